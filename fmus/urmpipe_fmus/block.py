@@ -1,20 +1,22 @@
-"""The variables of a unit: what FMI knows of a quantity, and what the unit does with it.
+"""Block models: FMI variables and the elementwise functions between them.
 
-A table over time inside a unit: the rows about an instant, found the same way in Python and in C.
+A block model is written once; a run over a log (`run.run`), a Python FMU, a native FMU and its documentation
+are made from it. With parameters p, inputs u, continuous states x and memories m (discrete states), at the
+communication point t_k and over the step to t_k+1:
 
-What the functions of a unit are given: the values of its variables, by name.
+    y = outputs(t_k, p, u, x_k, m_k)
+    m_k+1 = update(t_k, p, u, x_k, m_k)
+    x' = derivatives(t, p, u, x, m_k+1)    from t_k to t_k+1, by RK4 with u held
 
-The unit: a model with FMI variables, written once in elementwise NumPy.
+The functions take the values of the variables (`v.phi`, `v.time`) and return new ones by name. Each value is
+an element: a float, an array, or a symbol of a trace. So they use `+ - * /` and NumPy's elementwise functions
+(`dependencies.FUNCTIONS`), `np.where` instead of `if`, and no `np.linalg`.
 
-From a unit come a vectorised run over a log (`run`), a Python FMU, a native FMU and its documentation.
-Its functions take the values of the variables (`v.phi`, `v.time`) and return new ones by name. Each value
-is an element: a float, an array, or a symbol of a trace; so the functions use `+ - * /` and NumPy's
-elementwise functions (`dependencies.FUNCTIONS`), `np.where` instead of `if`, and no `np.linalg`.
-
-A table as a file in an FMU's resources, which the native runtime reads as well (native/runtime/table.c).
-
-All of it little-endian: 8 bytes "URMTABLE", then as 64-bit integers the version of the layout, the number of
-rows n and of columns; the n times in [ns] as int64; n rows of float64.
+1. Variables: `Parameter`, `Input`, `Output`, `State`, `Memory`.
+2. `Table`: values over time that a model plays; the rows at an instant are the same in Python and in C.
+3. `Values`: what a function is called with.
+4. `BlockModel`, and the `Recipe` from which a Python FMU makes it again.
+5. The file of a table in an FMU, which native/runtime/table.c reads too.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,24 +42,25 @@ Causality = Literal["parameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
 ValueType = Literal["Real", "Integer", "Boolean"]
 
-MAX_INTEGER = 2**31 - 1
-"""FMI 2.0's integers have 32 bits."""
+MAX_INTEGER = 2**31 - 1  # integers of FMI 2.0 have 32 bits
+MAX_TIME_NS = 2**63 - 1  # times of a table have 64 bits
+INTERNAL_STEP = "internal_step"  # parameter of every model with states: largest step of its integrator [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variable(ABC):
-    """A quantity of a unit; an array of them, `name[1]` .. `name[size]`, if it has a size.
+    """A quantity of a block model; with a size an array of scalars, `name[1]` .. `name[size]`.
 
     Attributes:
-        name: An identifier; the unit's functions read it as `v.name`.
-        description: One line for people.
-        unit: Spelled as FMI does: rad, m/s, N.m, kg.m2; empty for a number without a unit.
-        display_unit: The unit that people like to see, such as deg; empty for the unit itself.
-        start: Its value at the start, one for all or one an element.
-        minimum: The least value allowed.
-        maximum: The largest value allowed.
-        size: Number of elements; None for a scalar.
-        type: Real, or Integer or Boolean for numbers that stand for one; the functions see numbers (0, 1).
+        name: An identifier; the functions read it as `v.name`.
+        description: One line of text.
+        unit: Unit in FMI's spelling: rad, m/s, N.m, kg.m2; empty for a number without a unit.
+        display_unit: The unit that tools display, such as deg; empty for `unit`.
+        start: Start value, one for all scalars or one per scalar.
+        minimum: Smallest allowed value.
+        maximum: Largest allowed value.
+        size: Number of scalars of an array; None for a scalar.
+        type: Real, or Integer or Boolean for numbers that represent one; the functions see numbers (0, 1).
     """
 
     name: str
@@ -73,16 +76,16 @@ class Variable(ABC):
     @property
     @abstractmethod
     def causality(self) -> Causality:
-        """What FMI calls the variable's part."""
+        """FMI's causality."""
 
     @property
     def variability(self) -> Variability:
-        """When the variable may change."""
+        """FMI's variability."""
         return "continuous" if self.type == "Real" else "discrete"
 
     @property
     def width(self) -> int:
-        """How many scalars it is."""
+        """Number of its scalars."""
         return 1 if self.size is None else self.size
 
     @property
@@ -100,18 +103,18 @@ class Variable(ABC):
         return (float(self.start),) * self.width
 
     def scalar_start(self, scalar: str) -> float:
-        """Return the start value of one of its scalars, by the name of that."""
+        """Return the start value of a scalar by its name."""
         index = 0 if self.size is None else int(scalar[len(self.name) + 1 : -1]) - 1
         return self.starts[index]
 
     def faults(self) -> Iterator[str]:
-        """Yield what is wrong with the variable."""
+        """Yield the errors of the description."""
         if not (self.name.isidentifier() and self.name.isascii()) or self.name.startswith("_"):
             yield f"{format_value(self.name)}: found as a name, allowed: a letter, then letters, digits and _"
         starts = self.start if isinstance(self.start, tuple) else (self.start,)
-        if not all(isinstance(one, Real) for one in starts):
-            found = format_value(self.start)
-            yield f"{self.name}: start value {found}, allowed: a number, or a tuple of numbers"
+        if not all(isinstance(start, Real) for start in starts):
+            allowed = "a number, or a tuple of numbers"
+            yield f"{self.name}: start value {format_value(self.start)}, allowed: {allowed}"
             return
         if self.size is not None and self.size < 1:
             yield f"{self.name}: size {self.size}, allowed: 1 or more"
@@ -121,31 +124,29 @@ class Variable(ABC):
             yield f"{self.name}: min {self.minimum:g} above max {self.maximum:g}"
         yield from (f"{self.name}: {fault}" for fault in self._unit_faults())
         for name, start in zip(self.names, self.starts, strict=False):
-            yield from (f"{name}: start value {fault}" for fault in self.rejection_reasons(start))
+            yield from (f"{name}: start value {reason}" for reason in self.rejection_reasons(start))
 
     def _unit_faults(self) -> Iterator[str]:
         if self.type != "Real" and (self.unit or self.display_unit):
             yield f"found {self.type} with a unit, allowed: a unit of a Real"
             return
         if self.display_unit and not self.unit:
-            found = format_value(self.display_unit)
-            yield f"found display unit {found} without a unit, allowed: both or none"
+            display = format_value(self.display_unit)
+            yield f"found display unit {display} without a unit, allowed: both or none"
+        if not self.unit:
+            return
         try:
-            if self.unit:
-                display_conversion(self.unit, self.display_unit or self.unit)
-                yield from self._factor_faults()
+            display_conversion(self.unit, self.display_unit or self.unit)
+            in_si = coherent_unit(self.unit)
         except UnitError as error:
             yield str(error)
-
-    def _factor_faults(self) -> Iterator[str]:
-        """Yield why a unit is none that a model's equations can be written in: 1 deg/s is not 1 rad/s."""
-        in_si = coherent_unit(self.unit)
-        if not is_same_unit(self.unit, in_si):
+            return
+        if not is_same_unit(self.unit, in_si):  # equations need SI: 1 deg/s is not 1 rad/s
             as_well = f", with display_unit={self.unit!r} to show it so" if not self.display_unit else ""
             yield f"found unit {self.unit!r}, allowed: values in SI, unit={in_si!r}{as_well}"
 
     def rejection_reasons(self, value: float) -> Iterator[str]:
-        """Yield why one of its scalars cannot take a value: not finite, out of range, no integer."""
+        """Yield why a scalar cannot take a value: not finite, out of range, no integer."""
         if not math.isfinite(value):
             yield f"found {value:g}, allowed: a finite number"
         elif not self.minimum <= value <= self.maximum:
@@ -158,18 +159,14 @@ class Variable(ABC):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter(Variable):
-    """A constant of the model: tunable (may change between steps), or fixed once the simulation runs.
+    """A constant of the model.
 
     Attributes:
-        tunable: Whether it may change while the simulation runs.
+        tunable: Whether it may change between steps; else it is fixed from the first step on.
     """
 
+    causality: ClassVar[Causality] = "parameter"
     tunable: bool = True
-
-    @property
-    def causality(self) -> Causality:
-        """Parameter."""
-        return "parameter"
 
     @property
     def variability(self) -> Variability:
@@ -179,33 +176,27 @@ class Parameter(Variable):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Input(Variable):
-    """A quantity that the unit is given at every communication point."""
+    """A quantity that is set at every communication point."""
 
-    @property
-    def causality(self) -> Causality:
-        """Input."""
-        return "input"
+    causality: ClassVar[Causality] = "input"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output(Variable):
-    """A quantity that the unit's `outputs` computes from time, parameters, inputs and states.
+    """A quantity that `outputs` computes from time, parameters, inputs, states and memories.
 
-    Its start value is not used: what it starts with is computed.
+    Its start value is not used, as the first output is computed.
     """
 
-    @property
-    def causality(self) -> Causality:
-        """Output."""
-        return "output"
+    causality: ClassVar[Causality] = "output"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateVariable(Variable):
-    """A quantity that the unit remembers from step to step: a `State` or a `Memory`.
+    """A quantity that is kept from step to step: a `State` or a `Memory`.
 
     Attributes:
-        output: Whether it is an output itself; else it is local, to be looked at.
+        output: Whether it is an output; else it is a local variable.
     """
 
     output: bool = False
@@ -218,15 +209,10 @@ class StateVariable(Variable):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class State(StateVariable):
-    """A continuous state: the unit's `derivatives` gives its derivative in [unit/s]."""
-
-    def scalar_start(self, scalar: str) -> float:
-        """Return the start value of one of its scalars, by the name of that."""
-        index = 0 if self.size is None else int(scalar[len(self.name) + 1 : -1]) - 1
-        return self.starts[index]
+    """A continuous state: `derivatives` returns its derivative in [unit/s]."""
 
     def faults(self) -> Iterator[str]:
-        """Yield what is wrong with the variable."""
+        """Yield the errors of the description."""
         if self.type != "Real":
             yield f"{self.name}: found {self.type} as a state, allowed: Real (a Memory may be {self.type})"
         yield from super(State, self).faults()
@@ -234,25 +220,18 @@ class State(StateVariable):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Memory(StateVariable):
-    """A discrete state: it keeps its value between communication points, where `update` gives the next."""
+    """A discrete state, constant between communication points: `update` returns its next value."""
 
-    @property
-    def variability(self) -> Variability:
-        """Discrete."""
-        return "discrete"
-
-
-LAST_NS = 2**63 - 1
-"""The last time that 64 bits hold."""
+    variability: ClassVar[Variability] = "discrete"
 
 
 class Rows(NamedTuple):
-    """The rows of a table about an instant.
+    """The two rows of a table around an instant.
 
     Attributes:
-        before: Values of the last row at or before it, one element a column; before the first, the first.
-        after: Values of the row after that; beyond the last, the last.
-        fraction: How far the instant is from one to the other, 0 at a row and outside the table, below 1.
+        before: Values of the last row at or before it, one per column; the first row before the table.
+        after: Values of the next row; the last row after the table.
+        fraction: Position of the instant between them, from 0 to below 1; 0 at a row and outside the table.
     """
 
     before: tuple[Element, ...]
@@ -264,7 +243,7 @@ class Rows(NamedTuple):
 class Table:
     """Values over time.
 
-    Times are integer nanoseconds, so that t = k h meets the row that is meant and not its neighbour.
+    Times are integer nanoseconds, so that t = k h selects the intended row and not its neighbour.
 
     Attributes:
         t_ns: Times in [ns], strictly rising, shape (n,), n >= 1.
@@ -276,17 +255,17 @@ class Table:
     _times: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        given = np.asarray(self.t_ns)
-        if given.dtype.kind not in "iu":
-            raise UnitError(f"table: found times of type {given.dtype}, allowed: integers, in ns")
-        if given.size and given.max() > LAST_NS:
-            raise UnitError(f"table: found a time of {given.max()} ns, allowed: {LAST_NS} ns")
+        times = np.asarray(self.t_ns)
+        if times.dtype.kind not in "iu":
+            raise UnitError(f"table: found times of type {times.dtype}, allowed: integers, in ns")
+        if times.size and times.max() > MAX_TIME_NS:
+            raise UnitError(f"table: found a time of {times.max()} ns, allowed: {MAX_TIME_NS} ns")
         for name, value in (
-            ("t_ns", np.array(given, dtype=np.int64)),
+            ("t_ns", np.array(times, dtype=np.int64)),
             ("values", np.array(self.values, dtype=np.float64, order="C")),
-            ("_times", np.array(given, dtype=np.float64)),
+            ("_times", np.array(times, dtype=np.float64)),
         ):
-            value.flags.writeable = False  # a copy of its own: nobody changes what a unit holds
+            value.flags.writeable = False  # a copy, so that callers cannot change the model
             object.__setattr__(self, name, value)
         faults = list(self._faults())
         if faults:
@@ -301,7 +280,7 @@ class Table:
             return
         if len(self.t_ns) > MAX_INTEGER:
             yield f"table: found {len(self.t_ns)} rows, allowed: {MAX_INTEGER}"
-        falls = self.t_ns[1:] <= self.t_ns[:-1]  # their differences may have more than 64 bits
+        falls = self.t_ns[1:] <= self.t_ns[:-1]  # no differences: they may exceed 64 bits
         if falls.any():
             row = int(np.argmax(falls)) + 2
             yield f"table: the time of row {row} is not after the one before; allowed: rising times"
@@ -311,17 +290,17 @@ class Table:
 
     @property
     def columns(self) -> int:
-        """How many values a row has."""
+        """Number of values per row."""
         return int(self.values.shape[1])
 
     def rows_at(self, time: Element) -> Rows:
-        """Return the rows about a time in [s], a float or an array of shape (n,).
+        """Return the rows around a time in [s], a float or an array of shape (n,).
 
         The time is rounded to whole nanoseconds, halves away from zero as C's `round` does.
         """
         scaled = np.asarray(time, dtype=np.float64) * 1e9
-        whole = np.trunc(scaled)  # adding 0.5 first would round once more where half a ns is an ulp
-        instant = whole + np.where(np.abs(scaled - whole) >= 0.5, np.copysign(1.0, scaled), 0.0)
+        truncated = np.trunc(scaled)  # adding 0.5 first would round once more where half a ns is an ulp
+        instant = truncated + np.where(np.abs(scaled - truncated) >= 0.5, np.copysign(1.0, scaled), 0.0)
         times = self._times
         last = len(times) - 1
         before = np.clip(np.searchsorted(times, instant, side="right") - 1, 0, last)
@@ -333,24 +312,24 @@ class Table:
 
 
 class UnknownVariableError(UnitError, AttributeError):
-    """A unit's function reads a variable that the unit has not; also what `hasattr` and `copy` expect."""
+    """A function reads a variable that its model does not have; an AttributeError, as `hasattr` expects."""
 
 
 class Values:
-    """The values at an instant: `v.u` is an element, `v.phi` of a variable with a size a tuple of elements.
+    """Values at an instant: `v.u` is an element, `v.phi` of a variable with a size a tuple of elements.
 
     Attributes:
         time: The instant in [s].
-        table: The rows of the unit's table about the instant; None if the unit has none.
+        table: The rows of the model's table around the instant; None without a table.
     """
 
     time: Element
     table: Any
 
     def __init__(
-        self, time: Element, named: Mapping[str, Element | tuple[Element, ...]], table: Rows | None = None
+        self, time: Element, elements: Mapping[str, Element | tuple[Element, ...]], table: Rows | None = None
     ) -> None:
-        self.__dict__.update(named, time=time, table=table)
+        self.__dict__.update(elements, time=time, table=table)
 
     def __getattr__(self, name: str) -> Any:
         allowed = ", ".join(sorted(self.__dict__))
@@ -359,19 +338,16 @@ class Values:
 
 Function = Callable[[Values], Mapping[str, Element | Sequence[Element]]]
 
-INTERNAL_STEP = "internal_step"
-"""The parameter that every unit with continuous states gets: the largest step of its integrator in [s]."""
-
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How to make a unit again, where its FMU is run by Python.
+    """How a Python FMU makes its block model again.
 
     Attributes:
-        module: Import name of the module that makes it; of a user's file the name of the file.
-        function: The module's function that returns the unit; empty if the module holds it as a variable.
-        arguments: What the function is called with: strings, numbers, lists and mappings of them. A table
-            is not among them: a unit that has one takes it as the argument `table`.
+        module: Import name of the module that makes it; for a user's file the name of the file.
+        function: The module's function that returns the model; empty if the module has it as a variable.
+        arguments: Arguments of the function: strings, numbers, lists and mappings of them. A table is not
+            stored among them: the model's table is passed as the argument `table`.
         source: The text of a user's file; empty for a module of an installed package.
     """
 
@@ -385,23 +361,22 @@ class Recipe:
 class BlockModel:
     """A model with FMI variables.
 
-    At a communication point t_k the inputs are set and the outputs are those of these inputs at once:
-    `outputs` is a function of time, parameters, inputs and states. A step from t_k to t_k+1 first takes the
-    sample, `update` giving the next values of the memories from those of t_k, then integrates the states
-    with RK4 in steps of at most `internal_step`, the inputs held.
+    At a communication point t_k the inputs are set and the outputs follow them without delay. A step from
+    t_k to t_k+1 first samples: `update` returns the next values of the memories from the values at t_k. Then
+    the states are integrated by RK4 in steps of at most `internal_step`, with the inputs held.
 
     Attributes:
         name: An identifier: the name of the block, of the FMU's file and of its binaries.
-        description: One line for people.
+        description: One line of text.
         variables: In the order in which importers show them.
-        outputs: The values of all `Output`s; None if there are none.
-        derivatives: The derivatives of all `State`s, in [unit/s]; None if there are none.
-        update: The next values of all `Memory`s; None if there are none.
+        outputs: The values of all `Output`s; None without outputs.
+        derivatives: The derivatives of all `State`s, in [unit/s]; None without states.
+        update: The next values of all `Memory`s; None without memories.
         internal_step: Largest step of the integrator in [s], the start value of a parameter of that name.
-        table: Rows over time, to be read as `v.table`; None for most units.
-        equations: The model as people write it, a line an equation or remark.
-        source: Where the equations come from.
-        recipe: How to make the unit again.
+        table: Rows over time, available as `v.table`; None for most models.
+        equations: The model in readable form, one line per equation or remark.
+        source: The source of the equations.
+        recipe: How to make the model again.
     """
 
     name: str
@@ -417,7 +392,7 @@ class BlockModel:
     recipe: Recipe = field(default_factory=Recipe)
 
     def __post_init__(self) -> None:
-        if self.states and not any(one.name == INTERNAL_STEP for one in self.variables):
+        if self.states and not any(variable.name == INTERNAL_STEP for variable in self.variables):
             step = Parameter(
                 name=INTERNAL_STEP,
                 description="Largest step of the integrator (RK4)",
@@ -427,88 +402,85 @@ class BlockModel:
                 tunable=False,
             )
             object.__setattr__(self, "variables", (*self.variables, step))
-        faults = [f"unit {self.name}: {fault}" for fault in self._faults()]
+        faults = [f"unit {self.name}: {fault}" for fault in [*self._type_faults()] or [*self._faults()]]
         if faults:
             raise UnitError(*faults)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its parameters, in order."""
-        return tuple(one for one in self.variables if isinstance(one, Parameter))
+        return tuple(variable for variable in self.variables if isinstance(variable, Parameter))
 
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
         """Its inputs, in order."""
-        return tuple(one for one in self.variables if isinstance(one, Input))
+        return tuple(variable for variable in self.variables if isinstance(variable, Input))
 
     @cached_property
     def states(self) -> tuple[State, ...]:
         """Its continuous states, in order."""
-        return tuple(one for one in self.variables if isinstance(one, State))
+        return tuple(variable for variable in self.variables if isinstance(variable, State))
 
     @cached_property
     def memories(self) -> tuple[Memory, ...]:
         """Its discrete states, in order."""
-        return tuple(one for one in self.variables if isinstance(one, Memory))
+        return tuple(variable for variable in self.variables if isinstance(variable, Memory))
 
     @cached_property
     def computed(self) -> tuple[Output, ...]:
         """The outputs that `outputs` computes, in order."""
-        return tuple(one for one in self.variables if isinstance(one, Output))
+        return tuple(variable for variable in self.variables if isinstance(variable, Output))
 
     @cached_property
     def arguments(self) -> tuple[Variable, ...]:
-        """All that the functions are given, by kind: parameters, inputs, states, memories."""
+        """The variables that the functions read, by kind: parameters, inputs, states, memories."""
         return (*self.parameters, *self.inputs, *self.states, *self.memories)
 
     @cached_property
     def scalars(self) -> tuple[tuple[str, Variable], ...]:
         """Name and variable of every scalar, in order: the index is FMI's value reference."""
-        return tuple((name, one) for one in self.variables for name in one.names)
+        return tuple((name, variable) for variable in self.variables for name in variable.names)
 
-    def _wrong_kinds(self) -> Iterator[str]:
-        """Yield what is of a kind that Python takes and FMI does not know."""
-        for one in self.variables:
-            if not isinstance(one, (Parameter, Input, Output, State, Memory)):
+    def _type_faults(self) -> Iterator[str]:
+        """Yield the fields whose types Python accepts, but FMI does not know."""
+        for variable in self.variables:
+            if not isinstance(variable, (Parameter, Input, Output, State, Memory)):
                 allowed = "a Parameter, Input, Output, State or Memory"
-                yield f"found {format_value(one)} as a variable, allowed: {allowed}"
+                yield f"found {format_value(variable)} as a variable, allowed: {allowed}"
                 continue
             for key in ("name", "description", "unit", "display_unit"):
-                yield from _no_text(f"{one.name}: {key}", getattr(one, key))
-            if one.type not in get_args(ValueType):
-                allowed = ", ".join(get_args(ValueType))
-                yield f"{one.name}: found type {format_value(one.type)}, allowed: {allowed}"
-            if one.size is not None and type(one.size) is not int:
-                size = format_value(one.size)
-                yield f"{one.name}: found size {size}, allowed: an integer; None for a scalar"
+                yield from _text_fault(f"{variable.name}: {key}", getattr(variable, key))
+            if variable.type not in (types := get_args(ValueType)):
+                kind = format_value(variable.type)
+                yield f"{variable.name}: found type {kind}, allowed: {', '.join(types)}"
+            if variable.size is not None and type(variable.size) is not int:
+                size = format_value(variable.size)
+                yield f"{variable.name}: found size {size}, allowed: an integer; None for a scalar"
         for key in ("name", "description", "source"):
-            yield from _no_text(key, getattr(self, key))
+            yield from _text_fault(key, getattr(self, key))
         if isinstance(self.equations, str):
             yield f"equations: found {format_value(self.equations)}, allowed: a tuple of texts, a line each"
 
     def _faults(self) -> Iterator[str]:
-        wrong = list(self._wrong_kinds())
-        if wrong:
-            yield from wrong
-            return
         if not self.name.isidentifier() or not self.name.isascii():
             name = format_value(self.name)
             yield f"found {name} as its name, allowed: a letter, then letters, digits and _"
         if not self.variables:
             yield "found no variables, allowed: one or more (FMI has no FMU without them)"
-        names = [one.name for one in self.variables]
+        names = [variable.name for variable in self.variables]
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield f"{name}: found twice, allowed: each name once"
         for name in {"time", "table"} & set(names):
             yield f"{name}: found as a variable, allowed: another name (v.{name} is given to all units)"
-        for one in self.variables:
-            yield from one.faults()
-            if one.name == INTERNAL_STEP and not _is_internal_step(one):
-                yield f"{one.name}: found as a variable, allowed: one Real parameter with a min above 0"
-        yield from self._missing()
-
-    def _missing(self) -> Iterator[str]:
-        """Yield the functions that lack variables, and the variables that lack a function."""
+        for variable in self.variables:
+            yield from variable.faults()
+            if variable.name == INTERNAL_STEP and not (
+                isinstance(variable, Parameter)
+                and variable.type == "Real"
+                and variable.size is None
+                and variable.minimum > 0.0
+            ):
+                yield f"{variable.name}: found as a variable, allowed: one Real parameter with a min above 0"
         for kind, variables, function, name in (
             ("output", self.computed, self.outputs, "outputs"),
             ("state", self.states, self.derivatives, "derivatives"),
@@ -520,18 +492,15 @@ class BlockModel:
                 yield f"`{name}` is set, but no {kind} is declared"
 
 
-def _is_internal_step(one: Variable) -> bool:
-    return isinstance(one, Parameter) and one.type == "Real" and one.size is None and one.minimum > 0.0
-
-
-def _no_text(what: str, value: Any) -> Iterator[str]:
+def _text_fault(what: str, value: Any) -> Iterator[str]:
     if not isinstance(value, str):
         yield f"{what}: found {format_value(value)}, allowed: a text"
 
 
-TABLE_FILE = "resources/table.bin"
-"""Where the file belongs in an FMU."""
+TABLE_FILE = "resources/table.bin"  # path in an FMU
 
+# Little-endian: "URMTABLE", then as 64-bit integers the version of the layout, the numbers of rows n and of
+# columns; the n times in [ns] as int64; n rows of float64.
 _HEADER = struct.Struct("<8sQQQ")
 _MAGIC = b"URMTABLE"
 _VERSION = 1
@@ -558,15 +527,11 @@ def read_table(path: Path) -> Table:
     _, version, rows, columns = _HEADER.unpack_from(content)
     length = _HEADER.size + 8 * rows * (columns + 1)
     if version != _VERSION or len(content) != length:
-        raise FmuError(
-            Finding(
-                f"found version {version}, {len(content)} bytes, allowed: version {_VERSION}, {length} bytes",
-                file=str(path),
-            )
-        )
+        layout = f"found version {version}, {len(content)} bytes"
+        raise FmuError(Finding(f"{layout}, allowed: version {_VERSION}, {length} bytes", file=str(path)))
     times = np.frombuffer(content, "<i8", rows, _HEADER.size)
     values = np.frombuffer(content, "<f8", rows * columns, _HEADER.size + 8 * rows)
     try:
         return Table(times.astype(np.int64), values.reshape(rows, columns).astype(np.float64))
     except UnitError as error:
-        raise FmuError(*(replace(one, file=str(path)) for one in error.findings)) from error
+        raise FmuError(*(replace(finding, file=str(path)) for finding in error.findings)) from error

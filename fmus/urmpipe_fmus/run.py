@@ -1,8 +1,10 @@
-"""A unit's functions on flat lists of scalars: the form in which they are run, traced and looked into.
+"""Running block models in Python: the functions of a model, the rules of a step, and a run over a log.
 
-An instance of a unit in Python: the rules of a step, which the native runtime follows line by line.
-
-A unit over a log: all samples at once where it remembers nothing, else sample by sample.
+1. `Equations` calls the functions of a model with one element per scalar and checks what they return. Runs,
+   traces to C and the search of dependencies all call the functions in this way.
+2. `Instance` steps a model through time. Its rules (`do_step` is fmi2DoStep) are those of all FMUs: a Python
+   FMU contains it, and native/runtime/stepping.c follows it line by line, with the constants below.
+3. `run` computes the outputs of a model over the samples of a log.
 """
 
 from __future__ import annotations
@@ -32,9 +34,15 @@ from urmpipe_fmus.block import (
 from urmpipe_models.elementwise import Element, FloatArray
 from urmpipe_models.errors import Finding, UnitError, UrmpipeError
 
+STEP_SLACK = 1e-9  # of an internal step; k h - (k - 1) h is rounded, and must not take one step more
+TIME_SLACK = 1e-6  # of a step: allowed distance of the communication point from the time of the instance
+# Of the time itself, for short steps: start + k h is rounded here, in the importer, and in the step before.
+ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+STOP_SLACK = 0.1  # of a step: allowed excess over the stop time, from adding up steps
+
 
 class Equations:
-    """What a unit computes, from one element a scalar to one element a scalar.
+    """The functions of a block model, from one element per scalar to one element per scalar.
 
     Each method takes the elements of `model.arguments` in their order: parameters, inputs, states, memories.
 
@@ -45,133 +53,119 @@ class Equations:
     def __init__(self, model: BlockModel) -> None:
         self.model = model
 
-    def outputs(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
+    def outputs(self, time: Element, arguments: Sequence[Element], rows: Rows | None = None) -> list[Element]:
         """Return the elements of `model.computed`."""
-        return self._called("outputs", self.model.outputs, self.model.computed, time, given, rows)
+        return self._call("outputs", self.model.outputs, self.model.computed, time, arguments, rows)
 
-    def derivatives(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
+    def derivatives(
+        self, time: Element, arguments: Sequence[Element], rows: Rows | None = None
+    ) -> list[Element]:
         """Return the derivatives of `model.states` in [unit/s]."""
-        return self._called("derivatives", self.model.derivatives, self.model.states, time, given, rows)
+        return self._call("derivatives", self.model.derivatives, self.model.states, time, arguments, rows)
 
-    def update(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
+    def update(self, time: Element, arguments: Sequence[Element], rows: Rows | None = None) -> list[Element]:
         """Return the next values of `model.memories`."""
-        return self._called("update", self.model.update, self.model.memories, time, given, rows)
+        return self._call("update", self.model.update, self.model.memories, time, arguments, rows)
 
-    def _called(
+    def _call(
         self,
-        what: str,
+        name: str,
         function: Function | None,
         variables: Sequence[Variable],
         time: Element,
-        given: Sequence[Element],
+        arguments: Sequence[Element],
         rows: Rows | None,
     ) -> list[Element]:
-        """Return what a function of the unit gives for some variables, flat."""
         if function is None:
             return []
-        where = f"unit {self.model.name}: {what}"
-        values = Values(time, elements_to_dict(self.model.arguments, given), rows)
+        values = Values(time, elements_to_dict(self.model.arguments, arguments), rows)
         try:
-            with np.errstate(all="ignore"):  # 1/0 is inf, as in C; who uses it asks whether it is finite
+            with np.errstate(all="ignore"):  # 1/0 is inf, as in C; users of the result check if it is finite
                 result = function(values)
             return dict_to_elements(result, variables)
         except Exception as error:
-            raise UnitError(*_told(where, function, error)) from error
+            findings = _locate_error(f"unit {self.model.name}: {name}", function, error)
+            raise UnitError(*findings) from error
 
 
-def _told(where: str, function: Function, error: Exception) -> Iterator[Finding]:
-    """Yield what went wrong in a unit's function, and in which line of its file; else where it begins."""
+def _locate_error(where: str, function: Function, error: Exception) -> Iterator[Finding]:
+    """Yield the findings of an error in a model's function, at its line, or at the function's first line."""
     code = getattr(function, "__code__", None)
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if code and frame.filename == code.co_filename]
     place = {"file": code.co_filename, "line": [code.co_firstlineno, *lines][-1]} if code else {}
-    if isinstance(error, UrmpipeError):
-        said = error.findings
-    else:
-        said = (Finding(f"{type(error).__name__}: {error}"),)
-    return (replace(one, message=": ".join(filter(None, (where, one.message))), **place) for one in said)
+    other = (Finding(f"{type(error).__name__}: {error}"),)
+    for finding in error.findings if isinstance(error, UrmpipeError) else other:
+        yield replace(finding, message=": ".join(filter(None, (where, finding.message))), **place)
 
 
 def elements_to_dict(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[str, Any]:
     """Return the elements of variables by name: one, or a tuple of them for a variable with a size."""
     rest = iter(elements)
-    return {one.name: next(rest) if one.size is None else tuple(islice(rest, one.size)) for one in variables}
+    return {
+        variable.name: next(rest) if variable.size is None else tuple(islice(rest, variable.size))
+        for variable in variables
+    }
 
 
 def dict_to_elements(result: Any, variables: Sequence[Variable]) -> list[Element]:
-    """Return what a function gave by name as one element a scalar, in the order of the variables.
+    """Return the result of a function as one element per scalar, in the order of the variables.
 
     Raises:
-        UnitError: If it is no mapping, a name is missing or unknown, or one has not its variable's size.
+        UnitError: If it is no mapping, a name is missing or unknown, or a size differs from its variable's.
     """
     if not isinstance(result, Mapping):
-        raise UnitError(
-            f"returns {_kind(result)}, allowed: a dict of {', '.join(one.name for one in variables)}"
-        )
-    faults = list(_faults(result, variables))
+        names = ", ".join(variable.name for variable in variables)
+        raise UnitError(f"returns {_kind(result)}, allowed: a dict of {names}")
+    faults = list(_result_faults(result, variables))
     if faults:
         raise UnitError(*faults)
     return [
         element
-        for one in variables
-        for element in ((result[one.name],) if one.size is None else result[one.name])
+        for variable in variables
+        for element in ((result[variable.name],) if variable.size is None else result[variable.name])
     ]
 
 
-def _faults(result: Mapping[str, Any], variables: Sequence[Variable]) -> Iterator[str]:
-    expected = {one.name: one for one in variables}
+def _result_faults(result: Mapping[str, Any], variables: Sequence[Variable]) -> Iterator[str]:
+    expected = {variable.name: variable for variable in variables}
     for name in sorted(set(result) - set(expected), key=str):
         yield f"{name}: found in what it returns, allowed: {', '.join(expected)}"
-    for name, one in expected.items():
+    for name, variable in expected.items():
         if name not in result:
             yield f"{name}: not found in what it returns, allowed: all of {', '.join(expected)}"
             continue
-        found = result[name]
-        if one.size is None:
-            yield from _element_faults(name, found)
-        elif not isinstance(found, (tuple, list)):
-            yield f"{name}: found {_kind(found)}, allowed: a tuple of {one.size} elements"
-        elif len(found) != one.size:
-            yield f"{name}: found {len(found)} elements, allowed: {one.size}"
+        value = result[name]
+        if variable.size is None:
+            scalars = [(name, value)]
+        elif not isinstance(value, (tuple, list)):
+            yield f"{name}: found {_kind(value)}, allowed: a tuple of {variable.size} elements"
+            continue
+        elif len(value) != variable.size:
+            yield f"{name}: found {len(value)} elements, allowed: {variable.size}"
+            continue
         else:
-            for scalar, element in zip(one.names, found, strict=True):
-                yield from _element_faults(scalar, element)
-
-
-def _element_faults(name: str, found: Any) -> Iterator[str]:
-    if found is None or isinstance(found, (str, complex, tuple, list, dict)):
-        yield f"{name}: found {_kind(found)}, allowed: one element"
+            scalars = [*zip(variable.names, value, strict=True)]
+        for scalar, element in scalars:
+            if element is None or isinstance(element, (str, complex, tuple, list, dict)):
+                yield f"{scalar}: found {_kind(element)}, allowed: one element"
 
 
 def _kind(value: Any) -> str:
-    return "nothing (None)" if value is None else f"{type(value).__name__}"
-
-
-STEP_SLACK = 1e-9
-"""A step of n internal steps but for this share of one takes n of them: k h - (k-1) h is not quite h."""
-
-TIME_SLACK = 1e-6
-"""A communication point may differ by this share of the step from where the instance stands."""
-
-ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""And by this share of itself, however short the step: start + k h is rounded here, in the master, and again
-in where the step before ended."""
-
-STOP_SLACK = 0.1
-"""This share of a step past the stop time is what adding up steps may bring."""
+    return "nothing (None)" if value is None else type(value).__name__
 
 
 class Instance:
-    """A unit that is stepped through time.
+    """A block model that is stepped through time; the rules of its calls are those of the FMUs.
 
-    Values are NumPy's doubles, which compute as C's do: 1/0 is inf, and raises nothing. They may be elements
-    of shape (runs,) as well, which step many runs side by side.
+    Values are NumPy's doubles, which compute as C's do: 1/0 is inf and raises nothing. They may be arrays of
+    shape (runs,), which steps many runs in parallel.
 
     Attributes:
         model: The block model.
-        time: Where it stands in [s].
-        stop: Where the simulation ends in [s]; infinite if that is not said.
-        running: Whether fixed parameters are fixed: from the first step on.
+        time: The time that it has reached, in [s].
+        stop: The stop time in [s]; infinite without one.
+        running: Whether a step was taken: then fixed parameters and states can no longer be set.
     """
 
     def __init__(self, model: BlockModel, time: Element = 0.0) -> None:
@@ -182,173 +176,134 @@ class Instance:
         self._equations = Equations(model)
         self._owner = [variable for _, variable in model.scalars]
         self._index = {name: index for index, (name, _) in enumerate(model.scalars)}
-        self._values: list[Element] = [np.float64(start) for one in model.variables for start in one.starts]
-        self._given = self._places(model.arguments)
-        self._states = self._places(model.states)
-        self._memories = self._places(model.memories)
-        self._computed = self._places(model.computed)
-        self._stale = True
+        self._values: list[Element] = [
+            np.float64(start) for variable in model.variables for start in variable.starts
+        ]
+        self._arguments, self._states, self._memories, self._computed = (
+            [self._index[name] for variable in variables for name in variable.names]
+            for variables in (model.arguments, model.states, model.memories, model.computed)
+        )
+        self._stale = True  # whether the outputs must be computed before they are read
 
     def reference(self, name: str) -> int:
         """Return the value reference of a scalar.
 
         Raises:
-            UnitError: If the unit has no such scalar.
+            UnitError: If the model has no such scalar.
         """
         if name not in self._index:
-            allowed = ", ".join(self._index)
-            raise UnitError(f"unit {self.model.name}: no variable {name}; allowed: {allowed}")
+            raise self._error(f"no variable {name}; allowed: {', '.join(self._index)}")
         return self._index[name]
 
-    def set(self, references: Sequence[int], values: Sequence[Element]) -> None:
-        """Set scalars: all of them, or none if one is refused.
+    def setup_experiment(self, time: float, stop: float | None = None) -> None:
+        """Set the start time in [s] before the first step, and the stop time (fmi2SetupExperiment).
 
         Raises:
-            UnitError: With all that is refused: no such reference, an output, a value not finite or out of
-                range, a fixed parameter or a state of a running instance.
+            UnitError: If the time is not finite, or the stop time before it.
+        """
+        if not math.isfinite(time):
+            raise self._error(f"startTime: found {time:g}, allowed: a finite number")
+        if stop is not None and not stop >= time:
+            raise self._error(f"stopTime: found {stop:g}, allowed: from the start time {time:g} on")
+        self.time, self._stale = np.float64(time), True
+        self.stop = math.inf if stop is None else stop
+
+    def set(self, references: Sequence[int], values: Sequence[Element]) -> None:
+        """Set scalars (fmi2SetReal and its like): all of them, or none if one is rejected.
+
+        Raises:
+            UnitError: With all rejections: no such reference, an output, a value not finite or out of range,
+                a fixed parameter or a state of a running instance.
         """
         faults = [
             fault
             for reference, value in zip(references, values, strict=True)
-            for fault in self._refusals(reference, value)
+            for fault in self._rejection_reasons(reference, value)
         ]
         if faults:
-            raise UnitError(*(f"unit {self.model.name}: {fault}" for fault in faults))
+            raise self._error(*faults)
         for reference, value in zip(references, values, strict=True):
-            self._values[reference] = _doubles(value)
+            self._values[reference] = _to_double(value)
         self._stale = True
 
     def get(self, references: Sequence[int]) -> list[Element]:
-        """Return scalars; outputs are those of the inputs as they stand now.
+        """Return scalars (fmi2GetReal and its like); outputs follow the inputs that are set, without a step.
 
         Raises:
             UnitError: If there is no such reference, or an output is not finite.
         """
         for reference in references:
             if not 0 <= reference < len(self._owner):
-                raise UnitError(f"unit {self.model.name}: {self._no_reference(reference)}")
+                raise self._error(self._reference_fault(reference))
             if self._stale and isinstance(self._owner[reference], Output):
-                self._refresh()
+                outputs = self._equations.outputs(self.time, self._read_arguments(), self._rows(self.time))
+                self._put(self._computed, outputs, "output")
+                self._stale = False
         return [self._values[reference] for reference in references]
 
     def do_step(self, time: float, step: float) -> None:
-        """Take the sample at a communication point, and go to the next.
+        """Step from a communication point to the next (fmi2DoStep).
+
+        1. The step must be finite and above 0, begin at the time of the instance (`TIME_SLACK`, `ROUNDING`)
+           and end at the stop time at the latest (`STOP_SLACK`).
+        2. Sample: `update` gives the next values of the memories from the values at the communication point.
+        3. Integrate the states (`_integrate`), with inputs and memories held.
 
         Args:
             time: The communication point in [s].
-            step: To the next one in [s], above 0.
+            step: Distance of the next one in [s], above 0.
 
         Raises:
-            UnitError: If the step is not above 0, does not begin where the instance stands, goes past the
-                stop time or is too long for its internal steps, or a state is not finite after it; then
-                nothing changed, but that what is fixed from the first step on stays fixed.
+            UnitError: If the step is not allowed or too long for its internal steps, or a state is not finite
+                after it. Then nothing has changed, except that the instance is running.
         """
         if not (math.isfinite(time + step) and step > 0.0):
-            raise UnitError(
-                f"unit {self.model.name}: found a step of {step:g} s at {time:g} s, allowed: finite, above 0"
-            )
+            raise self._error(f"found a step of {step:g} s at {time:g} s, allowed: finite, above 0")
         if not abs(time - self.time) <= max(TIME_SLACK * step, ROUNDING * abs(time)):
-            raise UnitError(
-                f"unit {self.model.name}: found a step from {time:.15g} s,"
-                f" allowed: from where it stands, {self.time:.15g} s"
-            )
+            stands = f"from where it stands, {self.time:.15g} s"
+            raise self._error(f"found a step from {time:.15g} s, allowed: {stands}")
         if time + step - self.stop > STOP_SLACK * step:
-            raise UnitError(
-                f"unit {self.model.name}: found a step to {time + step:g} s,"
-                f" allowed: to the stop time, {self.stop:g} s"
+            raise self._error(
+                f"found a step to {time + step:g} s, allowed: to the stop time, {self.stop:g} s"
             )
         before = (self.time, list(self._values), self._stale)
         self.running = True
         try:
-            with np.errstate(all="ignore"):  # what is not finite is told
-                self._sample(np.float64(time))
-                self._integrate(np.float64(time), np.float64(step))
+            with np.errstate(all="ignore"):  # values that are not finite are reported
+                t = np.float64(time)
+                samples = self._equations.update(t, self._read_arguments(), self._rows(t))
+                self._put(self._memories, samples, "next value")
+                self._integrate(t, np.float64(step))
         except BaseException:
             self.time, self._values, self._stale = before
             raise
         self.time, self._stale = np.float64(time) + step, True
 
-    def setup_experiment(self, time: float, stop: float | None = None) -> None:
-        """Put the instance at its start time in [s], before the first step; no step may go past `stop`.
-
-        Raises:
-            UnitError: If the time is not finite, or the stop time before it.
-        """
-        if not math.isfinite(time):
-            raise UnitError(f"unit {self.model.name}: startTime: found {time:g}, allowed: a finite number")
-        if stop is not None and not stop >= time:
-            raise UnitError(
-                f"unit {self.model.name}: stopTime: found {stop:g}, allowed: from the start time {time:g} on"
-            )
-        self.time, self._stale = np.float64(time), True
-        self.stop = math.inf if stop is None else stop
-
-    def save(self) -> Any:
-        """Return all that the instance remembers, to be given to `restore`."""
-        return self.time, self.running, list(self._values)
-
-    def restore(self, saved: Any) -> None:
-        """Go back to where `save` was called."""
-        self.time, self.running, values = saved
-        self._values, self._stale = list(values), True
-
-    def _places(self, variables: Sequence[Variable]) -> list[int]:
-        return [self._index[name] for one in variables for name in one.names]
-
-    def _no_reference(self, reference: int) -> str:
-        return f"value reference {reference}: found, allowed: 0 to {len(self._owner) - 1}"
-
-    def _refusals(self, reference: int, value: Element) -> list[str]:
-        """Return why a scalar cannot be set."""
-        if not 0 <= reference < len(self._owner):
-            return [self._no_reference(reference)]
-        one, name = self._owner[reference], self.model.scalars[reference][0]
-        if isinstance(one, Output):
-            return [f"{name}: set, allowed: an output is computed, not set"]
-        if self.running and isinstance(one, (State, Memory)):
-            return [f"{name}: set while it runs, allowed: a state before the first step"]
-        if self.running and isinstance(one, Parameter) and not one.tunable:
-            return [f"{name}: set while it runs, allowed: a fixed parameter before the first step"]
-        return [
-            f"{name}: {fault}" for each in _extremes(one, value) for fault in one.rejection_reasons(each)
-        ][:1]
-
-    def _rows(self, time: Element) -> Rows | None:
-        return None if self.model.table is None else self.model.table.rows_at(time)
-
-    def _elements(self) -> list[Element]:
-        return [self._values[place] for place in self._given]
-
-    def _refresh(self) -> None:
-        """Compute the outputs."""
-        found = self._equations.outputs(self.time, self._elements(), self._rows(self.time))
-        self._put(self._computed, found, "output")
-        self._stale = False
-
-    def _sample(self, time: float) -> None:
-        """Take the sample: the memories' next values from the values at the communication point."""
-        found = self._equations.update(time, self._elements(), self._rows(time))
-        self._put(self._memories, found, "next value")
-
     def _integrate(self, time: float, step: float) -> None:
-        """Integrate the states over a step with the classical Runge-Kutta method (RK4)."""
+        """Integrate the states by the classical Runge-Kutta method (RK4) in n equal steps.
+
+        n = max(1, ceil(step / internal_step - STEP_SLACK)), h = step / n, and with f the derivatives:
+
+            x := x + h / 6 (k1 + 2 k2 + 2 k3 + k4)
+            k1 = f(t, x), k2 = f(t + h/2, x + h/2 k1), k3 = f(t + h/2, x + h/2 k2), k4 = f(t + h, x + h k3)
+        """
         if not self._states:
             return
         largest = self._values[self._index[INTERNAL_STEP]]
         if step / largest > MAX_INTEGER:
-            raise UnitError(
-                f"unit {self.model.name}: found a step of {step:g} s in internal steps of {largest:g} s,"
+            raise self._error(
+                f"found a step of {step:g} s in internal steps of {largest:g} s,"
                 f" allowed: {MAX_INTEGER} internal steps"
             )
         count = max(1, math.ceil(step / largest - STEP_SLACK))
         h = step / count
         for k in range(count):
             t = time + k * h
-            x = [self._values[place] for place in self._states]
-            k1 = self._rates(t, x)
-            k2 = self._rates(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(x, k1, strict=True)])
-            k3 = self._rates(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(x, k2, strict=True)])
-            k4 = self._rates(t + h, [a + h * b for a, b in zip(x, k3, strict=True)])
+            x = [self._values[index] for index in self._states]
+            k1 = self._derivatives(t, x)
+            k2 = self._derivatives(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(x, k1, strict=True)])
+            k3 = self._derivatives(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(x, k2, strict=True)])
+            k4 = self._derivatives(t + h, [a + h * b for a, b in zip(x, k3, strict=True)])
             slopes = zip(x, k1, k2, k3, k4, strict=True)
             self._put(
                 self._states,
@@ -356,49 +311,83 @@ class Instance:
                 "state",
             )
 
-    def _rates(self, time: float, states: Sequence[Element]) -> list[Element]:
-        """Return the derivatives at a time and for some states, the rest as it stands."""
+    def _derivatives(self, time: float, states: Sequence[Element]) -> list[Element]:
+        """Return the derivatives at a time for other states and the present values of all else."""
         values = list(self._values)
-        for place, state in zip(self._states, states, strict=True):
-            values[place] = state
-        return self._equations.derivatives(time, [values[place] for place in self._given], self._rows(time))
+        for index, state in zip(self._states, states, strict=True):
+            values[index] = state
+        arguments = [values[index] for index in self._arguments]
+        return self._equations.derivatives(time, arguments, self._rows(time))
 
-    def _put(self, places: Sequence[int], found: Sequence[Element], what: str) -> None:
-        """Take new values over.
+    def save(self) -> Any:
+        """Return the state of the instance for `restore` (fmi2GetFMUstate)."""
+        return self.time, self.running, list(self._values)
 
-        Raises:
-            UnitError: If one is not finite.
-        """
-        taken = [_doubles(value) for value in found]
+    def restore(self, saved: Any) -> None:
+        """Return to the state at which `save` was called (fmi2SetFMUstate)."""
+        self.time, self.running, values = saved
+        self._values, self._stale = list(values), True
+
+    def _rejection_reasons(self, reference: int, value: Element) -> list[str]:
+        """Return why a scalar cannot be set, if so."""
+        if not 0 <= reference < len(self._owner):
+            return [self._reference_fault(reference)]
+        variable, name = self._owner[reference], self.model.scalars[reference][0]
+        if isinstance(variable, Output):
+            return [f"{name}: set, allowed: an output is computed, not set"]
+        if self.running and isinstance(variable, (State, Memory)):
+            return [f"{name}: set while it runs, allowed: a state before the first step"]
+        if self.running and isinstance(variable, Parameter) and not variable.tunable:
+            return [f"{name}: set while it runs, allowed: a fixed parameter before the first step"]
+        return [
+            f"{name}: {reason}"
+            for extreme in _extremes(variable, value)
+            for reason in variable.rejection_reasons(extreme)
+        ][:1]
+
+    def _reference_fault(self, reference: int) -> str:
+        return f"value reference {reference}: found, allowed: 0 to {len(self._owner) - 1}"
+
+    def _rows(self, time: Element) -> Rows | None:
+        return None if self.model.table is None else self.model.table.rows_at(time)
+
+    def _read_arguments(self) -> list[Element]:
+        return [self._values[index] for index in self._arguments]
+
+    def _put(self, indices: Sequence[int], results: Sequence[Element], what: str) -> None:
+        """Store results of the functions; `UnitError` if one is not finite."""
+        values = [_to_double(result) for result in results]
         faults = [
-            f"unit {self.model.name}: {what} {self.model.scalars[place][0]} is not finite at"
-            f" {self._first_not_finite(value):g} s"
-            for place, value in zip(places, taken, strict=True)
-            if not _all_finite(value)
+            f"{what} {self.model.scalars[index][0]} is not finite at {self._first_not_finite(value):g} s"
+            for index, value in zip(indices, values, strict=True)
+            if not _is_finite(value)
         ]
         if faults:
-            raise UnitError(*faults)
-        for place, value in zip(places, taken, strict=True):
-            self._values[place] = value
+            raise self._error(*faults)
+        for index, value in zip(indices, values, strict=True):
+            self._values[index] = value
 
     def _first_not_finite(self, value: Element) -> float:
-        """Return the time of the first of some values that is not finite."""
+        """Return the time of the first element that is not finite."""
         times, values = np.broadcast_arrays(self.time, value)
         return float(times[~np.isfinite(values)][0])
 
-
-def _doubles(value: Element) -> Element:
-    """Return a value as C has it; a column as one of our own, which nobody else changes."""
-    column = isinstance(value, np.ndarray) and value.ndim > 0
-    return np.array(value, dtype=np.float64) if column else np.float64(value)
+    def _error(self, *messages: str) -> UnitError:
+        return UnitError(*(f"unit {self.model.name}: {message}" for message in messages))
 
 
-def _all_finite(value: Element) -> bool:
+def _to_double(value: Element) -> Element:
+    """Return a value as C's double; of an array a copy, so that callers cannot change it."""
+    is_array = isinstance(value, np.ndarray) and value.ndim > 0
+    return np.array(value, dtype=np.float64) if is_array else np.float64(value)
+
+
+def _is_finite(value: Element) -> bool:
     return math.isfinite(value) if isinstance(value, float) else bool(np.isfinite(value).all())
 
 
 def _extremes(variable: Variable, value: Element) -> list[float]:
-    """Return values of which one is refused if any of an element is: of a column its bounds."""
+    """Return values of which one is rejected if any element is: of an array its bounds."""
     if not isinstance(value, np.ndarray):
         return [float(value)]
     values = np.ravel(np.float64(value))
@@ -406,7 +395,7 @@ def _extremes(variable: Variable, value: Element) -> list[float]:
         values = np.unique(values)
     elif values.size:
         values = np.array([values.min(), values.max()])
-    return [float(one) for one in values]
+    return [float(extreme) for extreme in values]
 
 
 def run(
@@ -415,7 +404,9 @@ def run(
     inputs: Mapping[str, Any] | None = None,
     start: Mapping[str, Any] | None = None,
 ) -> dict[str, FloatArray]:
-    """Run a unit over the samples of a log: the outputs at each sample for the inputs of that sample.
+    """Run a block model over the samples of a log: the outputs at each sample for the inputs of that sample.
+
+    A model without states and memories computes all samples at once, any other steps from sample to sample.
 
     Args:
         model: The block model.
@@ -429,82 +420,65 @@ def run(
         shape (n,), or (n, size).
 
     Raises:
-        UnitError: If times do not rise, a name is unknown, a shape does not fit, a value is refused, or an
+        UnitError: If times do not rise, a name is unknown, a shape does not fit, a value is rejected, or an
             output is not finite.
     """
     t = np.asarray(t, dtype=np.float64)
     if t.ndim != 1 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():
-        raise UnitError(
-            f"unit {model.name}: found times of shape {t.shape}, allowed: rising times, shape (n,)"
-        )
+        allowed = "rising times, shape (n,)"
+        raise UnitError(f"unit {model.name}: found times of shape {t.shape}, allowed: {allowed}")
     instance = Instance(model, t[0] if len(t) else 0.0)
     for name, value in (start or {}).items():
-        owner = _variable(model, name)
-        instance.set([instance.reference(scalar) for scalar in owner.names], _starts(model, owner, value))
-    columns = _columns(model, inputs or {}, len(t))
-    shown = [one for one in model.variables if one.causality == "output"]
-    over = _stepped if model.states or model.memories else _at_once
-    found = over(instance, t, columns, [name for one in shown for name in one.names])
+        variable = _find_variable(model, name)
+        values = np.ravel(np.asarray(value, dtype=np.float64)).tolist()
+        counts = sorted({1, variable.width})
+        if len(values) not in counts:
+            allowed = " or ".join(map(str, counts))
+            raise UnitError(f"unit {model.name}: {name}: found {len(values)} values, allowed: {allowed}")
+        references = [instance.reference(scalar) for scalar in variable.names]
+        instance.set(references, values * (variable.width // len(values)))
+    columns = _read_columns(model, inputs or {}, len(t))
+    outputs = [variable for variable in model.variables if variable.causality == "output"]
+    input_references = [instance.reference(name) for name in columns]
+    output_references = [instance.reference(name) for variable in outputs for name in variable.names]
+    elements: list[Element]
+    if model.states or model.memories:
+        rows = np.column_stack(list(columns.values())).tolist() if columns else [[]] * len(t)
+        samples = np.empty((len(output_references), len(t)))
+        for k, time in enumerate(t.tolist()):
+            instance.set(input_references, rows[k])
+            samples[:, k] = instance.get(output_references)
+            if k + 1 < len(t):
+                instance.do_step(time, float(t[k + 1]) - time)
+        elements = list(samples)
+    else:
+        instance.time = t
+        instance.set(input_references, list(columns.values()))
+        elements = [np.broadcast_to(value, t.shape).copy() for value in instance.get(output_references)]
     return {
         name: np.column_stack(value) if isinstance(value, tuple) else np.asarray(value)
-        for name, value in elements_to_dict(shown, found).items()
+        for name, value in elements_to_dict(outputs, elements).items()
     }
 
 
-def _variable(model: BlockModel, name: str) -> Variable:
-    """Return a variable of a unit by name."""
-    allowed = [one.name for one in model.variables]
-    if name not in allowed:
-        raise UnitError(f"unit {model.name}: no variable {name}; allowed: {', '.join(allowed)}")
-    return model.variables[allowed.index(name)]
+def _find_variable(model: BlockModel, name: str) -> Variable:
+    """Return a variable by name; `UnitError` if there is no such variable."""
+    variables = {variable.name: variable for variable in model.variables}
+    if name not in variables:
+        raise UnitError(f"unit {model.name}: no variable {name}; allowed: {', '.join(variables)}")
+    return variables[name]
 
 
-def _starts(model: BlockModel, owner: Variable, value: Any) -> list[float]:
-    """Return the start value of every scalar of a variable: one for all of them, or one each."""
-    values: list[float] = np.ravel(np.asarray(value, dtype=np.float64)).tolist()
-    counts = sorted({1, owner.width})
-    if len(values) not in counts:
-        allowed = " or ".join(map(str, counts))
-        raise UnitError(f"unit {model.name}: {owner.name}: found {len(values)} values, allowed: {allowed}")
-    return values * (owner.width // len(values))
-
-
-def _columns(model: BlockModel, inputs: Mapping[str, Any], count: int) -> dict[str, FloatArray]:
-    """Return the column of every scalar that is given over the log."""
+def _read_columns(model: BlockModel, inputs: Mapping[str, Any], count: int) -> dict[str, FloatArray]:
+    """Return the column, shape (n,), of every scalar of the inputs."""
     columns: dict[str, FloatArray] = {}
     for name, value in inputs.items():
-        owner, found = _variable(model, name), np.asarray(value, dtype=np.float64)
-        shape = (count,) if owner.size is None else (count, owner.size)
-        if owner not in model.inputs or found.shape != shape:
+        variable, values = _find_variable(model, name), np.asarray(value, dtype=np.float64)
+        shape = (count,) if variable.size is None else (count, variable.size)
+        if variable not in model.inputs or values.shape != shape:
             raise UnitError(
-                f"unit {model.name}: {name}: found {owner.causality} with values of shape {found.shape},"
+                f"unit {model.name}: {name}: found {variable.causality} with values of shape {values.shape},"
                 f" allowed: an input, shape {shape}"
             )
-        columns |= zip(owner.names, found.reshape(count, owner.width).T, strict=True)
+        columns |= zip(variable.names, values.reshape(count, variable.width).T, strict=True)
     return columns
-
-
-def _at_once(
-    instance: Instance, t: FloatArray, columns: Mapping[str, FloatArray], shown: Sequence[str]
-) -> list[Element]:
-    """Return the outputs of a unit that remembers nothing, each shape (n,)."""
-    instance.time = t
-    instance.set([instance.reference(name) for name in columns], list(columns.values()))
-    found = instance.get([instance.reference(name) for name in shown])
-    return [np.broadcast_to(one, t.shape).copy() for one in found]
-
-
-def _stepped(
-    instance: Instance, t: FloatArray, columns: Mapping[str, FloatArray], shown: Sequence[str]
-) -> list[Element]:
-    """Return what a unit shows at every sample, each shape (n,)."""
-    inputs = [instance.reference(name) for name in columns]
-    outputs = [instance.reference(name) for name in shown]
-    given = np.column_stack(list(columns.values())).tolist() if columns else [[]] * len(t)
-    found = np.empty((len(outputs), len(t)))
-    for k, time in enumerate(t.tolist()):
-        instance.set(inputs, given[k])
-        found[:, k] = instance.get(outputs)
-        if k + 1 < len(t):
-            instance.do_step(time, float(t[k + 1]) - time)
-    return list(found)
