@@ -25,10 +25,10 @@ from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.cosim import Plan, load_system, prepare
-from urmpipe_fmus.cosim.job import ELSEWHERE, Progress
+from urmpipe_fmus.cosim.job import NO_CALL, Progress
 from urmpipe_fmus.cosim.master import Master
-from urmpipe_fmus.cosim.plan import Assembly
-from urmpipe_fmus.cosim.worker import Log
+from urmpipe_fmus.cosim.plan import JobBuilder
+from urmpipe_fmus.cosim.worker import FmuLog
 from urmpipe_fmus.process import callbacks_with
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
@@ -176,9 +176,9 @@ def loops_of(plan: Plan, folder: Path) -> dict[str, Callable[[], object]]:
         name: Path(extract(str(one.path), unzipdir=str(folder / f"fmu_{name}")))
         for name, one in plan.interfaces.items()
     }
-    job = Assembly(plan).job(folders)
-    progress = Progress(rows=0, k=0, call=ELSEWHERE)
-    callbacks = callbacks_with(Log(folder / "log.txt", job, progress).take)
+    job = JobBuilder(plan).job(folders)
+    progress = Progress(rows=0, k=0, call=NO_CALL)
+    callbacks = callbacks_with(FmuLog(folder / "log.txt", job, progress).write)
     ours, theirs = np.zeros((job.rows, job.columns)), np.zeros((job.rows, job.columns))
     odd = np.zeros((3, job.recorded["Real"]))
     warned = np.zeros((2, job.calls))

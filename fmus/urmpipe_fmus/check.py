@@ -1,31 +1,34 @@
-"""Whether an FMU is right and runs: validation, a short run of its default experiment, its variables."""
+"""Validation and short run of an FMU, of any tool.
+
+1. FMPy validates the description: variable names, model structure.
+2. The FMU runs for at most `MAX_STEPS` steps of its default experiment, in a separate process
+   (`check_run`, started and watched as in `process`).
+3. Problems of both, warnings, and each variable with its values before and after are reported.
+"""
 
 from __future__ import annotations
 
+import json
 import math
-import tempfile
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+import mmap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.check_run import CALL_BYTES, LOG_BYTES
 from urmpipe_fmus.fmu_file import FmuFile, host_platforms, open_fmu
-from urmpipe_fmus.process import TIMEOUT, Run, run_job
+from urmpipe_fmus.process import DEFAULT_TIMEOUT, CallWatchdog, FmuProcess
 from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import Finding, FmuError
+from urmpipe_models.processes import describe_exit
 
-STEPS = 20
-"""So many steps are tried, less if the default experiment is shorter."""
-
-STEP = 0.005
-"""The communication step in [s] of an FMU that tells none."""
-
-LINES = 5
-"""So many of the last lines of its log are shown where an FMU fails."""
-
+MAX_STEPS = 20  # fewer if the default experiment is shorter
+DEFAULT_STEP = 0.005  # s; communication step of an FMU that states none
+MAX_LOG_LINES = 5  # last lines of the log in the problems of an FMU that fails
+START_TIMEOUT = 60.0  # s from the start of the process to the first call of the FMU
 CO_SIMULATION = "FMI 2.0 for co-simulation, as most tools export it, too"
-
 PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")
 
 
@@ -40,11 +43,11 @@ class CheckedVariable:
         type: Real, Integer, Boolean, String or Enumeration.
         unit: As the FMU spells it; empty without one.
         start: The start value as the FMU writes it; empty without one.
-        min: The least value allowed; None without a bound.
-        max: The largest value allowed.
-        before: Its value after the initialization; None if it is not known or not finite.
-        after: Its value after the last step.
-        description: One line for people.
+        min: The minimum; None without a bound.
+        max: The maximum; None without a bound.
+        before: Its value after the initialization; None if unknown or not finite.
+        after: Its value after the last step; None if unknown or not finite.
+        description: One line of text.
     """
 
     name: str
@@ -61,20 +64,20 @@ class CheckedVariable:
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
-    """What was found in an FMU.
+class CheckReport:
+    """The result of a check.
 
     Attributes:
         path: The file.
         name: Name of the model.
         guid: Its GUID.
-        generator: The tool that made it.
-        platforms: FMI's names of the platforms that it has binaries for.
-        problems: All that is wrong, one line each; empty if nothing is.
-        warnings: What it warned of while it ran, one line each.
+        generator: The tool that exported it.
+        platforms: FMI's names of the platforms of its binaries.
+        problems: Errors, one line each; empty if there are none.
+        warnings: Warnings of the run, one line each.
         variables: Its variables.
         step: Communication step of the run in [s].
-        steps: How many steps were asked for.
+        steps: Number of requested steps.
         ran: Whether it ran to the end without an error.
     """
 
@@ -91,66 +94,92 @@ class Checked:
     ran: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it as what JSON can hold."""
+        """Return all fields as values that JSON can hold."""
         return {**asdict(self), "path": str(self.path)}
 
 
-def check_fmu(path: Path, *, timeout: float = TIMEOUT) -> Checked:
-    """Check an FMU 2.0 for co-simulation, of whatever tool.
+@dataclass(slots=True)
+class RunReport:
+    """The report of the process that ran an FMU.
 
-    It is validated by FMPy and runs for some steps of its default experiment in a process of its own, which
-    may take 8 GB of memory.
+    Attributes:
+        ended: The call that did not return, and how the process ended; empty if it completed.
+        log: The lines that the FMU logged.
+        failed: The call that failed, and how; empty if none did.
+        before: Values by variable after the initialization; empty if that failed.
+        after: Values by variable after the last step.
+        first_non_finite: Time in [s], index of the variable, and value where an output is first not finite.
+        warned: Each call that returned fmi2Warning, and what the FMU logged meanwhile.
+    """
+
+    ended: str = ""
+    log: list[str] = field(default_factory=list)
+    failed: str = ""
+    before: list[Any] = field(default_factory=list)
+    after: list[Any] = field(default_factory=list)
+    first_non_finite: list[tuple[float, int, float]] = field(default_factory=list)
+    warned: list[tuple[str, str]] = field(default_factory=list)
+
+
+def check_fmu(path: Path, *, timeout: float = DEFAULT_TIMEOUT) -> CheckReport:
+    """Check an FMU 2.0 for co-simulation, of any tool.
+
+    FMPy validates it. It runs for some steps of its default experiment in a separate process, which may use
+    8 GB of memory.
 
     Args:
         path: The file.
-        timeout: How long a call of the FMU may take, in [s].
+        timeout: Maximum duration of a call of the FMU in [s].
 
     Raises:
         FmuError: If the file is no such FMU, or its archive or description exceeds the limits.
     """
     file = open_fmu(path)
-    described = _described(file)
-    problems = _validated(path)
-    platforms = _platforms(file)
-    start, step, steps = _experiment(described)
-    here = host_platforms()
-    if set(here) & set(platforms):
-        run = _run(file, described, (start, step, steps), timeout)
+    description = _read_description(file)
+    problems = _validate(path)
+    paths = [Path(name).parts for name in file.names if name.endswith(PLATFORM_SUFFIXES)]
+    platforms = tuple(sorted({parts[1] for parts in paths if len(parts) == 3 and parts[0] == "binaries"}))
+    experiment = description.defaultExperiment
+    start = _finite_number(experiment and experiment.startTime, 0.0)
+    step = _finite_number(experiment and experiment.stepSize, DEFAULT_STEP)
+    step = step if step > 0.0 else DEFAULT_STEP
+    length = (_finite_number(experiment and experiment.stopTime, math.inf) - start) / step
+    steps = MAX_STEPS if length >= MAX_STEPS or length <= 0.0 else max(1, round(length))
+    if set(host_platforms()) & set(platforms):
+        run = _run(file, description, {"start": start, "step": step, "steps": steps}, timeout)
     else:
-        found = ", ".join(platforms) or "no platform"
-        run = Run(
-            failed=f"found binaries for {found}, allowed for a run here: {' or '.join(here)}; it was not run"
+        available, here = ", ".join(platforms) or "no platform", " or ".join(host_platforms())
+        run = RunReport(
+            failed=f"found binaries for {available}, allowed for a run here: {here}; it was not run"
         )
-    wrong = _problems(run)
-    return Checked(
+    run_problems = _run_problems(run)
+    return CheckReport(
         path=path,
-        name=described.modelName,
-        guid=described.guid,
-        generator=described.generationTool or "",
+        name=description.modelName,
+        guid=description.guid,
+        generator=description.generationTool or "",
         platforms=platforms,
-        problems=(*problems, *wrong, *_not_finite(described.modelVariables, run)),
+        problems=(*problems, *run_problems, *_non_finite_problems(description.modelVariables, run)),
         warnings=tuple(_warnings(run)),
-        variables=tuple(_variables(described, run.before, run.after)),
+        variables=tuple(_variables(description.modelVariables, run)),
         step=step,
         steps=steps,
-        ran=not wrong,
+        ran=not run_problems,
     )
 
 
-def _described(file: FmuFile) -> Any:
-    """Return the model description of an FMU 2.0 for co-simulation."""
+def _read_description(file: FmuFile) -> Any:
     if file.version != "2.0":
-        found = f"FMI {file.version}" if file.version else "no version of FMI"
-        said = f"found {found}, allowed: {CO_SIMULATION}"
-        raise FmuError(Finding(said, file=str(file.path)))
+        version = f"FMI {file.version}" if file.version else "no version of FMI"
+        raise FmuError(Finding(f"found {version}, allowed: {CO_SIMULATION}", file=str(file.path)))
     if "CoSimulation" not in file.kinds:
-        said = f"found no FMU for co-simulation, allowed: {CO_SIMULATION}"
-        raise FmuError(Finding(said, file=str(file.path)))
+        message = f"found no FMU for co-simulation, allowed: {CO_SIMULATION}"
+        raise FmuError(Finding(message, file=str(file.path)))
     return file.read_description()
 
 
-def _validated(path: Path) -> list[str]:
-    """Return what FMPy's validation finds."""
+def _validate(path: Path) -> list[str]:
+    """Return the problems that FMPy's validation finds."""
     from fmpy import read_model_description
     from fmpy.model_description import ValidationError
 
@@ -161,29 +190,12 @@ def _validated(path: Path) -> list[str]:
         )
     except ValidationError as error:
         problems = error.problems
-    except Exception as error:  # what FMPy's validation stumbles over is wrong too
+    except Exception as error:  # a description that breaks the validation is wrong too
         problems.append(f"the validation ended with {type(error).__name__}: {error}")
-    return [" ".join(str(one).split()) for one in problems]
+    return [" ".join(str(problem).split()) for problem in problems]
 
 
-def _platforms(file: FmuFile) -> tuple[str, ...]:
-    """Return FMI's names of the platforms that an FMU has binaries for."""
-    parts = [Path(name).parts for name in file.names if name.endswith(PLATFORM_SUFFIXES)]
-    return tuple(sorted({one[1] for one in parts if len(one) == 3 and one[0] == "binaries"}))
-
-
-def _experiment(described: Any) -> tuple[float, float, int]:
-    """Return start time and communication step in [s] of the default experiment, and a number of steps."""
-    told = described.defaultExperiment
-    start = _number(told and told.startTime, 0.0)
-    step = _number(told and told.stepSize, STEP)
-    step = step if step > 0.0 else STEP
-    stop = _number(told and told.stopTime, math.inf)
-    wanted = (stop - start) / step
-    return start, step, STEPS if wanted >= STEPS or wanted <= 0.0 else max(1, round(wanted))
-
-
-def _number(text: Any, default: float) -> float:
+def _finite_number(text: Any, default: float) -> float:
     """Return the finite number of an attribute, or a default."""
     try:
         value = float(text)
@@ -192,93 +204,119 @@ def _number(text: Any, default: float) -> float:
     return value if math.isfinite(value) else default
 
 
-def _run(file: FmuFile, described: Any, experiment: tuple[float, float, int], timeout: float) -> Run:
-    """Run an FMU in a process of its own."""
-    start, step, steps = experiment
-    variables = described.modelVariables
-    with tempfile.TemporaryDirectory(prefix="urmpipe-check-", ignore_cleanup_errors=True) as name:
-        folder = Path(name)
+def _run(file: FmuFile, description: Any, experiment: Mapping[str, Any], timeout: float) -> RunReport:
+    """Run an FMU in a separate process.
+
+    Args:
+        file: The FMU.
+        description: FMPy's description of it.
+        experiment: Start and communication step in [s], and number of steps.
+        timeout: Maximum duration of a call in [s].
+    """
+    variables = description.modelVariables
+    job = {
+        "guid": description.guid,
+        "identifier": description.coSimulation.modelIdentifier,
+        "variables": [
+            ("Integer" if variable.type == "Enumeration" else str(variable.type), variable.valueReference)
+            for variable in variables
+        ],
+        "watched": [
+            (i, variable.valueReference)
+            for i, variable in enumerate(variables)
+            if variable.causality == "output" and variable.type == "Real"
+        ],
+        **experiment,
+    }
+    with FmuProcess(
+        "urmpipe_fmus.check_run", prefix="urmpipe-check-", keep_stdout=False, max_output=LOG_BYTES
+    ) as process:
+        folder = process.folder
         file.unpack(folder / "fmu")
-        misplaced = why_not_in(folder / "fmu")
-        if misplaced:
-            return Run(failed=misplaced)
-        job = {
-            "guid": described.guid,
-            "identifier": described.coSimulation.modelIdentifier,
-            "variables": [(_type(one), one.valueReference) for one in variables],
-            "watched": [
-                (i, one.valueReference)
-                for i, one in enumerate(variables)
-                if one.causality == "output" and one.type == "Real"
-            ],
-            "start": start,
-            "step": step,
-            "steps": steps,
-        }
-        return run_job(folder, job, timeout)
+        if reason := why_not_in(folder / "fmu"):
+            return RunReport(failed=reason)
+        (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+        (folder / "call").write_bytes(bytes(CALL_BYTES))
+        (folder / "log").touch()
+        watchdog = CallWatchdog()
+        with (folder / "call").open("r+b") as shared, mmap.mmap(shared.fileno(), CALL_BYTES) as call:
+
+            def watch() -> str:
+                number = int.from_bytes(call[:8], "little")
+                return watchdog.overdue(number, timeout if number else START_TIMEOUT)
+
+            ended = process.run(watch)
+            name = bytes(call[8:]).rstrip(b"\0").decode("utf-8", "replace") or "loading"
+        if process.exit_code > 0:
+            ended = ": ".join((ended, *process.last_lines(1)))
+        return _read_report(folder, name, ended)
 
 
-def _problems(run: Run) -> list[str]:
-    """Return what went wrong in a run, with the last lines that the FMU logged."""
-    refused = sum(one is None for one in run.before)
-    said = [f"{refused} variables cannot be read after the initialization"] if refused else []
-    said += [one for one in (run.failed, run.ended) if one]
-    return said and said + [f"its log: {line}" for line in run.log][-LINES:]
+def _read_report(folder: Path, last_call: str, ended: str) -> RunReport:
+    """Read what the process wrote; without its last line it ended during its last call."""
+    run = RunReport(log=(folder / "log").read_text("utf-8", "replace").splitlines())
+    results, complete = folder / "results", False
+    for line in results.read_text("utf-8").splitlines() if results.exists() else ():
+        kind, value = json.loads(line)
+        if kind == "complete":
+            complete = True
+        elif kind in ("first_non_finite", "warned"):
+            getattr(run, kind).append(tuple(value))
+        else:
+            setattr(run, kind, value)
+    if ended or not complete:
+        run.ended = f"{last_call} {ended or describe_exit(0)}"
+    return run
 
 
-def _not_finite(variables: Sequence[Any], run: Run) -> Iterator[str]:
-    """Yield which outputs are not finite from when on."""
-    for t, odd in groupby(run.odd, key=lambda one: one[0]):
-        found = ", ".join(f"{variables[i].name} = {value:g}" for _, i, value in odd)
-        yield f"at {t:.9g} s: found {found}, allowed: outputs that are finite"
+def _run_problems(run: RunReport) -> list[str]:
+    """Return the errors of a run, with the last lines that the FMU logged."""
+    unreadable = sum(value is None for value in run.before)
+    problems = [f"{unreadable} variables cannot be read after the initialization"] if unreadable else []
+    problems += [problem for problem in (run.failed, run.ended) if problem]
+    return problems and problems + [f"its log: {line}" for line in run.log][-MAX_LOG_LINES:]
 
 
-def _warnings(run: Run) -> Iterator[str]:
-    """Yield what returned fmi2Warning: of each function the first call, with what the FMU logged."""
-    functions = [what.split(" ")[0] for what, _ in run.warned]
+def _non_finite_problems(variables: Sequence[Any], run: RunReport) -> Iterator[str]:
+    """Yield the outputs that are not finite, by the time at which this begins."""
+    for t, outputs in groupby(run.first_non_finite, key=lambda output: output[0]):
+        names = ", ".join(f"{variables[i].name} = {value:g}" for _, i, value in outputs)
+        yield f"at {t:.9g} s: found {names}, allowed: outputs that are finite"
+
+
+def _warnings(run: RunReport) -> Iterator[str]:
+    """Yield for each function the first call that returned fmi2Warning, with what the FMU logged."""
+    functions = [call.split(" ")[0] for call, _ in run.warned]
     for function in dict.fromkeys(functions):
-        what, logged = run.warned[functions.index(function)]
+        call, logged = run.warned[functions.index(function)]
         count = functions.count(function) - 1
         more = f", and {count} more of its calls" if count else ""
-        yield f"{what} returned fmi2Warning{more}{logged and f'; its log: {logged}'}"
+        yield f"{call} returned fmi2Warning{more}{logged and f'; its log: {logged}'}"
 
 
-def _variables(described: Any, before: Sequence[Any], after: Sequence[Any]) -> list[CheckedVariable]:
-    """Return the variables of an FMU with their values, if it ran."""
-    count = len(described.modelVariables)
-    unknown = [None] * count
-    return [
-        CheckedVariable(
-            name=one.name,
-            causality=one.causality or "local",
-            variability=one.variability or "",
-            type=one.type,
-            unit=one.unit or (one.declaredType.unit if one.declaredType else None) or "",
-            start="" if one.start is None else str(one.start),
-            min=_bound(one, "min"),
-            max=_bound(one, "max"),
-            before=_finite(first),
-            after=_finite(last),
-            description=one.description or "",
+def _variables(variables: Sequence[Any], run: RunReport) -> Iterator[CheckedVariable]:
+    """Yield the variables of an FMU with their values, if it ran."""
+    unknown = [None] * len(variables)
+    for variable, before, after in zip(variables, run.before or unknown, run.after or unknown, strict=True):
+        declared = variable.declaredType
+        low, high = (
+            _finite_number(getattr(variable, bound) or getattr(declared, bound, None), math.nan)
+            for bound in ("min", "max")
         )
-        for one, first, last in zip(
-            described.modelVariables, before or unknown, after or unknown, strict=True
+        yield CheckedVariable(
+            name=variable.name,
+            causality=variable.causality or "local",
+            variability=variable.variability or "",
+            type=variable.type,
+            unit=variable.unit or (declared.unit if declared else None) or "",
+            start="" if variable.start is None else str(variable.start),
+            min=_finite_or_none(low),
+            max=_finite_or_none(high),
+            before=_finite_or_none(before),
+            after=_finite_or_none(after),
+            description=variable.description or "",
         )
-    ]
 
 
-def _bound(one: Any, which: str) -> float | None:
-    """Return a bound of a variable, its own or that of its declared type."""
-    told = getattr(one, which) or getattr(one.declaredType, which, None)
-    value = _number(told, math.nan)
-    return None if math.isnan(value) else value
-
-
-def _type(one: Any) -> str:
-    """Return by which function a variable is read."""
-    return "Integer" if one.type == "Enumeration" else str(one.type)
-
-
-def _finite(value: Any) -> Any:
-    """Return a value; None for a number that is not finite."""
+def _finite_or_none(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value

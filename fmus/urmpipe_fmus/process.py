@@ -1,181 +1,179 @@
-"""What the processes share in which FMUs run: what an FMU is given, and how long its calls may take.
+"""The process in which FMUs run: an FMU may crash, hang or print without end, and must not harm its caller.
 
-How a process in which an FMU runs ends with the one that started it, however that ended.
+`check_fmu` runs one FMU in such a process (`check_run`), `simulate` all FMUs of a system (`cosim.worker`).
+The parent process and the process of the FMUs share a temporary folder:
 
-The process in which `check_fmu` runs an FMU, from the parent's side: started, watched, ended.
+1. The parent starts the process (`FmuProcess`), which loads its libraries while the parent writes the job.
+2. The process waits for the line "begin" (`await_job`). From then on it exits when its parent does.
+3. The parent polls the process (`FmuProcess.run`): it limits what is printed, and ends a process whose call
+   does not return (`CallWatchdog`). Each call is noted in shared memory before it is made, with a number.
+4. The end is reported as text: the call that did not return, a signal, or an exit code.
 """
 
 from __future__ import annotations
 
 import ctypes
-import json
-import mmap
 import os
 import shutil
 import signal
 import subprocess
+import sys
+import tempfile
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from time import monotonic
+from types import TracebackType
 from typing import Any
 
 from urmpipe_models.processes import describe_exit, end_group, module_command, module_environment
 
-TIMEOUT = 60.0
-"""Seconds that a call of an FMU may take; one that takes longer has hung."""
+DEFAULT_TIMEOUT = 60.0  # s; a call of an FMU that takes longer has hung
+POLL_PERIOD = 0.02  # s
+MAX_COUNTED_PAUSE = 1.0  # s between two polls; a longer pause means that the processes were suspended
+OUTPUT = "output.txt"  # file of the shared folder: what the FMUs print
+TAIL_BYTES = 65_536  # of the output, of which the last lines are taken
 
 
-def callbacks_with(take: Callable[..., None]) -> Any:
-    """Return FMPy's callbacks that give an FMU memory, and what it logs to a function.
-
-    Args:
-        take: Called with environment, instance, status, category and the text, in which FMPy has put the
-            values for its %s and %d.
-    """
-    from fmpy import calloc, fmi2, free
-    from fmpy.logging import addLoggerProxy
-
-    made = fmi2.fmi2CallbackFunctions()
-    made.logger = fmi2.fmi2CallbackLoggerTYPE(take)
-    made.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-    made.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-    addLoggerProxy(ctypes.byref(made))
-    return made
-
-
-def end_with_parent(folder: Path) -> None:
-    """End this process when the one that started it does: its end of the standard input is closed then.
-
-    The input is taken away from the standard one, so that an FMU that reads waits for nothing.
+class FmuProcess:
+    """A process that runs FMUs, as a context; at its end the process and all that it started are killed.
 
     Args:
-        folder: The folder of the run, of no use to anybody then.
+        module: Module to run, with the folder as its only argument; it begins with `await_job`.
+        prefix: Prefix of the folder's name.
+        keep_stdout: Whether standard output is kept as standard error is.
+        max_output: Size in bytes from which printed output is discarded, to protect the disk.
+
+    Attributes:
+        folder: Temporary folder shared with the process: its job and its results.
+        process: The process.
+        exit_code: Its exit code, or the negative number of a signal; 0 if the parent ended it.
     """
-    watched = os.dup(0)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
+
+    def __init__(self, module: str, *, prefix: str, keep_stdout: bool, max_output: int) -> None:
+        self._module, self._prefix = module, prefix
+        self._keep_stdout, self._max_output = keep_stdout, max_output
+        self.exit_code = 0
+
+    def __enter__(self) -> FmuProcess:
+        self._temporary = tempfile.TemporaryDirectory(prefix=self._prefix, ignore_cleanup_errors=True)
+        self.folder = Path(self._temporary.name)
+        with (self.folder / OUTPUT).open("ab") as output:
+            self.process = subprocess.Popen(
+                module_command(self._module, str(self.folder)),
+                env=module_environment(),
+                stdin=subprocess.PIPE,  # closed when this process ends, however it ends
+                stdout=output if self._keep_stdout else subprocess.DEVNULL,
+                stderr=output,
+                start_new_session=True,
+                bufsize=0,  # so that closing its input writes nothing to a process that has ended
+            )
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        end_group(self.process)
+        with self.process:  # closes its input, and waits for its end
+            pass
+        self._temporary.cleanup()
+
+    def run(self, watch: Callable[[], str]) -> str:
+        """Start the job that is in the folder, and wait until the process ends.
+
+        Args:
+            watch: Called at each poll; if it returns a text, the process is killed.
+
+        Returns:
+            How the process ended: the text of `watch`, or signal or exit code; empty after exit code 0.
+        """
+        assert self.process.stdin is not None
+        with suppress(OSError):  # if it has already ended, the exit code shows why
+            self.process.stdin.write(b"begin\n")
+        output = self.folder / OUTPUT
+        while True:
+            with suppress(subprocess.TimeoutExpired):
+                self.exit_code = self.process.wait(POLL_PERIOD)
+                return describe_exit(self.exit_code) if self.exit_code else ""
+            if output.stat().st_size > self._max_output:
+                os.truncate(output, 0)  # the process appends: it continues at the new end
+            if reason := watch():
+                end_group(self.process)
+                self.process.wait()
+                return reason
+
+    def last_lines(self, count: int) -> list[str]:
+        """Return the last lines that the process printed, without empty ones."""
+        with (self.folder / OUTPUT).open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL_BYTES))
+            text = file.read().decode("utf-8", errors="replace")
+        return [line.strip() for line in text.splitlines() if line.strip()][-count:]
+
+
+class CallWatchdog:
+    """Measures how long a call has been running; pauses of both processes do not count."""
+
+    def __init__(self) -> None:
+        self._call, self._elapsed, self._polled = -1, 0.0, monotonic()
+
+    def overdue(self, call: int, timeout: float) -> str:
+        """Return the message that a call did not return in time, or an empty string.
+
+        Args:
+            call: Number of the current call; each call has another.
+            timeout: Maximum duration in [s] of this call; inf for no limit.
+        """
+        now = monotonic()
+        passed, self._polled = min(now - self._polled, MAX_COUNTED_PAUSE), now
+        self._elapsed = self._elapsed + passed if call == self._call else 0.0
+        self._call = call
+        return f"did not return within {timeout:g} s" if self._elapsed > timeout else ""
+
+
+def await_job(folder: Path) -> None:
+    """Wait in the process of the FMUs until its folder holds the job; exit if the parent exits first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted too, and ends this process
+    if not sys.stdin.buffer.readline():
+        shutil.rmtree(folder, ignore_errors=True)
+        os._exit(0)
+    exit_with_parent(folder)
+
+
+def exit_with_parent(folder: Path) -> None:
+    """Exit this process, and remove its folder, when the parent exits: that closes the standard input.
+
+    Standard input is replaced by an empty one, so that an FMU that reads does not wait.
+    """
+    parent_pipe = os.dup(0)
+    empty = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(empty, 0)
+    os.close(empty)
 
     def watch() -> None:
-        """Wait until the input is closed, then leave nothing behind."""
-        while os.read(watched, 1024):
+        while os.read(parent_pipe, 1024):
             pass
         shutil.rmtree(folder, ignore_errors=True)
         with suppress(AttributeError, OSError):  # Windows has no groups
-            if os.getpgrp() == os.getpid():  # what the FMU started ends, too
+            if os.getpgrp() == os.getpid():  # processes that the FMU started end, too
                 os.killpg(os.getpid(), signal.SIGKILL)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 
 
-STARTING = 60.0
-"""Seconds that the process may take until it calls the FMU."""
-
-POLL = 0.02
-"""How often it is looked at, in [s]."""
-
-CALL_BYTES = 256
-"""Bytes of the file that holds the number of the call, in eight bytes, and its name."""
-
-LOG_BYTES = 1_000_000
-"""What an FMU logs or prints is forgotten when it is longer."""
-
-
-@dataclass(slots=True)
-class Run:
-    """What is known of a run.
-
-    Attributes:
-        ended: Which call the process did not come back from, and how it ended; empty if it came to its end.
-        log: The lines that the FMU logged.
-        failed: Which call failed, and how; empty if none did.
-        before: Values by variable after the initialization; empty if it did not come so far.
-        after: The same after the last step.
-        odd: Time in [s], number of the variable and value where an output is not finite first.
-        warned: Each call that returned fmi2Warning, and what the FMU logged meanwhile.
-    """
-
-    ended: str = ""
-    log: list[str] = field(default_factory=list)
-    failed: str = ""
-    before: list[Any] = field(default_factory=list)
-    after: list[Any] = field(default_factory=list)
-    odd: list[tuple[float, int, float]] = field(default_factory=list)
-    warned: list[tuple[str, str]] = field(default_factory=list)
-
-
-def run_job(folder: Path, job: Mapping[str, Any], timeout: float) -> Run:
-    """Run an FMU in a process of its own.
+def callbacks_with(log: Callable[..., None]) -> Any:
+    """Return FMPy's callbacks: memory for an FMU, and a function for its log messages.
 
     Args:
-        folder: Where the two processes meet.
-        job: What to run, as `check_run` takes it.
-        timeout: Seconds that a call may take.
+        log: Called with environment, instance, status, category and text; FMPy has formatted its %s and %d.
     """
-    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
-    (folder / "call").write_bytes(bytes(CALL_BYTES))
-    (folder / "log").touch()
-    with (folder / "call").open("r+b") as file, mmap.mmap(file.fileno(), CALL_BYTES) as call:
-        ended = _watched(folder, call, timeout)
-        name = bytes(call[8:]).rstrip(b"\0").decode("utf-8", "replace") or "loading"
-    run = Run(log=(folder / "log").read_text("utf-8", "replace").splitlines())
-    whole = _fill(run, folder / "found")
-    if ended or not whole:
-        run.ended = f"{name} {ended or describe_exit(0)}"
-    return run
+    from fmpy import calloc, fmi2, free
+    from fmpy.logging import addLoggerProxy
 
-
-def _fill(run: Run, found: Path) -> bool:
-    """Take what the process found; return whether it said that this is all."""
-    whole = False
-    for line in found.read_text("utf-8").splitlines() if found.exists() else ():
-        kind, value = json.loads(line)
-        if kind == "whole":
-            whole = True
-        elif kind in ("odd", "warned"):
-            getattr(run, kind).append(tuple(value))
-        else:
-            setattr(run, kind, value)
-    return whole
-
-
-def _watched(folder: Path, call: mmap.mmap, timeout: float) -> str:
-    """Run the job of a folder; return how its process ended, empty if well."""
-    printed = folder / "printed"
-    with _started(folder, printed) as process:
-        number, since = bytes(8), monotonic()
-        while True:
-            with suppress(subprocess.TimeoutExpired):
-                code = process.wait(POLL)
-                break
-            if call[:8] != number:
-                number, since = call[:8], monotonic()
-            if monotonic() - since > (timeout if any(number) else STARTING):
-                return f"did not return within {timeout if any(number) else STARTING:g} s"
-            if printed.stat().st_size > LOG_BYTES:
-                os.truncate(printed, 0)
-    said = printed.read_text("utf-8", "replace").strip().splitlines() if code > 0 else []
-    return ": ".join((describe_exit(code), *said[-1:])) if code else ""
-
-
-@contextmanager
-def _started(folder: Path, printed: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Start the process of a job; it ends with the context, and so does what the FMU started in it."""
-    with printed.open("ab") as file:
-        process = subprocess.Popen(
-            module_command("urmpipe_fmus.check_run", str(folder)),
-            env=module_environment(),
-            stdin=subprocess.PIPE,  # closed when this process ends, whatever ends it
-            stdout=subprocess.DEVNULL,
-            stderr=file,
-            start_new_session=True,
-        )
-    with process:
-        try:
-            yield process
-        finally:
-            end_group(process)
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+    addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks

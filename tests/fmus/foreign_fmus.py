@@ -18,11 +18,11 @@ from asserting import there
 from urmpipe_fmus.cosim import (
     Block,
     Connection,
+    CosimulationRecord,
     LogColumn,
     LogInput,
     Plan,
     Port,
-    Recorded,
     System,
     prepare,
     simulate,
@@ -321,6 +321,6 @@ def planned(*arguments: Any, column: Callable[[LogInput], LogColumn] | None = No
     return prepare(system(*arguments, **options), fmu_of, column=column)
 
 
-def ran(*arguments: Any, **options: Any) -> Recorded:
+def ran(*arguments: Any, **options: Any) -> CosimulationRecord:
     """Return what a system of foreign FMUs recorded: the arguments are those of `planned`."""
     return simulate(planned(*arguments, **options))

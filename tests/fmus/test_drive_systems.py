@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import make_block
-from urmpipe_fmus.cosim import Block, Recorded, load_system, prepare, simulate
+from urmpipe_fmus.cosim import Block, CosimulationRecord, load_system, prepare, simulate
 from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import Instance
 from urmpipe_models.drives import trapezoid
@@ -72,7 +72,7 @@ def make(block: Block) -> BlockModel:
     return make_block(block.unit, **options)
 
 
-def run_system(name: str | Path, step: float | None = None, **changes: Any) -> Recorded:
+def run_system(name: str | Path, step: float | None = None, **changes: Any) -> CosimulationRecord:
     """Run a system with every communication point recorded, with another step if one is given."""
     system = load_system(name)
     recorded = simulate(prepare(replace(system, step=step or system.step, record_every=1, **changes), make))
@@ -80,7 +80,7 @@ def run_system(name: str | Path, step: float | None = None, **changes: Any) -> R
     return recorded
 
 
-def changed_drive(step: float, duration: float, **starts: float) -> Recorded:
+def changed_drive(step: float, duration: float, **starts: float) -> CosimulationRecord:
     """Run the system `one-drive` with other start values, each by block__variable."""
     blocks = [
         replace(
@@ -185,14 +185,14 @@ def test_the_step_map_of_small_steps_nears_that_of_the_monolithic_ode(figures: M
 
 
 @pytest.fixture(scope="module")
-def one_drive() -> Recorded:
+def one_drive() -> CosimulationRecord:
     """Return 2 s of the system `one-drive` in steps of 1 ms."""
     return run_system("one-drive", 1e-3, duration=2.0)
 
 
 @pytest.mark.slow
 @needs_compiler
-def test_eq_20_with_a_plus_tracks_and_settles(one_drive: Recorded) -> None:
+def test_eq_20_with_a_plus_tracks_and_settles(one_drive: CosimulationRecord) -> None:
     wanted, real = one_drive.column("set_point", "theta"), one_drive.column("load", "theta")
     # The move ends at 0.8 s; the slowest mode decays with 15 / s (docs/drives.md): e^-18 of 0.04 rad is left.
     assert abs(real[-1] - 1.0) < 1e-8
@@ -204,7 +204,7 @@ def test_eq_20_with_a_plus_tracks_and_settles(one_drive: Recorded) -> None:
 @pytest.mark.slow
 @needs_compiler
 def test_one_drive_of_native_fmus_is_the_loop_over_units(
-    figures: Mapping[str, Any], one_drive: Recorded
+    figures: Mapping[str, Any], one_drive: CosimulationRecord
 ) -> None:
     names = ("load.theta", "drive.i_a", "drive.Mk", "controller.u")
     expected = figures["simulated"](figures["OneDrive"](), 1e-3, 0.5, *names)
@@ -227,7 +227,7 @@ def test_one_drive_nears_the_monolithic_solution_with_the_first_order_of_the_com
 
 
 @pytest.fixture(scope="module")
-def six_drives() -> Recorded:
+def six_drives() -> CosimulationRecord:
     """Return the system `six-drives` in steps of 1 ms."""
     return run_system("six-drives", 1e-3)
 
@@ -235,7 +235,7 @@ def six_drives() -> Recorded:
 @pytest.mark.slow
 @needs_compiler
 def test_six_drives_start_at_the_calibration_pose_and_arrive_where_their_set_points_do(
-    six_drives: Recorded,
+    six_drives: CosimulationRecord,
 ) -> None:
     recorded, chain = six_drives, load_robot("urm6")
     tip = np.column_stack([recorded.column("chain", f"p7[{i}]") for i in (1, 2, 3)])
@@ -250,8 +250,10 @@ def test_six_drives_start_at_the_calibration_pose_and_arrive_where_their_set_poi
 
 @pytest.mark.slow
 @needs_compiler
-def test_six_drives_with_5_ms_shake_at_the_wrist_and_with_1_ms_they_do_not(six_drives: Recorded) -> None:
-    def shaking(recorded: Recorded, i: int) -> float:
+def test_six_drives_with_5_ms_shake_at_the_wrist_and_with_1_ms_they_do_not(
+    six_drives: CosimulationRecord,
+) -> None:
+    def shaking(recorded: CosimulationRecord, i: int) -> float:
         """Return how far a joint is from its set point in the last half second."""
         late = recorded.t_ns > 1_500_000_000
         off = recorded.column(f"load{i}", "theta") - recorded.column(f"set_point{i}", "theta")

@@ -22,7 +22,7 @@ from urmpipe_fmus.block import BlockModel, Output
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.driven_arm import start_values
 from urmpipe_fmus.build.fmu import cached_fmu
-from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, simulate
+from urmpipe_fmus.cosim import Block, CosimulationRecord, System, load_system, prepare, simulate
 from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import Instance
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
@@ -361,7 +361,7 @@ def make(block: Block) -> BlockModel:
     return make_block(block.unit, **options)
 
 
-def run_system(step: float, duration: float) -> Recorded:
+def run_system(step: float, duration: float) -> CosimulationRecord:
     return simulate(prepare(replace(system(), step=step, duration=duration, record_every=1), make))
 
 

@@ -16,8 +16,8 @@ from urmpipe.systems.units import Backend
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
-from urmpipe_fmus.cosim.simulation import Worker
-from urmpipe_fmus.process import TIMEOUT
+from urmpipe_fmus.cosim.simulation import start_worker
+from urmpipe_fmus.process import DEFAULT_TIMEOUT
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -37,7 +37,7 @@ def simulate(
     step: float | None = None,
     duration: float | None = None,
     backend: Backend | None = None,
-    timeout: float = TIMEOUT,
+    timeout: float = DEFAULT_TIMEOUT,
     strict: bool = False,
     output: PathLike | None = None,
     draw: PathLike | None = None,
@@ -77,7 +77,10 @@ def simulate(
     kept = [loaded.path, *_files(loaded), *map_files(reading)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
     running, writing = _halves(progress)
-    with guarded_outputs(named, kept) as written, Worker() as worker:  # it loads what it needs meanwhile
+    with (
+        guarded_outputs(named, kept) as written,
+        start_worker() as worker,
+    ):  # it loads what it needs meanwhile
         blocks = Blocks(loaded, bundled=bundled, backend=backend, reading=reading, told=told)
         plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period)
         check_meters(plan, blocks)

@@ -15,7 +15,7 @@ from urmpipe_pipeline import text
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build.fmu import BuiltFmu
-    from urmpipe_fmus.check import Checked, CheckedVariable
+    from urmpipe_fmus.check import CheckedVariable, CheckReport
 
 FIGURES = 6
 """Significant digits of a number in a table; --json has all."""
@@ -115,13 +115,13 @@ def print_built(made: BuiltFmu) -> None:
         say(f"note: {made.note}", err=True)
 
 
-def checked_dict(checked: Checked) -> dict[str, Any]:
+def checked_dict(checked: CheckReport) -> dict[str, Any]:
     """Return the object that `urmpipe fmu check --json` prints."""
     found = checked.to_dict()
     return {"schema": 1, "fmu": found.pop("path"), **found}
 
 
-def print_checked(checked: Checked) -> None:
+def print_checked(checked: CheckReport) -> None:
     """Print what was found in an FMU, and a table of its variables."""
     console = new_console()
     ran = f"{checked.steps} steps of {1e3 * checked.step:.6g} ms" if checked.ran else "it did not run"

@@ -18,7 +18,7 @@ from urmpipe_datasets import LOGS
 from urmpipe_fmus.block import Table
 from urmpipe_fmus.build.fmu import cached_fmu, select_backend
 from urmpipe_fmus.cosim.plan import LogColumn
-from urmpipe_fmus.cosim.system import STEP
+from urmpipe_fmus.cosim.system import DEFAULT_STEP
 from urmpipe_models.errors import Finding, OptionError, UrmpipeError, format_value
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import row_clock
@@ -79,11 +79,11 @@ class Blocks:
         self._held: dict[str, IntArray] = {}
         self._faults: dict[str, UrmpipeError] = {}
         self._columns: dict[Port, LogTable] = {}
-        for block in (one for one in system.blocks if one.name not in system.unread):
+        for block in (one for one in system.blocks if one.name not in system.unusable_blocks):
             self._try(block.name, partial(self._take, block))
         for one in (each for each in system.inputs if each.log):
             self._try(str(one.destination), partial(self._follow, one))
-        self._meet(system.step or self.period or STEP)
+        self._meet(system.step or self.period or DEFAULT_STEP)
         if self._slow and self.units:
             said = f"the units run on Python, a hundred times slower than native ones: {self._slow}"
             self.warnings.append(LogWarning(SLOW, said))

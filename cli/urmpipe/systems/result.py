@@ -12,7 +12,7 @@ from urmpipe.systems.blocks import CHAIN, METER, Blocks
 from urmpipe_fmus.build.fmu import read_robot_entry
 from urmpipe_fmus.cosim.checks import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import NANOSECOND, Plan
-from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
+from urmpipe_fmus.cosim.simulation import CosimulationRecord, NonFiniteValues
 from urmpipe_fmus.cosim.system import Block, Port, System
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
@@ -52,7 +52,7 @@ def check_meters(plan: Plan, blocks: Blocks) -> None:
         raise LogError(*asked)
 
 
-def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> Simulation:
+def simulation_of(plan: Plan, recorded: CosimulationRecord, blocks: Blocks, svg: str) -> Simulation:
     """Return what was recorded as a simulation.
 
     Args:
@@ -102,10 +102,10 @@ def _inputs(paths: list[Path]) -> list[SourceFile]:
     return [fingerprint(path) for path in dict.fromkeys(paths)]
 
 
-def _not_finite(plan: Plan, recorded: Recorded) -> dict[Port, NotFinite]:
+def _not_finite(plan: Plan, recorded: CosimulationRecord) -> dict[Port, NonFiniteValues]:
     """Return the variables that had values which are not finite: of an array the first and all of them."""
     places = {port: i for i, port in enumerate(recorded.names)}
-    found: dict[Port, list[NotFinite]] = {}
+    found: dict[Port, list[NonFiniteValues]] = {}
     for port, one in recorded.not_finite.items():
         _, variable = _array(plan.interfaces[port.block], port, places)
         found.setdefault(Port(port.block, variable), []).append(one)
@@ -115,14 +115,14 @@ def _not_finite(plan: Plan, recorded: Recorded) -> dict[Port, NotFinite]:
     }
 
 
-def _told(odd: Mapping[Port, NotFinite]) -> Iterator[LogWarning]:
+def _told(odd: Mapping[Port, NonFiniteValues]) -> Iterator[LogWarning]:
     """Yield which outputs were not finite, a line each."""
     for port, one in odd.items():
         said = f"found {one.value:g} at t = {one.t:.9g} s; values that are not finite: {one.count}"
         yield LogWarning("not-finite", said, about=port.block, column=port.variable)
 
 
-def _signals(plan: Plan, recorded: Recorded) -> Iterator[Signal]:
+def _signals(plan: Plan, recorded: CosimulationRecord) -> Iterator[Signal]:
     """Yield the signals: scalars, and arrays whose elements were all recorded."""
     places = {port: i for i, port in enumerate(recorded.names)}
     done: set[Port] = set()
@@ -181,7 +181,12 @@ def _settings(plan: Plan, block: str, shown: Interface) -> Iterator[Setting]:
     fed = {*plan.sources, *(one.destination for one in plan.logged)}
     for one in shown.variables.values():
         value = given.get(one.name, one.start)
-        if one.settable and value is not None and one.type != "String" and Port(block, one.name) not in fed:
+        if (
+            one.is_settable
+            and value is not None
+            and one.type != "String"
+            and Port(block, one.name) not in fed
+        ):
             yield Setting(one.name, _number(value), one.unit, one.causality, one.name in given)
 
 
@@ -197,7 +202,7 @@ def _value(plan: Plan, port: Port) -> float:
     return _number(given.get(port.variable, 0.0 if start is None else start))
 
 
-def _arms(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Arm]:
+def _arms(plan: Plan, recorded: CosimulationRecord, blocks: Blocks) -> Iterator[Arm]:
     """Yield the arm of each block of kinematics, as its joints were: of a unit, or of an FMU of that unit."""
     for block in plan.system.blocks:
         chain = read_robot_entry(block.fmu) if block.fmu else blocks.chains.get(block.name)
@@ -217,7 +222,7 @@ def _joint_inputs(chain: Chain) -> Iterator[str]:
         yield f"{'phi' if joint.kind == 'revolute' else 's'}[{counts[joint.kind]}]"
 
 
-def _over_time(plan: Plan, recorded: Recorded, destination: Port) -> FloatArray:
+def _over_time(plan: Plan, recorded: CosimulationRecord, destination: Port) -> FloatArray:
     """Return what an input had at each sample, shape (n,): its source, its log, or its start value."""
     port = plan.sources.get(destination, destination)
     if port in recorded.names:
@@ -230,7 +235,9 @@ def _meters(system: System) -> list[str]:
     return [block.name for block in system.blocks if block.unit == METER]
 
 
-def _verdicts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite]) -> Iterator[DeltaVerdict]:
+def _verdicts(
+    plan: Plan, recorded: CosimulationRecord, odd: Mapping[Port, NonFiniteValues]
+) -> Iterator[DeltaVerdict]:
     """Yield the verdict of each delta meter."""
     for name in _meters(plan.system) if len(recorded.t_ns) else ():
         columns = [recorded.column(name, f"delta[{i}]") for i in (1, 2, 3)]
@@ -241,7 +248,9 @@ def _verdicts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite]) -> 
             yield found
 
 
-def _doubts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite], meter: str) -> Iterator[str]:
+def _doubts(
+    plan: Plan, recorded: CosimulationRecord, odd: Mapping[Port, NonFiniteValues], meter: str
+) -> Iterator[str]:
     """Yield why a delta meter does not pass even where no sample is out of tolerance.
 
     What is not finite may have reached it through any block before it, which need not show it: an FMU may

@@ -1,6 +1,10 @@
-"""What an FMU shows of itself: its variables, what they depend on, and what it can do.
+"""Interface of an FMU (variables, dependencies, abilities), and the checks of a system's connections.
 
-What goes where in a system, by scalars, and all that is wrong with it.
+1. `read_interface` reads an FMU's description. It is not validated, as in `check_fmu`: many FMUs that are not
+   quite valid run.
+2. `Wiring` resolves the connections, inputs from logs and start values of a system to scalars. It checks
+   names, causality, sizes, types, units (by their dimensions in SI), ranges, that no input has two sources,
+   and that each has one. What depends on a block or column that could not be read counts as right.
 """
 
 from __future__ import annotations
@@ -19,11 +23,8 @@ from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, is_same_unit, parse_unit
 from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_unknown_name
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 
-ELEMENT = re.compile(r"(.+)\[(\d+(?:,\s*\d+)*)\]")
-"""The name of an array's element: `phi[1]`, `M[1,2]`."""
-
-NUMBERS = ("Real", "Integer", "Boolean")
-"""The types that are exchanged and recorded."""
+ELEMENT = re.compile(r"(.+)\[(\d+(?:,\s*\d+)*)\]")  # name of an array's element: `phi[1]`, `M[1,2]`
+NUMBERS = ("Real", "Integer", "Boolean")  # types that are exchanged and recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +40,13 @@ class Variable:
         variability: As FMI spells it.
         initial: As FMI spells it; empty if there is none.
         unit: Its unit as the FMU spells it; empty if it has none.
-        base: The unit in the base units of SI, if the FMU tells; else what its spelling says, if it is one.
-        minimum: The least value allowed.
-        maximum: The largest value allowed.
-        nominal: The size of its values; 0 if the FMU does not tell.
-        start: Its value at the start, as the FMU spells it; None if it has none.
-        description: One line for people; empty for none.
-        display_unit: The unit that people like to see, such as deg; empty for the unit itself.
+        base: The unit in the base units of SI, if the FMU states it; else from its spelling, if it is a unit.
+        minimum: The minimum, in `unit`.
+        maximum: The maximum, in `unit`.
+        nominal: The magnitude of its values, in `unit`; 0 if the FMU does not state it.
+        start: Its start value, as the FMU spells it; None if it has none.
+        description: One line of text; empty if there is none.
+        display_unit: The preferred unit for display, such as deg; empty for the unit itself.
     """
 
     name: str
@@ -65,12 +66,12 @@ class Variable:
     display_unit: str = ""
 
     @property
-    def settable(self) -> bool:
+    def is_settable(self) -> bool:
         """Whether it takes a start value: no constant, initial exact or approx (FMI 2.0.4, section 4.2.4)."""
         return self.variability != "constant" and self.initial in ("exact", "approx")
 
-    def refusal(self, value: float) -> str:
-        """Return why it cannot take a value; empty if it can."""
+    def rejection_reason(self, value: float) -> str:
+        """Return why it cannot have a value; empty if it can."""
         if not math.isfinite(value):
             return f"found {value:g}, allowed: a finite number"
         if not self.minimum <= value <= self.maximum:
@@ -81,22 +82,42 @@ class Variable:
             return f"found {value:.12g}, allowed: true, false"
         return ""
 
+    def start_rejection_reason(self, value: Any) -> str:
+        """Return why a value of a system file cannot be its start value; empty if it can."""
+        if not self.is_settable:
+            found = f"{self.name}, {self.variability} {self.causality}"  # plain: ok
+            return f"found {found}, allowed: a parameter, input or state"
+        types: dict[str, tuple[type | tuple[type, ...], str]] = {
+            "String": (str, "a text"),
+            "Boolean": (bool, "true, false"),
+        }
+        python_type, allowed = types.get(self.type, ((int, float), NAMES.get(self.unit or "", "a number")))
+        if not isinstance(value, python_type) or (isinstance(value, bool) and self.type != "Boolean"):
+            spelled = str(value).lower() if isinstance(value, bool) else repr(value)
+            return f"found {spelled}, allowed: {allowed}"
+        return self.rejection_reason(float(value)) if isinstance(value, (bool, int, float)) else ""
+
+    @property
+    def kind(self) -> str:
+        """Its type as text, with the name of an enumeration."""
+        return f"Enumeration {self.enumeration}" if self.enumeration else self.type
+
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """What an FMU shows of itself.
+    """The interface of an FMU.
 
     Attributes:
         path: The FMU.
         identifier: Name of its binaries.
-        guid: What binds description and binaries.
-        variables: All of them by name, in order.
-        dependencies: Of each output, the inputs that its value depends on at once.
-        silent: Outputs that do not tell what they depend on: on all inputs, as far as one knows.
+        guid: Identifies the description that belongs to the binaries.
+        variables: All variables by name, in order.
+        dependencies: For each output, the inputs that its value depends on at once.
+        missing_dependencies: Outputs without stated dependencies: assumed to depend on all inputs.
         can_save: Whether its state can be saved and restored.
         variable_step: Whether its communication step may change.
-        alone: Whether it can be instantiated only once per process.
-        description: One line for people; empty for none.
+        single_instance: Whether it can be instantiated only once per process.
+        description: One line of text; empty if there is none.
     """
 
     path: Path
@@ -104,16 +125,16 @@ class Interface:
     guid: str
     variables: Mapping[str, Variable]
     dependencies: Mapping[str, frozenset[str]]
-    silent: frozenset[str]
+    missing_dependencies: frozenset[str]
     can_save: bool
     variable_step: bool
-    alone: bool
+    single_instance: bool
     description: str = ""
 
     @cached_property
     def inputs(self) -> tuple[Variable, ...]:
         """Its inputs, in order."""
-        return tuple(one for one in self.variables.values() if one.causality == "input")
+        return tuple(variable for variable in self.variables.values() if variable.causality == "input")
 
     @cached_property
     def outputs(self) -> tuple[Variable, ...]:
@@ -123,35 +144,34 @@ class Interface:
     @cached_property
     def arrays(self) -> Mapping[str, tuple[Variable, ...]]:
         """The elements of its arrays by the array's name, in the order of their indices."""
-        found: dict[str, list[tuple[tuple[int, ...], Variable]]] = {}
-        for name, one in self.variables.items():
+        arrays: dict[str, list[tuple[tuple[int, ...], Variable]]] = {}
+        for name, variable in self.variables.items():
             match = ELEMENT.fullmatch(name)
             if match and match[1] not in self.variables:
                 index = tuple(int(i) for i in match[2].split(","))
-                found.setdefault(match[1], []).append((index, one))
+                arrays.setdefault(match[1], []).append((index, variable))
         return {
-            name: tuple(v for _, v in sorted(rows, key=lambda row: row[0])) for name, rows in found.items()
+            name: tuple(variable for _, variable in sorted(rows, key=lambda row: row[0]))
+            for name, rows in arrays.items()
         }
 
     def elements(self, name: str) -> tuple[Variable, ...]:
-        """Return the scalar of a name, or all elements of an array; none if there is neither."""
-        one = self.variables.get(name)
-        return (one,) if one else self.arrays.get(name, ())
+        """Return the scalar of a name, or all elements of an array; empty if there is neither."""
+        variable = self.variables.get(name)
+        return (variable,) if variable else self.arrays.get(name, ())
 
     def names(self, causality: str) -> list[str]:
-        """Return the names of the variables of a causality, arrays as one."""
+        """Return the names of the variables of a causality, one name per array."""
         names: dict[str, None] = {}
-        for name, one in self.variables.items():
-            if one.causality == causality:
+        for name, variable in self.variables.items():
+            if variable.causality == causality:
                 match = ELEMENT.fullmatch(name)
                 names[match[1] if match and match[1] in self.arrays else name] = None
         return list(names)
 
 
 def read_interface(path: Path) -> Interface:
-    """Read the description of an FMU.
-
-    It is not held to the standard's schema, as `check_fmu` does: many an FMU that is not quite valid runs.
+    """Read the interface of an FMU.
 
     Raises:
         FmuError: If its archive or its description cannot be read.
@@ -159,48 +179,94 @@ def read_interface(path: Path) -> Interface:
             has no binaries for this platform.
     """
     file = open_fmu(path)
-    described = file.read_description()
+    description = file.read_description()
     try:
-        shown = _interface(path, described)
-    except Exception as error:  # what a description can be wrong by is much
-        said = " ".join(str(error).split())
-        raise CosimulationError(f"{path}: cannot be read as an FMU: {said}") from error
-    if shown is None:
-        kinds = [kind for kind in ("coSimulation", "modelExchange") if getattr(described, kind)]
-        found = f"FMI {described.fmiVersion} for {' and '.join(kinds) or 'nothing'}"
-        raise CosimulationError(f"{path}: found {found}, allowed: FMI 2.0 for coSimulation")
-    binaries = host_binaries(shown.identifier)
+        interface = _interface(path, description)
+    except Exception as error:  # a description can be wrong in many ways
+        message = " ".join(str(error).split())
+        raise CosimulationError(f"{path}: cannot be read as an FMU: {message}") from error
+    if interface is None:
+        kinds = [kind for kind in ("coSimulation", "modelExchange") if getattr(description, kind)]
+        version = f"FMI {description.fmiVersion} for {' and '.join(kinds) or 'nothing'}"
+        raise CosimulationError(f"{path}: found {version}, allowed: FMI 2.0 for coSimulation")
+    binaries = host_binaries(interface.identifier)
     if not set(file.names) & set(binaries):
         platforms = sorted({name.split("/")[1] for name in file.names if re.match(r"binaries/[^/]+/.", name)})
         raise CosimulationError(
             f"{path}: found binaries for {', '.join(platforms) or 'no platform'},"
             f" allowed: {' or '.join(binaries)}"
         )
-    return shown
+    return interface
 
 
-def _interface(path: Path, described: Any) -> Interface | None:
-    """Return what FMPy's description shows; None if it is not for co-simulation by FMI 2.0."""
-    can = described.coSimulation
-    if described.fmiVersion != "2.0" or can is None:
+def _interface(path: Path, description: Any) -> Interface | None:
+    """Return the interface in FMPy's description; None if it is not for co-simulation by FMI 2.0."""
+    abilities = description.coSimulation
+    if description.fmiVersion != "2.0" or abilities is None:
         return None
-    told = {one.variable.name for one in described.outputs if one.dependencies is not None}
+    inputs = frozenset(v.name for v in description.modelVariables if v.causality == "input")
+    outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+    stated = {
+        output.variable.name: inputs & {v.name for v in output.dependencies}
+        for output in description.outputs
+        if output.dependencies is not None
+    }
     return Interface(
         path=path,
-        identifier=can.modelIdentifier,
-        guid=described.guid,
-        variables={one.name: one for one in _variables(described)},
-        dependencies=_dependencies(described),
-        silent=frozenset(v.name for v in described.modelVariables if v.causality == "output") - told,
-        can_save=can.canGetAndSetFMUstate,
-        variable_step=can.canHandleVariableCommunicationStepSize,
-        alone=can.canBeInstantiatedOnlyOncePerProcess,
-        description=described.description or "",
+        identifier=abilities.modelIdentifier,
+        guid=description.guid,
+        variables={variable.name: variable for variable in _variables(description)},
+        dependencies={name: stated.get(name, inputs) for name in outputs},
+        missing_dependencies=frozenset(outputs) - stated.keys(),
+        can_save=abilities.canGetAndSetFMUstate,
+        variable_step=abilities.canHandleVariableCommunicationStepSize,
+        single_instance=abilities.canBeInstantiatedOnlyOncePerProcess,
+        description=description.description or "",
     )
 
 
-def unit_fault(unit: str, base: BaseUnit | None, destination: Variable) -> str | None:
-    """Return how the unit of a source differs from an input's; empty if one has none, None if it does not.
+def _variables(description: Any) -> Iterator[Variable]:
+    """Yield the variables of FMPy's description; the declared type fills what a variable does not state."""
+    bases = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
+    for variable in description.modelVariables:
+        declared = variable.declaredType
+        unit = variable.unit or (declared and declared.unit) or ""
+        low, high = (
+            getattr(variable, key) or (declared and getattr(declared, key)) for key in ("min", "max")
+        )
+        is_enumeration = variable.type == "Enumeration"
+        yield Variable(
+            name=variable.name,
+            reference=variable.valueReference,
+            type="Integer" if is_enumeration else variable.type,
+            enumeration=declared.name if declared and is_enumeration else "",
+            causality=variable.causality,
+            variability=variable.variability,
+            initial=variable.initial or "",
+            unit=unit,
+            base=to_si_base(unit, bases.get(unit)),
+            minimum=float(low) if low else -math.inf,
+            maximum=float(high) if high else math.inf,
+            nominal=abs(float(variable.nominal or (declared and declared.nominal) or 0.0)),
+            start=variable.start,
+            description=variable.description or "",
+            display_unit=variable.displayUnit or (declared and declared.displayUnit) or "",
+        )
+
+
+def to_si_base(unit: str, stated: Any = None) -> BaseUnit | None:
+    """Return a unit in the base units of SI, as FMPy read it or else from its spelling; None if unknown."""
+    if stated is not None:
+        exponents = {name: getattr(stated, name) for name in BASE_NAMES}
+        return BaseUnit(**exponents, factor=stated.factor, offset=stated.offset)
+    try:
+        return parse_unit(unit) if unit else None
+    except UnitError:
+        return None
+
+
+def unit_mismatch(unit: str, base: BaseUnit | None, destination: Variable) -> str | None:
+    """Return how the unit of a source differs from an input's; None if it does not, empty if one has none.
 
     Args:
         unit: The source's unit; empty if it has none.
@@ -216,62 +282,14 @@ def unit_fault(unit: str, base: BaseUnit | None, destination: Variable) -> str |
     return f"found the unit {unit}, allowed: that of the input, {destination.unit}"
 
 
-def _variables(described: Any) -> Iterator[Variable]:
-    """Yield the variables of FMPy's description; what one does not say, its declared type may."""
-    bases = {unit.name: unit.baseUnit for unit in described.unitDefinitions}
-    for one in described.modelVariables:
-        kind = one.declaredType
-        unit = one.unit or (kind and kind.unit) or ""
-        low, high = one.min or (kind and kind.min), one.max or (kind and kind.max)
-        yield Variable(
-            name=one.name,
-            reference=one.valueReference,
-            type="Integer" if one.type == "Enumeration" else one.type,
-            enumeration=kind.name if kind and one.type == "Enumeration" else "",
-            causality=one.causality,
-            variability=one.variability,
-            initial=one.initial or "",
-            unit=unit,
-            base=si_base(unit, bases.get(unit)),
-            minimum=float(low) if low else -math.inf,
-            maximum=float(high) if high else math.inf,
-            nominal=abs(float(one.nominal or (kind and kind.nominal) or 0.0)),
-            start=one.start,
-            description=one.description or "",
-            display_unit=one.displayUnit or (kind and kind.displayUnit) or "",
-        )
-
-
-def si_base(unit: str, told: Any = None) -> BaseUnit | None:
-    """Return a unit in the base units of SI, as FMPy read it or else by its spelling; None if unknown."""
-    if told is not None:
-        exponents = {name: getattr(told, name) for name in BASE_NAMES}
-        return BaseUnit(**exponents, factor=told.factor, offset=told.offset)
-    try:
-        return parse_unit(unit) if unit else None
-    except UnitError:
-        return None
-
-
-def _dependencies(described: Any) -> dict[str, frozenset[str]]:
-    """Return what the outputs depend on; on all inputs where an FMU does not say."""
-    inputs = frozenset(v.name for v in described.modelVariables if v.causality == "input")
-    told = {
-        one.variable.name: inputs & {v.name for v in one.dependencies}
-        for one in described.outputs
-        if one.dependencies is not None
-    }
-    return {v.name: told.get(v.name, inputs) for v in described.modelVariables if v.causality == "output"}
-
-
 @dataclass(frozen=True, slots=True)
 class Link:
     """A connection, by scalars.
 
     Attributes:
-        connection: As the system names it.
+        connection: The connection of the system.
         scalars: Each input with its source.
-        unit: The unit of what goes through; empty if it has none.
+        unit: The unit of its values; empty if it has none.
     """
 
     connection: Connection
@@ -280,12 +298,12 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class StartValue:
     """A scalar that is set before the first step.
 
     Attributes:
         variable: The scalar.
-        value: A number (yes is 1, no is 0), or a text.
+        value: A number (true is 1, false is 0), or a text.
     """
 
     variable: Variable
@@ -293,13 +311,11 @@ class Start:
 
 
 class Wiring:
-    """The connections and start values of a system.
-
-    What hangs on a block or a column that could not be read is taken as right: that is told already.
+    """The connections and start values of a system, checked.
 
     Args:
         system: The system.
-        interfaces: What the FMU of each block shows, of those that could be read.
+        interfaces: The interface of each block's FMU that could be read.
         units: Unit of the column that each input from a log follows, of those that could be read; empty if it
             is not known.
 
@@ -307,187 +323,166 @@ class Wiring:
         links: The connections.
         logged: The inputs from logs.
         starts: The start values, by block.
-        faults: All that is wrong.
-        notes: What is allowed but should be seen.
+        faults: The errors.
+        notes: Allowed, but worth a look.
     """
 
     def __init__(
         self, system: System, interfaces: Mapping[str, Interface], units: Mapping[Port, str]
     ) -> None:
-        self.system, self.interfaces = system, interfaces
+        self.interfaces = interfaces
         self.faults: list[Finding] = []
         self.notes: list[str] = []
-        self._fed: dict[Port, str] = {}
-        self._named: set[Port] = set()  # inputs that are told a source, if only a wrong one
-        links = (self._link(one) for one in system.connections)
-        self.links = tuple(one for one in links if one)
-        ports = [one.destination for one in system.inputs]
-        self.logged = tuple(port for port in ports if self._from_log(port, units.get(port)))
-        known = (block for block in system.blocks if block.name in interfaces)
-        self.starts = {block.name: tuple(self._starts(block)) for block in known}
-        self._unconnected()
+        self._sources: dict[Port, str] = {}
+        self._mentioned: set[Port] = set()  # inputs with a source in the file, even if a wrong one
+        links = [self._link(connection) for connection in system.connections]
+        self.links = tuple(link for link in links if link)
+        ports = [log_input.destination for log_input in system.inputs]
+        self.logged = tuple(port for port in ports if self._check_log_input(port, units.get(port)))
+        blocks = [block for block in system.blocks if block.name in interfaces]
+        self.starts = {block.name: tuple(self._start_values(block)) for block in blocks}
+        for name, interface in interfaces.items():
+            self._check_all_fed(name, interface)
 
-    def _fault(self, where: str, said: str) -> None:
-        """Note what is wrong with a table or key of the system's file."""
-        self.faults.append(Finding(said, about=where))
+    def _fault(self, table: str, message: str) -> None:
+        self.faults.append(Finding(message, about=table))
 
     def _link(self, connection: Connection) -> Link | None:
-        """Return a connection by scalars, if both ends are there and fit."""
-        where = f"connections.{connection.destination}"
-        inputs = self._found(where, connection.destination, "input")
-        outputs = self._found(where, connection.source, "output")
-        self._named |= {Port(connection.destination.block, one.name) for one in inputs}
+        """Return a connection by scalars, if both ends exist and have the same size."""
+        table = f"connections.{connection.destination}"
+        inputs = self._elements(table, connection.destination, "input")
+        outputs = self._elements(table, connection.source, "output")
+        input_ports = [Port(connection.destination.block, variable.name) for variable in inputs]
+        self._mentioned |= {*input_ports}
         if not inputs or not outputs:
             return None
         if len(inputs) != len(outputs):
-            found = f"found {connection.source} of size {len(outputs)}, allowed: {len(inputs)}"
-            self._fault(where, f"{found}, as many as {connection.destination}")
+            size = f"found {connection.source} of size {len(outputs)}, allowed: {len(inputs)}"
+            self._fault(table, f"{size}, as many as {connection.destination}")
             return None
-        pairs = list(zip(inputs, outputs, strict=True))
-        self._compare(where, connection.source, pairs)
-        scalars = tuple(
-            (Port(connection.destination.block, one.name), Port(connection.source.block, source.name))
-            for one, source in pairs
-        )
-        for port, source_port in scalars:
-            self._feed(port, str(source_port))
+        self._compare(table, connection.source, inputs, outputs)
+        output_ports = [Port(connection.source.block, variable.name) for variable in outputs]
+        scalars = tuple(zip(input_ports, output_ports, strict=True))
+        for port, source in scalars:
+            self._feed(port, str(source))
         return Link(connection, scalars, outputs[0].unit or inputs[0].unit)
 
-    def _found(self, where: str, port: Port, causality: str) -> Sequence[Variable]:
-        """Return the scalars at a port, if they are there and of a causality."""
+    def _elements(self, table: str, port: Port, causality: str) -> Sequence[Variable]:
+        """Return the scalars at a port, if they exist and have a causality."""
         if port.block not in self.interfaces:
             return ()
-        shown = self.interfaces[port.block]
-        found = shown.elements(port.variable)
-        if not found:
-            allowed = format_unknown_name(port.variable, shown.names(causality))
-            self._fault(where, f"{causality} of {port.block}: {allowed}")
-        for one in found:
-            if one.causality != causality:
-                allowed = ", ".join(shown.names(causality)) or "none"
+        interface = self.interfaces[port.block]
+        elements = interface.elements(port.variable)
+        if not elements:
+            unknown = format_unknown_name(port.variable, interface.names(causality))
+            self._fault(table, f"{causality} of {port.block}: {unknown}")
+        for element in elements:
+            if element.causality != causality:
+                allowed = ", ".join(interface.names(causality)) or "none"
                 self._fault(
-                    where,
-                    f"found {port.block}.{one.name}, causality {one.causality}, allowed: an"
+                    table,
+                    f"found {port.block}.{element.name}, causality {element.causality}, allowed: an"
                     f" {causality} of {port.block}: {allowed}",
                 )
                 return ()
-        return found
+        return elements
 
-    def _compare(self, where: str, source: Port, pairs: Sequence[tuple[Variable, Variable]]) -> None:
-        """Tell types and units that differ, and texts; once for an array."""
-        for one, output in pairs:
-            kinds = (_kind(output), _kind(one))
-            if "String" in (one.type, output.type):
-                found = f"found {source}, {kinds[0]}, for {one.name}, {kinds[1]}"
+    def _compare(
+        self, table: str, source: Port, inputs: Sequence[Variable], outputs: Sequence[Variable]
+    ) -> None:
+        """Report types and units that differ, and texts; once for an array."""
+        for variable, output in zip(inputs, outputs, strict=True):
+            if "String" in (variable.type, output.type):
+                connected = f"found {source}, {output.kind}, for {variable.name}, {variable.kind}"
                 allowed = "numbers: texts are not exchanged, start sets one for the whole run"
-                self._fault(where, f"{found}; allowed: {allowed}")
+                self._fault(table, f"{connected}; allowed: {allowed}")
                 return
-            if kinds[0] != kinds[1]:
-                self._fault(where, f"found {source}, {kinds[0]}, allowed: {kinds[1]}")
+            if output.kind != variable.kind:
+                self._fault(table, f"found {source}, {output.kind}, allowed: {variable.kind}")
                 return
-            fault = unit_fault(output.unit, output.base, one)
-            if fault:
-                self._fault(where, f"{source}: {fault}")
+            mismatch = unit_mismatch(output.unit, output.base, variable)
+            if mismatch:
+                self._fault(table, f"{source}: {mismatch}")
                 return
-            if fault is not None:
-                note = f"{where}: {source} has {_unit(output)}, the input {_unit(one)}: not compared"
-                self.notes.append(note)
+            if mismatch is not None:
+                units = f"{output.unit or 'no unit'}, the input {variable.unit or 'no unit'}"
+                self.notes.append(f"{table}: {source} has {units}: not compared")
 
     def _feed(self, port: Port, source: str) -> None:
-        """Note where an input comes from; tell if it already came from elsewhere."""
-        if port in self._fed:
-            self._fault(str(port), f"found two sources, {self._fed[port]} and {source}, allowed: one")
-        self._fed[port] = source
+        """Note the source of an input; report a second one."""
+        if port in self._sources:
+            self._fault(str(port), f"found two sources, {self._sources[port]} and {source}, allowed: one")
+        self._sources[port] = source
 
-    def _from_log(self, port: Port, unit: str | None) -> bool:
-        """Return whether an input from a log, None for one not read, is there, a number and of its unit."""
-        where = f"inputs.{port}"
-        found = self._found(where, port, "input")
-        if not found:
+    def _check_log_input(self, port: Port, unit: str | None) -> bool:
+        """Return whether an input from a log exists, and is a number of its unit; None if not read."""
+        table = f"inputs.{port}"
+        elements = self._elements(table, port, "input")
+        if not elements:
             return False
-        one = found[0]
-        if one.name != port.variable:
-            self._fault(where, f"found an array, allowed: one of {', '.join(v.name for v in found)}")
+        variable = elements[0]
+        if variable.name != port.variable:
+            names = ", ".join(element.name for element in elements)
+            self._fault(table, f"found an array, allowed: one of {names}")
             return False
-        if one.type == "String":
-            self._fault(where, "found a String, allowed: a number")
+        if variable.type == "String":
+            self._fault(table, "found a String, allowed: a number")
             return False
-        self._named.add(port)
+        self._mentioned.add(port)
         if unit is None:
             return False
-        fault = unit_fault(unit, si_base(unit), one)
-        if fault:
-            self._fault(where, fault)
-        elif fault is not None:
-            self.notes.append(
-                f"{where}: the log has {unit or 'no unit'}, the input {_unit(one)}: not compared"
-            )
+        mismatch = unit_mismatch(unit, to_si_base(unit), variable)
+        if mismatch:
+            self._fault(table, mismatch)
+        elif mismatch is not None:
+            units = f"{unit or 'no unit'}, the input {variable.unit or 'no unit'}"
+            self.notes.append(f"{table}: the log has {units}: not compared")
         self._feed(port, "the log")
         return True
 
-    def _starts(self, block: Block) -> Iterator[Start]:
+    def _start_values(self, block: Block) -> Iterator[StartValue]:
         """Yield the start values of a block, by scalars."""
-        shown = self.interfaces[block.name]
+        interface = self.interfaces[block.name]
         seen: set[str] = set()
         for name, value in block.start.items():
-            where = f"blocks.{block.name}.start.{name}"
-            found = shown.elements(name)
-            if not found:
-                names = [n for kind in ("parameter", "input", "output", "local") for n in shown.names(kind)]
-                self._fault(where, format_unknown_name(name, names))
-                continue
-            values = value if isinstance(value, list) else [value] * len(found)
-            if len(values) != len(found):
-                self._fault(where, f"found {len(values)} values, allowed: {len(found)}, or one for all")
-                continue
-            for one, each in zip(found, map(_in_si, found, values), strict=True):
-                fault = _start_fault(one, each) or ("set twice" if one.name in seen else "")
-                seen.add(one.name)
-                if fault:
-                    self._fault(where, fault)
-                    break
-                yield Start(one, each if isinstance(each, str) else float(each))
-
-    def _unconnected(self) -> None:
-        """Tell the inputs that nothing gives a value to."""
-        for name, shown in self.interfaces.items():
-            given = {start.variable.name for start in self.starts[name]}
-            left = [
-                v.name for v in shown.inputs if Port(name, v.name) not in self._named and v.name not in given
-            ]
-            if left:
+            table = f"blocks.{block.name}.start.{name}"
+            elements = interface.elements(name)
+            if not elements:
+                kinds = ("parameter", "input", "output", "local")
                 self._fault(
-                    f"blocks.{name}",
-                    f"found inputs without a source: {', '.join(left)}; allowed: each in"
-                    " [connections], in [inputs], or with a value in start",
+                    table, format_unknown_name(name, (n for kind in kinds for n in interface.names(kind)))
                 )
+                continue
+            values = value if isinstance(value, list) else [value] * len(elements)
+            if len(values) != len(elements):
+                self._fault(table, f"found {len(values)} values, allowed: {len(elements)}, or one for all")
+                continue
+            for variable, text_or_number in zip(elements, values, strict=True):
+                start = _in_si(variable, text_or_number)
+                reason = variable.start_rejection_reason(start)
+                reason = reason or ("set twice" if variable.name in seen else "")
+                seen.add(variable.name)
+                if reason:
+                    self._fault(table, reason)
+                    break
+                yield StartValue(variable, start if isinstance(start, str) else float(start))
+
+    def _check_all_fed(self, block: str, interface: Interface) -> None:
+        """Report the inputs of a block that have neither source nor start value."""
+        fed = {start.variable.name for start in self.starts[block]}
+        fed |= {port.variable for port in self._mentioned if port.block == block}
+        missing = [variable.name for variable in interface.inputs if variable.name not in fed]
+        if missing:
+            self._fault(
+                f"blocks.{block}",
+                f"found inputs without a source: {', '.join(missing)}; allowed: each in"
+                " [connections], in [inputs], or with a value in start",
+            )
 
 
-def _kind(one: Variable) -> str:
-    """Return the type of a variable for people."""
-    return f"Enumeration {one.enumeration}" if one.enumeration else one.type
-
-
-def _unit(one: Variable) -> str:
-    return one.unit or "no unit"
-
-
-def _in_si(one: Variable, value: Any) -> Any:
+def _in_si(variable: Variable, value: Any) -> Any:
     """Return a start value; a text with its unit as a number, where the variable is in SI."""
-    number = quantity_to_si(value, WRITTEN.get(one.unit or "", {})) if isinstance(value, str) else math.nan
-    return number if one.type == "Real" and math.isfinite(number) else value
-
-
-def _start_fault(one: Variable, value: Any) -> str:
-    """Return why a scalar cannot start with a value; empty if it can."""
-    if not one.settable:
-        return f"found {one.name}, {one.variability} {one.causality}, allowed: a parameter, input or state"
-    types: dict[str, tuple[type | tuple[type, ...], str]] = {
-        "String": (str, "a text"),
-        "Boolean": (bool, "true, false"),
-    }
-    right, allowed = types.get(one.type, ((int, float), NAMES.get(one.unit or "", "a number")))
-    if not isinstance(value, right) or (isinstance(value, bool) and one.type != "Boolean"):
-        found = str(value).lower() if isinstance(value, bool) else repr(value)
-        return f"found {found}, allowed: {allowed}"
-    return one.refusal(float(value)) if isinstance(value, (bool, int, float)) else ""
+    number = (
+        quantity_to_si(value, WRITTEN.get(variable.unit or "", {})) if isinstance(value, str) else math.nan
+    )
+    return number if variable.type == "Real" and math.isfinite(number) else value

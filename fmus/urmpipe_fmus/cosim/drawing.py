@@ -24,7 +24,7 @@ from statistics import fmean
 from textwrap import wrap
 from typing import NamedTuple, TypeAlias
 
-from urmpipe_fmus.cosim.checks import ELEMENT, Interface, Start
+from urmpipe_fmus.cosim.checks import ELEMENT, Interface, StartValue
 from urmpipe_fmus.cosim.plan import Plan
 from urmpipe_fmus.cosim.system import Block
 
@@ -211,7 +211,7 @@ def _value(plan: Plan, block: str, pin: Pin) -> str:
     return shown[0] if len(set(shown)) == 1 else f"{shown[0]}, {shown[1]}{', …' * (len(shown) > 2)}"
 
 
-def _spelled(start: Start) -> str:
+def _spelled(start: StartValue) -> str:
     """Return a start value as a system file spells it, a Real in six digits."""
     if isinstance(start.value, str):
         return start.value

@@ -1,7 +1,7 @@
-"""What the process that runs the FMUs is told: numbers, places and paths, nothing to be looked up.
+"""Job of the process that runs the FMUs of a system: numbers, places and paths, without names to resolve.
 
-Values live in one vector a type. Its places are, in this order: inputs from logs, outputs in the order in
-which they are read, and torn inputs of algebraic loops. What is read together stands together.
+The values of a system are one vector per type. Its places are, in this order: inputs from logs, outputs in
+the order in which they are read, and torn inputs of algebraic loops. Values read together are neighbours.
 """
 
 from __future__ import annotations
@@ -16,27 +16,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TYPES = ("Real", "Integer", "Boolean")
-"""The types of numbers, in the order of the recorded columns."""
+TYPES = ("Real", "Integer", "Boolean")  # numeric types, in the order of the recorded columns
 
-JOB, RECORDED, NOT_FINITE, WARNED, PROGRESS, RESULT, LOG, SAID = (
-    "job.pickle",
-    "recorded.bin",
-    "not_finite.bin",
-    "warned.bin",
-    "progress.bin",
-    "result.json",
-    "log.txt",
-    "said.txt",
-)
-"""Files in the folder of a run; LOG holds what the FMUs log, SAID what they print.
+# Files in the folder of a run. NOT_FINITE has three rows of doubles with a column per recorded Real: the
+# first value that is not finite, its communication point, and the number of such values. WARNED has two rows
+# with a column per call code: the number of times that the call returned fmi2Warning, and the communication
+# point of the first.
+JOB = "job.pickle"
+RECORDED = "recorded.bin"
+NOT_FINITE = "not_finite.bin"
+WARNED = "warned.bin"
+PROGRESS = "progress.bin"
+RESULT = "result.json"
+LOG = "log.txt"  # messages that the FMUs log
 
-NOT_FINITE has three rows of doubles with a column for each recorded Real: of its values that are not finite
-the first, the communication point of that, and how many there were. WARNED has two rows with a column for
-each `call_code`: how often it returned fmi2Warning, and the communication point of the first.
-"""
-
-FUNCTIONS = (
+FUNCTIONS = (  # calls of an FMU
     "loading",
     "fmi2Instantiate",
     "fmi2SetupExperiment",
@@ -58,28 +52,32 @@ FUNCTIONS = (
     "fmi2Terminate",
     "fmi2FreeInstance",
 )
-"""What a block can be doing."""
+CODES = 2**24  # more than there are codes; code and number of a call are one integer, number * CODES + code
+NO_CALL = CODES - 1  # the code while no block is called
+next_call = count(0, CODES).__next__  # returns the number of the next call, times CODES
 
-CALLS = 2**24
-"""More than there are codes of calls: what a call is and its number are kept in one integer."""
 
-ELSEWHERE = CALLS - 1
-"""The call while no block is called."""
+def encode_call(block: int, function: str) -> int:
+    """Return a block and a function as one number."""
+    return block * len(FUNCTIONS) + FUNCTIONS.index(function)
 
-next_call = count(0, CALLS).__next__
-"""Gives the number of a call, times `CALLS`."""
+
+def decode_call(code: int) -> tuple[int, str]:
+    """Return the block and the function of a code."""
+    block, function = divmod(code, len(FUNCTIONS))
+    return block, FUNCTIONS[function]
 
 
 class Progress(ctypes.Structure):
-    """How far a run is: shared with the parent, and still there when the process is not.
+    """Progress of a run, in memory shared with the parent, which outlives the process.
 
     Attributes:
-        rows: Rows recorded.
+        rows: Number of recorded rows.
         k: The communication point.
-        call: Block and function being called, see `call_code`, plus `next_call()`: each call has another.
-        done: Whether all is done that the process was for: an FMU can end it before, with any exit code.
-        ended: Where the last row stands in [s] if it was read once more as an FMU ended the run; else 0.
-        loop_seconds: How long the loop over the communication points took in [s]; 0 until it ends.
+        call: The current call: its code, see `encode_call`, plus `next_call()`, so that no two are equal.
+        done: Whether the job is complete: an FMU can end the process before, with any exit code.
+        ended: Time of the last row in [s] if it was read once more as an FMU ended the run; else 0.
+        loop_seconds: Duration of the loop over the communication points in [s]; 0 until it ends.
     """
 
     _fields_ = (
@@ -88,29 +86,18 @@ class Progress(ctypes.Structure):
     )
 
     def begin(self, code: int) -> None:
-        """Note what is called next, see `call_code`."""
+        """Note the code of the next call."""
         self.call = code + next_call()
 
     @property
     def code(self) -> int:
-        """Block and function being called, see `call_code`."""
-        return int(self.call % CALLS)
-
-
-def call_code(block: int, function: str) -> int:
-    """Return a block and a function as one number."""
-    return block * len(FUNCTIONS) + FUNCTIONS.index(function)
-
-
-def called(code: int) -> tuple[int, str]:
-    """Return the block and the function of a `call_code`."""
-    block, function = divmod(code, len(FUNCTIONS))
-    return block, FUNCTIONS[function]
+        """Code of the current call."""
+        return int(self.call % CODES)
 
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """Values that go into a block or come out of it in one call.
+    """Values that are set or read by one call.
 
     Attributes:
         type: Real, Integer or Boolean.
@@ -125,7 +112,7 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class ExchangeJob:
-    """An exchange: its block by number, what is set, what is read."""
+    """An exchange: number of its block, what is set, what is read."""
 
     block: int
     sets: tuple[Transfer, ...]
@@ -140,11 +127,10 @@ class LoopJob:
         exchanges: One sweep.
         torn: Places of the torn inputs.
         sources: Places of their sources.
-        minimum: The least value that an input of the loop may have, in its own unit, at the place that it
-            follows, shape (places,).
-        maximum: The largest, likewise.
-        nominal: The size of the values of each torn input, in its unit, shape (torn,).
-        ring: The loop, for people.
+        minimum: The minimum of the loop's inputs that follow each place, in their unit, shape (places,).
+        maximum: The maximum, in their unit, shape (places,).
+        nominal: The magnitude of each torn input, in its unit, shape (torn,).
+        ring: The loop as text.
     """
 
     exchanges: tuple[ExchangeJob, ...]
@@ -162,12 +148,12 @@ class BlockJob:
 
     Attributes:
         name: Its name.
-        folder: Where its FMU is unpacked.
+        folder: Folder of its unpacked FMU.
         identifier: Name of its binary.
         guid: Of its FMU.
         variable_step: Whether its steps may differ in the last bit.
         can_save: Whether its state can be saved.
-        starts: Type, value reference and value of what is set before the first step.
+        starts: Type, value reference and value of each start value.
     """
 
     name: str
@@ -186,13 +172,13 @@ class Job:
     Attributes:
         step: Communication step in [s].
         count: Number of steps.
-        record_every: Every so many points are recorded.
-        tolerance: Of iterated loops.
+        record_every: Number of communication points per recorded one.
+        tolerance: Of iterated loops, relative to nominal + |value|.
         blocks: The blocks.
         order: The exchanges of a communication point.
         logged: Values from logs at the points by type, each in its own unit, shape (count + 1,
             inputs of the type).
-        recorded: How many places of each type are recorded, from the first.
+        recorded: Number of recorded places of each type, from the first.
         start: The values at the start by type, each in its own unit, shape (places,).
     """
 
@@ -208,15 +194,15 @@ class Job:
 
     @property
     def rows(self) -> int:
-        """How many rows a run may record: those of a whole run, and where an FMU ends it one more."""
+        """Maximum number of recorded rows: those of a full run, and one more where an FMU ends it."""
         return self.count // self.record_every + 2
 
     @property
     def calls(self) -> int:
-        """How many codes of calls there are."""
+        """Number of call codes."""
         return len(self.blocks) * len(FUNCTIONS)
 
     @property
     def columns(self) -> int:
-        """How many columns are recorded."""
+        """Number of recorded columns."""
         return sum(self.recorded.values())

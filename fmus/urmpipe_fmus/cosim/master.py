@@ -1,15 +1,19 @@
-"""Algebraic loops at a communication point: the torn inputs are found by Newton's method.
+"""The loop of a co-simulation over its communication points, and the solution of algebraic loops.
 
-A sweep gives g(x), what the sources of the torn inputs are if these are x. x is sought with r = g(x) - x = 0.
-The Jacobian of r is found by differences and kept, from iteration to iteration and from point to point, with
-Broyden's update; it is found anew where it no longer serves.
+**Master.** At t_k = k h, k = 0 .. count, inputs are set and outputs are read in the order of the plan
+(`order`); then all blocks step to t_k+1. Every call is prepared once (`slave`) and noted before it is made,
+in memory that outlives the process. A block may end the simulation in a step: what it reached is recorded.
+
+**Algebraic loops.** A sweep through a loop gives g(x), the sources of the torn inputs if these are x.
+Newton's method solves r(x) = g(x) - x = 0. The Jacobian of r is found by differences and kept, from
+iteration to iteration and from point to point, with Broyden's update
+
+    J <- J + (r_new - r - J s) s^T / (s^T s)    for a step s,
+
+and found again if the residual falls too slowly. Steps are clipped to the range of the inputs, and halved
+if the residual rises or is not finite.
 
 Source: [Broyden1965]_.
-
-The loop of a co-simulation: at t_k = k h inputs are set and outputs read in order, then all do a step.
-
-Every call is prepared once: its arguments stand, and what they point to changes. What is called is noted
-before each call, in memory that outlives the process.
 """
 
 from __future__ import annotations
@@ -24,14 +28,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_fmus.cosim.job import (
-    ELSEWHERE,
+    NO_CALL,
     TYPES,
     ExchangeJob,
     Job,
     LoopJob,
     Progress,
-    call_code,
-    called,
+    decode_call,
+    encode_call,
     next_call,
 )
 from urmpipe_fmus.cosim.slave import (
@@ -40,147 +44,35 @@ from urmpipe_fmus.cosim.slave import (
     PENDING,
     WARNING,
     Call,
-    Exchange,
-    FmuFailed,
-    Member,
-    Moved,
+    FmuCallError,
+    LoopExchange,
+    LoopMember,
+    LoopVariables,
     Slave,
     status_name,
 )
 from urmpipe_models.elementwise import FloatArray
 
-ITERATIONS = 50
-"""Newton's method needs a handful; what is not solved by then does not converge."""
+MAX_ITERATIONS = 50  # Newton's method needs a handful
+DIFFERENCE = 1e-7  # relative step of the differences: about the root of the precision of a double
+MAX_STEP_HALVINGS = 6  # of a step that makes the residual larger
+MAX_FINITE_HALVINGS = 40  # of a step to where values are not finite
+MAX_RESIDUAL_RATIO = 0.25  # of a step; a larger residual is a reason to find the Jacobian again
+TIME_TOLERANCE = 1e-9  # s; times that differ by no more are equal: rows are recorded in whole ns
 
-DIFFERENCE = 1e-7
-"""Relative step of the differences: about the root of the precision of a double."""
-
-SHRINKS = 6
-"""A step that makes the residual larger is halved so often at most."""
-
-DEEPEST = 40
-"""A step to where the values are not finite is halved until they are, but not more often."""
-
-USEFUL = 0.25
-"""A step that leaves more of the residual than this is a reason to find the Jacobian anew."""
+PreparedCall = tuple[int, Call]  # code of the call, and the call
 
 
-class NoConvergence(Exception):  # noqa: N818 - it ends the run, and is told as a result
-    """A loop was not solved."""
+class ConvergenceError(Exception):
+    """An algebraic loop was not solved."""
 
 
-class LoopSolver:
-    """Solves a loop.
-
-    Args:
-        loop: The loop.
-        values: The vector of the Reals, each in its own unit, shape (reals,).
-        sweeps: The exchanges of a sweep.
-        tolerance: What may be left of the residual, relative to nominal + |x|.
-    """
-
-    def __init__(
-        self, loop: LoopJob, values: FloatArray, sweeps: Sequence[Callable[[], None]], tolerance: float
-    ) -> None:
-        self._loop, self._values, self._sweeps, self._tolerance = loop, values, sweeps, tolerance
-        self._torn, self._sources = np.array(loop.torn, np.intp), np.array(loop.sources, np.intp)
-        read = [p for one in loop.exchanges for t in one.gets if t.type == "Real" for p in t.places]
-        self._read = np.array(read, np.intp)
-        self._minimum, self._maximum = loop.minimum[self._torn], loop.maximum[self._torn]
-        self._jacobian: FloatArray | None = None
-
-    def solve(self) -> int:
-        """Solve the loop: afterwards all its exchanges are those of the solution. Returns FMI's status OK.
-
-        Raises:
-            NoConvergence: If it cannot.
-        """
-        x = self._values[self._torn].copy()
-        r = self._residual(x)
-        for _ in range(ITERATIONS):
-            if self._solved(x, r):
-                return 0
-            fresh = self._jacobian is None
-            if self._jacobian is None:
-                self._jacobian = self._differences(x, r)
-            if not (np.isfinite(r).all() and np.isfinite(self._jacobian).all()):
-                raise NoConvergence(
-                    f"algebraic loop: {self._loop.ring}: found values that are not finite; start values of"
-                    " its inputs, nearer to the solution, may help"
-                )
-            newton = -np.linalg.lstsq(self._jacobian, r, rcond=None)[0].astype(np.float64)
-            following, left = self._line(x, r, newton)
-            step = following - x
-            if _size(left) > USEFUL * _size(r) and not (fresh and _size(left) < _size(r)):
-                self._jacobian = None
-            elif step.any():
-                self._jacobian = self._jacobian + np.outer(left - r - self._jacobian @ step, step) / (
-                    step @ step
-                )
-            x, r = following, left
-        if self._solved(x, r):
-            return 0
-        raise NoConvergence(
-            f"algebraic loop: {self._loop.ring}: not solved after {ITERATIONS} iterations, found a residual"
-            f" of {np.max(np.abs(r)):.3g}, allowed: {self._tolerance:.3g} relative to its values"
-        )
-
-    def _residual(self, x: FloatArray) -> FloatArray:
-        """Return g(x) - x."""
-        self._values[self._torn] = x
-        for sweep in self._sweeps:
-            sweep()
-            if not np.isfinite(self._values[self._read]).all():
-                self._values[self._read] = 0.0  # all are read again by the next sweep
-                return np.full_like(x, np.nan)  # no block of the sweep is given what is not finite
-        return self._values[self._sources] - x
-
-    def _solved(self, x: FloatArray, r: FloatArray) -> bool:
-        return bool(np.all(np.abs(r) <= self._tolerance * (self._loop.nominal + np.abs(x))))
-
-    def _differences(self, x: FloatArray, r: FloatArray) -> FloatArray:
-        """Return the Jacobian of the residual by differences, to the side where the inputs may be."""
-        return np.column_stack([self._column(i, x, r) for i in range(len(x))])
-
-    def _column(self, i: int, x: FloatArray, r: FloatArray) -> FloatArray:
-        """Return a column of the Jacobian; not finite if it is on neither side."""
-        column = np.full_like(r, np.nan)
-        h = DIFFERENCE * (self._loop.nominal[i] + abs(x[i]))
-        for each in (x[i] + h, x[i] - h):
-            moved = x.copy()
-            moved[i] = each
-            if self._minimum[i] <= each <= self._maximum[i] and not np.isfinite(column).all():
-                column = (self._residual(moved) - r) / (moved[i] - x[i])
-        return column
-
-    def _line(self, x: FloatArray, r: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return a point along a step, in the range of the inputs, that leaves less, and what it leaves."""
-        for halved in range(DEEPEST):
-            following = np.clip(x + step, self._minimum, self._maximum)
-            left = self._residual(following)
-            if np.isfinite(left).all() and (_size(left) < _size(r) or halved >= SHRINKS - 1):
-                break
-            step = 0.5 * step
-        return following, left
-
-
-def _size(r: FloatArray) -> float:
-    return float(np.linalg.norm(r))
-
-
-Prepared = tuple[int, Call]
-"""Block and function, and the call itself."""
-
-NANOSECOND = 1e-9
-"""Times in [s] that differ by no more are one: rows are recorded by whole nanoseconds."""
-
-
-class Ended(Exception):  # noqa: N818 - no error: an FMU may end the simulation
+class SimulationTerminated(Exception):  # noqa: N818 - no error: an FMU may end the simulation
     """A block ended the simulation.
 
     Attributes:
         block: Its number.
-        t: How far it came in [s]; nan if it does not tell.
+        t: The time in [s] that it reached; nan if it does not state it.
     """
 
     def __init__(self, block: int, t: float) -> None:
@@ -189,16 +81,16 @@ class Ended(Exception):  # noqa: N818 - no error: an FMU may end the simulation
 
 
 class Master:
-    """Blocks that are run together.
+    """Blocks that run together.
 
     Args:
-        job: What is run.
-        progress: How far it is, shared with the parent.
-        recorded: Where it is recorded, each column in its own unit, shape (rows, columns).
-        not_finite: Where values are noted that are not finite, zeros as yet, see `NOT_FINITE`, shape (3,
-            recorded Reals).
-        warned: Where each fmi2Warning is noted, zeros as yet, see `WARNED`, shape (2, codes of calls).
-        callbacks: What the FMUs are given: logger and memory.
+        job: The run.
+        progress: Its progress, shared with the parent.
+        recorded: Recorded values, each column in its own unit, shape (rows, columns).
+        not_finite: Values that are not finite, initially zeros, see `job.NOT_FINITE`, shape (3, recorded
+            Reals).
+        warned: Calls that returned fmi2Warning, initially zeros, see `job.WARNED`, shape (2, codes of calls).
+        callbacks: Logger and memory for the FMUs.
     """
 
     def __init__(
@@ -211,22 +103,29 @@ class Master:
         callbacks: Any,
     ) -> None:
         self._job, self._progress, self._recorded, self._callbacks = job, progress, recorded, callbacks
-        self._ends: list[str] = []
+        self._end_notes: list[str] = []
         self._values = {kind: job.start[kind].copy() for kind in TYPES}
-        self._time, self._step, self._exact = (ctypes.c_double(one) for one in (0.0, job.step, job.step))
+        self._time, self._step, self._exact_step = map(ctypes.c_double, (0.0, job.step, job.step))
         self._slaves: list[Slave] = []
-        self._members: dict[int, Member] = {}
-        self._looped: list[tuple[str, str, Exchange]] = []
-        self._columns = self._shares(job)
+        self._members: dict[int, LoopMember] = {}
+        self._loop_exchanges: list[tuple[str, str, LoopExchange]] = []  # block, ring, exchange
+        loops = [item for item in job.order if isinstance(item, LoopJob)]
+        self._loop_blocks = {exchange.block for loop in loops for exchange in loop.exchanges}
+        ends = np.cumsum([job.recorded[kind] for kind in TYPES]).tolist()
+        self._columns = [
+            (slice(end - job.recorded[kind], end), kind)
+            for kind, end in zip(TYPES, ends, strict=True)
+            if job.recorded[kind]
+        ]
         self._reals = self._values["Real"][: job.recorded["Real"]]
         self._not_finite, self._warnings = not_finite, warned
 
     def run(self) -> None:
-        """Run the whole job.
+        """Run the job.
 
         Raises:
-            FmuFailed: If an FMU did not do what it was asked.
-            NoConvergence: If a loop was not solved.
+            FmuCallError: If a call of an FMU failed.
+            ConvergenceError: If a loop was not solved.
         """
         try:
             self._start()
@@ -235,37 +134,37 @@ class Master:
                 self._loop()
             finally:
                 self._progress.loop_seconds = perf_counter() - started
-        except Ended as ended:  # while a step of a loop is done again
-            self._note_end(ended, self._time.value, self._time.value)
-        except (FmuFailed, NoConvergence):  # what is not finite may be why
-            self._look(0)
+        except SimulationTerminated as end:  # while a step of a loop is repeated
+            self._note_end(end, self._time.value, self._time.value)
+        except (FmuCallError, ConvergenceError):  # values that are not finite may be the reason
+            self._check_finite(0)
             raise
 
     def end(self) -> None:
-        """Terminate and free the blocks, as far as their status lets them.
+        """Terminate and free the blocks whose status allows it.
 
         After fmi2Fatal no instance of that FMU may be called (FMI 2.0.4, section 2.1.3).
         """
-        corrupted = {slave.block.folder for slave in self._slaves if slave.fatal}
+        fatal = {slave.block.folder for slave in self._slaves if slave.fatal}
         for slave in self._slaves:
-            if slave.block.folder not in corrupted:
+            if slave.block.folder not in fatal:
                 slave.end()
-        self._progress.begin(ELSEWHERE)
+        self._progress.begin(NO_CALL)
 
     @property
     def notes(self) -> list[str]:
-        """What should be seen of a run: that a block ended it, outputs in loops that may be a step late."""
-        return self._ends + [
+        """Which blocks ended the run, and outputs in loops that may be those of the step before."""
+        return self._end_notes + [
             f"algebraic loop: {ring}: the outputs of block {name} never followed its inputs: they do not"
             " depend on them, or are those of the step before"
-            for name, ring, exchange in self._looped
+            for name, ring, exchange in self._loop_exchanges
             if not exchange.followed
         ]
 
     def _start(self) -> None:
-        """Instantiate the blocks, set their start values, and exchange what they start with."""
+        """Instantiate the blocks, set their start values, and exchange the initial values."""
         for number, block in enumerate(self._job.blocks):
-            self._slaves.append(Slave(number, block, self._progress, self._warned))
+            self._slaves.append(Slave(number, block, self._progress, self._note_warning))
         for slave in self._slaves:
             slave.instantiate(self._callbacks)
         for slave in self._slaves:
@@ -274,147 +173,151 @@ class Master:
         for slave in self._slaves:
             slave.once("fmi2EnterInitializationMode")
         self._prepare()
-        self._log(0)
+        self._set_logged(0)
         self._run(self._point)
-        self._look(0)
+        self._check_finite(0)
         for slave in self._slaves:
             slave.once("fmi2ExitInitializationMode")
             slave.running = True
 
     def _prepare(self) -> None:
         """Prepare the calls of a communication point and those of a step."""
-        for number in sorted(self._in_loops()):
+        for number in sorted(self._loop_blocks):
             if self._slaves[number].block.can_save:
                 slave = self._slaves[number]
-                self._members[number] = Member(slave, self._time, self._length(slave), self._check)
-        self._point: list[Prepared] = []
-        for one in self._job.order:
-            if isinstance(one, LoopJob):
-                self._point.append((ELSEWHERE, self._solver(one).solve))
+                self._members[number] = LoopMember(slave, self._time, self._step_of(slave), self._check)
+        self._point: list[PreparedCall] = []
+        for item in self._job.order:
+            if isinstance(item, LoopJob):
+                self._point.append((NO_CALL, self._solver(item).solve))
             else:
-                self._point += self._sets(one) + self._gets(one)
-        self._steps = [(call_code(n, "fmi2DoStep"), one.step) for n, one in self._members.items()] + [
-            slave.stepper(self._time, self._length(slave))
+                self._point += self._sets(item) + self._gets(item)
+        self._steps = [
+            (encode_call(number, "fmi2DoStep"), member.step) for number, member in self._members.items()
+        ] + [
+            slave.stepper(self._time, self._step_of(slave))
             for slave in self._slaves
             if slave.number not in self._members
         ]
 
-    def _length(self, slave: Slave) -> ctypes.c_double:
-        """Return the step of a block: t_k+1 - t_k, which adds up exactly, or one that never changes."""
-        return self._exact if slave.block.variable_step else self._step
+    def _step_of(self, slave: Slave) -> ctypes.c_double:
+        """Return the step of a block: t_k+1 - t_k, which adds up exactly, or a constant."""
+        return self._exact_step if slave.block.variable_step else self._step
 
-    def _sets(self, one: ExchangeJob) -> list[Prepared]:
-        return [self._slaves[one.block].setter(transfer, self._values) for transfer in one.sets]
+    def _sets(self, exchange: ExchangeJob) -> list[PreparedCall]:
+        return [self._slaves[exchange.block].setter(transfer, self._values) for transfer in exchange.sets]
 
-    def _gets(self, one: ExchangeJob) -> list[Prepared]:
-        return [self._slaves[one.block].getter(transfer, self._values) for transfer in one.gets]
+    def _gets(self, exchange: ExchangeJob) -> list[PreparedCall]:
+        return [self._slaves[exchange.block].getter(transfer, self._values) for transfer in exchange.gets]
 
     def _solver(self, loop: LoopJob) -> LoopSolver:
-        """Return what solves a loop at a communication point."""
+        """Return the solver of a loop at a communication point."""
         reals = self._values["Real"]
-        read = [t for one in loop.exchanges for t in one.gets if t.type == "Real"]
-        moving = {*loop.torn, *(place for t in read for place in t.places)}
-        sweeps: list[Callable[[], None]] = []
-        for one in loop.exchanges:
-            sets, gets = partial(self._run, self._sets(one)), partial(self._run, self._gets(one))
-            at = sorted(p for t in one.sets if t.type == "Real" for p in t.places if p in moving)
-            places = np.array(at, dtype=np.intp)
-            shown = [self._values[t.type][t.places[0] : t.places[-1] + 1] for t in one.gets]
-            moved = Moved(reals, places, loop.minimum[places], loop.maximum[places], shown)
-            exchange = Exchange(self._members.get(one.block), sets, gets, moved)
-            sweeps.append(exchange)
-            self._looped.append((self._job.blocks[one.block].name, loop.ring, exchange))
-        return LoopSolver(loop, reals, sweeps, self._job.tolerance)
+        loop_places = {*loop.torn, *_real_outputs(loop)}
+        sweep: list[Callable[[], None]] = []
+        for job in loop.exchanges:
+            sets, gets = partial(self._run, self._sets(job)), partial(self._run, self._gets(job))
+            set_places = (place for t in job.sets if t.type == "Real" for place in t.places)
+            places = np.array(sorted(place for place in set_places if place in loop_places), dtype=np.intp)
+            outputs = [self._values[t.type][t.places[0] : t.places[-1] + 1] for t in job.gets]
+            variables = LoopVariables(reals, places, loop.minimum[places], loop.maximum[places], outputs)
+            exchange = LoopExchange(self._members.get(job.block), sets, gets, variables)
+            sweep.append(exchange)
+            self._loop_exchanges.append((self._job.blocks[job.block].name, loop.ring, exchange))
+        return LoopSolver(loop, reals, sweep, self._job.tolerance)
 
     def _loop(self) -> None:
-        """Go through the communication points."""
-        job, progress, time, exact = self._job, self._progress, self._time, self._exact
-        log = self._log if job.logged else None
+        """Loop over the communication points."""
+        job, progress, time, exact_step = self._job, self._progress, self._time, self._exact_step
+        set_logged = self._set_logged if job.logged else None
         for k in range(job.count + 1):
             progress.k = k
-            here = time.value
-            if log is not None:
-                log(k)
+            now = time.value
+            if set_logged is not None:
+                set_logged(k)
             self._run(self._point)
-            self._look(1)
+            self._check_finite(1)
             if k % job.record_every == 0:
                 self._record(k // job.record_every)
             if k == job.count:
                 break
             if k == 0:
-                for _, _, exchange in self._looped:
-                    exchange.begin()
+                for _, _, exchange in self._loop_exchanges:
+                    exchange.reset()
             following = (k + 1) * job.step
-            exact.value = following - here
-            ended = self._step_all(following)
-            if ended:
-                self._finish(ended, here, following)
+            exact_step.value = following - now
+            ends = self._step_all(following)
+            if ends:
+                self._finish(ends, now, following)
                 break
             time.value = following
 
-    def _step_all(self, following: float) -> list[Ended]:
-        """Do the step of all blocks; return which of them ended the simulation.
+    def _step_all(self, following: float) -> list[SimulationTerminated]:
+        """Do the step of all blocks to a time in [s]; return which of them ended the simulation.
 
-        Once one did, the others step only where it came to the next communication point, at a time in [s].
+        After the first, the other blocks step only if it reached that time.
         """
-        ended: list[Ended] = []
-        left = self._steps
-        while left:
+        ends: list[SimulationTerminated] = []
+        steps = self._steps
+        while steps:
             try:
-                self._run(left)
+                self._run(steps)
                 break
-            except Ended as one:
-                ended.append(one)
-                if not _same(one.t, following):
+            except SimulationTerminated as end:
+                ends.append(end)
+                if not _same_time(end.t, following):
                     break
-                left = left[1 + next(i for i, (code, _) in enumerate(left) if called(code)[0] == one.block) :]
-        return ended
+                stopped = next(i for i, (code, _) in enumerate(steps) if decode_call(code)[0] == end.block)
+                steps = steps[stopped + 1 :]
+        return ends
 
-    def _finish(self, ended: Sequence[Ended], here: float, following: float) -> None:
-        """Record once more where blocks ended the simulation, in a step from and to times in [s].
+    def _finish(self, ends: Sequence[SimulationTerminated], now: float, following: float) -> None:
+        """Record once more after blocks ended the simulation, in a step from and to times in [s].
 
         At the next communication point all blocks exchange their values, but nothing is set in those that
-        ended: after a discarded step that is not allowed (FMI 2.0.4, section 4.2.4). At a time before, and
-        for a block in a loop, which would have to be set, the outputs of the block alone are read.
+        ended: after a discarded step that is not allowed (FMI 2.0.4, section 4.2.4). At an earlier time, and
+        for a block in a loop, whose inputs would have to be set, only the outputs of the block are read.
         """
-        for one in ended:
-            self._note_end(one, here, following)
-        over, last = {one.block for one in ended}, ended[-1].t
-        if not here + NANOSECOND < last <= following + NANOSECOND:
+        for end in ends:
+            self._note_end(end, now, following)
+        ended_blocks, last = {end.block for end in ends}, ends[-1].t
+        if not now + TIME_TOLERANCE < last <= following + TIME_TOLERANCE:
             return
-        if all(_same(one.t, following) for one in ended) and not over & self._in_loops():
+        if all(_same_time(end.t, following) for end in ends) and not ended_blocks & self._loop_blocks:
             last = self._time.value = following
             self._progress.k += 1
-            self._log(self._progress.k)
-            self._run([one for one in self._point if not _sets(one, over)])
-            self._look(1)
+            self._set_logged(self._progress.k)
+            self._run([call for call in self._point if not _is_set_call(call, ended_blocks)])
+            self._check_finite(1)
         else:
-            self._run(self._reads(ended[-1].block))
-            self._look(0)
+            self._run(self._read_calls(ends[-1].block))
+            self._check_finite(0)
             if len(self._slaves) > 1:
-                self._ends.append(
-                    f"at t = {last:.9g} s the other blocks have their values of t = {here:.9g} s"
+                self._end_notes.append(
+                    f"at t = {last:.9g} s the other blocks have their values of t = {now:.9g} s"
                 )
         self._progress.ended = last
         self._record(self._progress.rows)
 
-    def _note_end(self, ended: Ended, here: float, following: float) -> None:
+    def _note_end(self, end: SimulationTerminated, now: float, following: float) -> None:
         """Note that a block ended the simulation, in a step from and to times in [s]."""
-        t = ended.t if here <= ended.t <= following + NANOSECOND else here
-        name = self._slaves[ended.block].block.name
-        self._ends.append(f"block {name} ended the simulation at t = {t:.9g} s")
+        t = end.t if now <= end.t <= following + TIME_TOLERANCE else now
+        name = self._slaves[end.block].block.name
+        self._end_notes.append(f"block {name} ended the simulation at t = {t:.9g} s")
 
-    def _in_loops(self) -> set[int]:
-        """Return the blocks in algebraic loops."""
-        return {e.block for one in self._job.order if isinstance(one, LoopJob) for e in one.exchanges}
-
-    def _reads(self, block: int) -> list[Prepared]:
+    def _read_calls(self, block: int) -> list[PreparedCall]:
         """Return the calls that read all outputs of a block."""
-        exchanges = [e for o in self._job.order for e in (o.exchanges if isinstance(o, LoopJob) else (o,))]
-        return [call for one in exchanges if one.block == block for call in self._gets(one)]
+        items = (item.exchanges if isinstance(item, LoopJob) else (item,) for item in self._job.order)
+        return [
+            call
+            for exchanges in items
+            for exchange in exchanges
+            if exchange.block == block
+            for call in self._gets(exchange)
+        ]
 
-    def _run(self, calls: Sequence[Prepared]) -> None:
-        """Make some calls."""
+    def _run(self, calls: Sequence[PreparedCall]) -> None:
+        """Make calls in order."""
         progress = self._progress
         for code, call in calls:
             progress.call = code + next_call()
@@ -423,41 +326,41 @@ class Master:
                 self._check(code, status)
 
     def _check(self, code: int, status: int) -> None:
-        """Note a warning, and stop at what is worse."""
+        """Note a warning; raise an error for a worse status."""
         if status == WARNING:
-            self._warned(code)
+            self._note_warning(code)
             return
         if status == OK:
             return
-        block, function = called(code)
+        block, function = decode_call(code)
         slave = self._slaves[block]
-        slave.blame(status)
-        if status == DISCARD and function == "fmi2DoStep" and slave.terminated():
-            raise Ended(block, slave.last_successful_time())
-        said = f"returned {status_name(status)}"
+        slave.update_allowed_calls(status)
+        if status == DISCARD and function == "fmi2DoStep" and slave.is_terminated():
+            raise SimulationTerminated(block, slave.last_successful_time())
+        message = f"returned {status_name(status)}"
         if status == DISCARD and function == "fmi2DoStep":
-            said += f", it cannot step by {self._job.step:g} s from there: a smaller system.step may help"
+            message += f", it cannot step by {self._job.step:g} s from there: a smaller system.step may help"
         if status == PENDING:
-            said += ", allowed: steps that are done when the call returns"
-        raise FmuFailed(code, said, status)
+            message += ", allowed: steps that are done when the call returns"
+        raise FmuCallError(code, message, status)
 
-    def _warned(self, code: int) -> None:
+    def _note_warning(self, code: int) -> None:
         """Note that a call returned fmi2Warning."""
         count, first = self._warnings
         if not count[code]:
             first[code] = self._progress.k
         count[code] += 1
 
-    def _log(self, k: int) -> None:
-        """Put the values of logs at a communication point into their places."""
+    def _set_logged(self, k: int) -> None:
+        """Set the values of logs at a communication point."""
         for kind, values in self._job.logged.items():
             self._values[kind][: values.shape[1]] = values[k]
 
-    def _look(self, points: int) -> None:
+    def _check_finite(self, points: int) -> None:
         """Note values that are not finite.
 
         Args:
-            points: So many communication points this counts for: none where it is no whole one.
+            points: Number of communication points that this counts for; 0 between two of them.
         """
         finite = np.isfinite(self._reals)
         if finite.all():
@@ -468,31 +371,124 @@ class Master:
         value[new], k[new] = self._reals[new], self._progress.k
         count[places] += points
 
-    @staticmethod
-    def _shares(job: Job) -> list[tuple[slice, str]]:
-        """Return the columns of each type that has some."""
-        shares, first = [], 0
-        for kind in TYPES:
-            count = job.recorded[kind]
-            if count:
-                shares.append((slice(first, first + count), kind))
-            first += count
-        return shares
-
     def _record(self, row: int) -> None:
-        """Record the values as they are."""
+        """Record the current values."""
         for columns, kind in self._columns:
             self._recorded[row, columns] = self._values[kind][: columns.stop - columns.start]
         self._progress.rows = row + 1
 
 
-def _same(one: float, other: float) -> bool:
-    """Return whether two times in [s] are one."""
-    return abs(one - other) <= NANOSECOND
+def _same_time(t: float, other: float) -> bool:
+    return abs(t - other) <= TIME_TOLERANCE
 
 
-def _sets(prepared: Prepared, blocks: Collection[int]) -> bool:
-    """Return whether a call sets a value of some blocks."""
-    code, _ = prepared
-    block, function = called(code)
+def _is_set_call(prepared: PreparedCall, blocks: Collection[int]) -> bool:
+    """Return whether a call sets a value of one of some blocks."""
+    block, function = decode_call(prepared[0])
     return block in blocks and function.startswith("fmi2Set")
+
+
+def _real_outputs(loop: LoopJob) -> list[int]:
+    """Return the places of the Reals that a sweep reads, in order."""
+    transfers = (transfer for exchange in loop.exchanges for transfer in exchange.gets)
+    return [place for transfer in transfers if transfer.type == "Real" for place in transfer.places]
+
+
+class LoopSolver:
+    """Solver of an algebraic loop.
+
+    Args:
+        loop: The loop.
+        values: The vector of the Reals, each in its own unit, shape (reals,).
+        sweep: The exchanges of a sweep.
+        tolerance: Allowed residual, relative to nominal + |x|.
+    """
+
+    def __init__(
+        self, loop: LoopJob, values: FloatArray, sweep: Sequence[Callable[[], None]], tolerance: float
+    ) -> None:
+        self._loop, self._values, self._sweep, self._tolerance = loop, values, sweep, tolerance
+        self._torn, self._sources = np.array(loop.torn, np.intp), np.array(loop.sources, np.intp)
+        self._outputs = np.array(_real_outputs(loop), np.intp)
+        self._minimum, self._maximum = loop.minimum[self._torn], loop.maximum[self._torn]
+        self._jacobian: FloatArray | None = None
+
+    def solve(self) -> int:
+        """Solve the loop, so that its values are those of the solution; return FMI's status OK.
+
+        Raises:
+            ConvergenceError: If it is not solved.
+        """
+        x = self._values[self._torn].copy()
+        r = self._residual(x)
+        for _ in range(MAX_ITERATIONS):
+            if self._is_solved(x, r):
+                return OK
+            fresh = self._jacobian is None
+            if self._jacobian is None:
+                self._jacobian = self._differences(x, r)
+            if not (np.isfinite(r).all() and np.isfinite(self._jacobian).all()):
+                raise ConvergenceError(
+                    f"algebraic loop: {self._loop.ring}: found values that are not finite; start values of"
+                    " its inputs, nearer to the solution, may help"
+                )
+            newton = -np.linalg.lstsq(self._jacobian, r, rcond=None)[0].astype(np.float64)
+            x_new, r_new = self._line_search(x, r, newton)
+            step = x_new - x
+            if _norm(r_new) > MAX_RESIDUAL_RATIO * _norm(r) and not (fresh and _norm(r_new) < _norm(r)):
+                self._jacobian = None
+            elif step.any():
+                self._jacobian = self._jacobian + np.outer(r_new - r - self._jacobian @ step, step) / (
+                    step @ step
+                )
+            x, r = x_new, r_new
+        if self._is_solved(x, r):
+            return OK
+        raise ConvergenceError(
+            f"algebraic loop: {self._loop.ring}: not solved after {MAX_ITERATIONS} iterations, found a"
+            f" residual of {np.max(np.abs(r)):.3g}, allowed: {self._tolerance:.3g} relative to its values"
+        )
+
+    def _residual(self, x: FloatArray) -> FloatArray:
+        """Return g(x) - x; nan if a value of the sweep is not finite."""
+        self._values[self._torn] = x
+        for exchange in self._sweep:
+            exchange()
+            if not np.isfinite(self._values[self._outputs]).all():
+                self._values[self._outputs] = 0.0  # all are read again by the next sweep
+                return np.full_like(x, np.nan)  # no block is given a value that is not finite
+        return self._values[self._sources] - x
+
+    def _is_solved(self, x: FloatArray, r: FloatArray) -> bool:
+        return bool(np.all(np.abs(r) <= self._tolerance * (self._loop.nominal + np.abs(x))))
+
+    def _differences(self, x: FloatArray, r: FloatArray) -> FloatArray:
+        """Return the Jacobian of the residual by differences within the range of the inputs.
+
+        A column is not finite if the residual is finite on neither side.
+        """
+        columns = []
+        for i in range(len(x)):
+            column = np.full_like(r, np.nan)
+            h = DIFFERENCE * (self._loop.nominal[i] + abs(x[i]))
+            for x_i in (x[i] + h, x[i] - h):
+                if self._minimum[i] <= x_i <= self._maximum[i] and not np.isfinite(column).all():
+                    moved = x.copy()
+                    moved[i] = x_i
+                    column = (self._residual(moved) - r) / (moved[i] - x[i])
+            columns.append(column)
+        return np.column_stack(columns)
+
+    def _line_search(self, x: FloatArray, r: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return a point along a step within the range of the inputs, and its residual."""
+        for halvings in range(MAX_FINITE_HALVINGS):
+            x_new = np.clip(x + step, self._minimum, self._maximum)
+            r_new = self._residual(x_new)
+            if np.isfinite(r_new).all() and (_norm(r_new) < _norm(r) or halvings >= MAX_STEP_HALVINGS - 1):
+                break
+            step = 0.5 * step
+        return x_new, r_new
+
+
+def _norm(r: FloatArray) -> float:
+    return float(np.linalg.norm(r))

@@ -27,7 +27,7 @@ from foreign_fmus import (
     ran,
     trouble_in,
 )
-from urmpipe_fmus.cosim import Recorded, simulate
+from urmpipe_fmus.cosim import CosimulationRecord, simulate
 
 CALLS = {
     "load": ("loading", 0),
@@ -44,7 +44,7 @@ CALLS = {
 """Where C stands in an FMU, the call that is, and how many rows are recorded before."""
 
 
-def with_trouble(bad: Foreign, timeout: float = 60.0) -> Recorded:
+def with_trouble(bad: Foreign, timeout: float = 60.0) -> CosimulationRecord:
     """Return what a system of an FMU and one that follows it recorded."""
     plan = planned({"good": gain(), "bad": bad}, {"good.u": "bad.y"}, {"bad": {"u": 0.0}})
     return simulate(plan, timeout=timeout)
@@ -129,7 +129,7 @@ STRICT = replace(
 """Ends at `at`, and lets nothing be set from then on, as FMI has it."""
 
 
-def ended(at: float, **options: Any) -> Recorded:
+def ended(at: float, **options: Any) -> CosimulationRecord:
     """Return what a block that ends the run at a time in [s], and a gain that follows it, recorded."""
     blocks = {"end": STRICT, "gain": gain(), "before": gain()}
     connections = {"gain.u": "end.y", "end.u": "before.y"}

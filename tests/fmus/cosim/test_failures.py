@@ -16,7 +16,7 @@ import pytest
 from asserting import there
 from foreign_fmus import TROUBLE, Foreign, Scalar, fmu, gain, planned, ran, system
 from urmpipe_fmus.cosim import prepare, simulate
-from urmpipe_fmus.cosim.simulation import Worker
+from urmpipe_fmus.cosim.simulation import start_worker
 
 WELL = "fmi2OK: trouble: all is well at 0.05 s"
 
@@ -123,11 +123,11 @@ def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
     )
     plan = planned({"f": flood}, step=0.05)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("urmpipe_fmus.cosim.simulation.SAID_BYTES", 10_000)
+    monkeypatch.setattr("urmpipe_fmus.cosim.simulation.MAX_OUTPUT_BYTES", 10_000)
     sizes: list[int] = []
 
     def look(_: float) -> None:
-        sizes.extend(one.stat().st_size for one in tmp_path.glob("urmpipe-*/said.txt"))
+        sizes.extend(one.stat().st_size for one in tmp_path.glob("urmpipe-*/output.txt"))
 
     recorded = simulate(plan, progress=look)
     assert max(sizes) < 9_000_000  # of 18 MB; it is looked at between two of them
@@ -237,15 +237,15 @@ def test_a_crash_at_the_end_does_not_hide_why_the_run_ended() -> None:
 
 
 def test_a_process_that_waits_for_its_job_ends_without_one() -> None:
-    with Worker() as worker:
-        folder, process = worker.folder, worker._process
+    with start_worker() as worker:
+        folder, process = worker.folder, worker.process
         assert process.poll() is None
     assert process.poll() is not None
     assert not folder.exists()
 
 
 def test_a_process_that_ended_before_its_job_tells_by_its_exit_code() -> None:
-    with Worker() as worker:
-        worker._process.kill()
-        worker._process.wait()
-        assert worker.work(str) == "ended the process: Killed (SIGKILL)"
+    with start_worker() as worker:
+        worker.process.kill()
+        worker.process.wait()
+        assert worker.run(str) == "ended the process: Killed (SIGKILL)"

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from foreign_fmus import INTEGRATOR, Foreign, Scalar, gain, ran
-from urmpipe_fmus.cosim import LogColumn, LogInput, Port, Recorded
+from urmpipe_fmus.cosim import CosimulationRecord, LogColumn, LogInput, Port
 
 RING = {"b.u": "a.y", "a.u": "b.y"}
 TOLERANCE = 1e-12
 
 
-def solved(*arguments: object, **options: object) -> Recorded:
+def solved(*arguments: object, **options: object) -> CosimulationRecord:
     recorded = ran(*arguments, iterate=True, tolerance=TOLERANCE, **options)
     assert recorded.failed is None
     return recorded

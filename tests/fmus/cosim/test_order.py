@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from urmpipe_fmus.cosim.order import Exchange, Loop, Order, components
+from urmpipe_fmus.cosim.order import Exchange, ExchangeOrder, Loop, strongly_connected_components
 from urmpipe_fmus.cosim.system import Port
 
 Wired = tuple[list[Port], dict[Port, list[Port]], dict[Port, Port]]
@@ -58,7 +58,7 @@ def assert_fresh(steps: Sequence[Exchange | Loop], wiring: Wired) -> None:
 @settings(deadline=None)  # a slow computer is no fault
 @given(wired())
 def test_every_input_is_that_of_the_instant(wiring: Wired) -> None:
-    assert_fresh(Order(*wiring).steps(), wiring)
+    assert_fresh(ExchangeOrder(*wiring).steps(), wiring)
 
 
 @settings(deadline=None)  # a slow computer is no fault
@@ -71,14 +71,14 @@ def test_loops_are_the_parts_of_the_graph_that_lead_back_to_themselves(wiring: W
         (np.ones(len(edges)), ([a for a, _ in edges], [b for _, b in edges])), shape=(len(place), len(place))
     )
     _, label = connected_components(graph, connection="strong")
-    ours = components(outputs, lambda y: [sources[u] for u in depends[y] if u in sources])
+    ours = strongly_connected_components(outputs, lambda y: [sources[u] for u in depends[y] if u in sources])
     assert sorted(sorted(place[port] for port in part) for part in ours) == sorted(
         sorted(int(i) for i in np.flatnonzero(label == one)) for one in set(label.tolist())
     )
     rings = {one for one in set(label.tolist()) if (label == one).sum() > 1} | {
         int(label[a]) for a, b in edges if a == b
     }
-    assert sum(isinstance(step, Loop) for step in Order(*wiring).steps()) == len(rings)
+    assert sum(isinstance(step, Loop) for step in ExchangeOrder(*wiring).steps()) == len(rings)
 
 
 def test_blocks_in_a_row_are_read_once_each_in_their_order_whatever_that_of_the_system() -> None:
@@ -86,14 +86,14 @@ def test_blocks_in_a_row_are_read_once_each_in_their_order_whatever_that_of_the_
     outputs = [Port(name, "y") for name in reversed(names)]
     depends = {port: [Port(port.block, "u")] for port in outputs}
     sources = {Port(b, "u"): Port(a, "y") for a, b in pairwise(names)}
-    steps = Order(outputs, depends, sources).steps()
+    steps = ExchangeOrder(outputs, depends, sources).steps()
     assert [step.block for step in steps if isinstance(step, Exchange)] == names
 
 
 def test_a_row_may_be_longer_than_pythons_recursion_limit() -> None:
     row = [Port(f"b{i}", "y") for i in range(2000)]
     before = {port: row[max(i - 1, 0) : i] for i, port in enumerate(row)}
-    assert components(row[::-1], lambda port: before[port]) == [[port] for port in row]
+    assert strongly_connected_components(row[::-1], lambda port: before[port]) == [[port] for port in row]
 
 
 def test_a_block_is_called_twice_only_where_it_must() -> None:
@@ -104,7 +104,7 @@ def test_a_block_is_called_twice_only_where_it_must() -> None:
         outputs[2]: [Port("control", "x")],
     }
     sources = {Port("control", "x"): outputs[0], Port("plant", "u"): outputs[2]}
-    assert Order(outputs, depends, sources).steps() == [
+    assert ExchangeOrder(outputs, depends, sources).steps() == [
         Exchange("plant", (), ("x",)),
         Exchange("control", ("x",), ("u",)),
         Exchange("plant", ("u",), ("y",)),
@@ -120,7 +120,7 @@ def test_a_loop_is_torn_where_least_is_unknown_and_named_by_its_shortest_ring() 
         Port("c", "u"): Port("b", "y"),
         Port("a", "v"): Port("b", "y"),
     }
-    (loop,) = Order(outputs, depends, sources).steps()
+    (loop,) = ExchangeOrder(outputs, depends, sources).steps()
     assert isinstance(loop, Loop)
     assert loop.torn == (Port("b", "u"),)
     assert loop.ring == "a.y -> b.u -> b.y -> a.v"

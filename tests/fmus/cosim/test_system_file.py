@@ -137,6 +137,8 @@ fmu = "none.fmu"
 robot = "urm6"
 [blocks.f]
 unit = "$lag"
+[blocks]
+g = 3
 [connections]
 "a.u" = "z.y"
 "a" = "b.y"
@@ -144,6 +146,7 @@ unit = "$lag"
 [inputs]
 "a.w" = { log = "$log", colunm = "u" }
 "a.x" = 1
+"a.y" = { log = "", column = "u" }
 [loops]
 iterate = 1
 tolerance = -1.0
@@ -151,27 +154,29 @@ tolerance = -1.0
     assert said(tmp_path / "bad.toml", text, speed="3") == [
         f"argument speed: found 'speed', allowed: log{ELSE}",
         "blocks.f.unit: found '$lag' (did you mean $log?), allowed: $log ([arguments] names them)",
-        "surprise: found 'surprise', allowed: system, arguments, blocks, connections, inputs, loops",
-        "system.durations: found 'durations' (did you mean duration?), allowed: name, description, step,"
-        " duration, record_every",
+        "system.name: found 5, allowed: a text",
+        'system.step: found 0.0, allowed: a time above 0 in s, or with its unit as in "1ms"',
+        "system.record_every: found 1.5, allowed: an integer from 1",
+        "system.durations: unknown (did you mean duration?); allowed: name, description, step, duration,"
+        " record_every",
+        "blocks.g: found 3, allowed: a table",
         "blocks.a: found unit and fmu, allowed: one of unit, file, fmu",
         "blocks.a.fmu: found 'none.fmu', allowed: a file that is there",
         "blocks.b: found none of them, allowed: one of unit, file, fmu",
         "blocks.c.d: found 'c.d' as a name, allowed: a letter, then letters, digits, _, -",
-        "blocks.c.d.start: found 3, allowed: a table of names and values",
-        "blocks.e.robot: found 'robot', allowed: fmu, start",
+        "blocks.c.d.start: found 3, allowed: a table",
         "blocks.e.fmu: found 'none.fmu', allowed: a file that is there",
-        "system.name: found 5, allowed: a text",
-        'system.step: found 0.0, allowed: a time above 0 in s, or with its unit as in "1ms"',
-        "system.record_every: found 1.5, allowed: an integer from 1",
+        "blocks.e.robot: unknown; allowed: fmu, start",
         "connections.a.u: block found 'z', allowed: a, b, c.d, e, f",
         "connections.a: found 'a', allowed: block.variable",
         "connections.a.v: found 7, allowed: its source as 'block.variable'",
-        "inputs.a.w.colunm: found 'colunm' (did you mean column?), allowed: log, column, interpolate",
-        "inputs.a.w.column: not found, allowed: a text",
+        "inputs.a.w.column: found nothing, allowed: a text",
+        "inputs.a.w.colunm: unknown (did you mean column?); allowed: log, column, interpolate",
         "inputs.a.x: found 1, allowed: { log = FILE, column = NAME }",
-        "loops.iterate: found 1, allowed: true, false",
+        "inputs.a.y.log: found '', allowed: a text",
+        "loops.iterate: found 1, allowed: true or false",
         "loops.tolerance: found -1.0, allowed: a number above 0",
+        "surprise: unknown; allowed: system, arguments, blocks, connections, inputs, loops",
     ]
 
 
@@ -241,9 +246,9 @@ unit = "x"
 a.v = 7
 """
     assert places_of_faults(tmp_path / "bad.toml", text) == [
+        ("system.step", 3),
         ("blocks.a.start", 6),
         ("blocks.b c", 7),
-        ("system.step", 3),
         ("connections.a.u", 10),
         ("connections.a.v", 11),
     ]
@@ -260,11 +265,11 @@ c.start = 3
 a.u = 7
 """
     assert places_of_faults(tmp_path / "bad.toml", text) == [
+        ("system.step", 1),
         ("blocks.a", 3),
         ("blocks.a.fmu", 3),
         ("blocks.c", 6),
         ("blocks.c.start", 6),
-        ("system.step", 1),
         ("connections.a.u", 8),
     ]
 

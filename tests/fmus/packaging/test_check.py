@@ -146,7 +146,7 @@ def test_a_step_that_fails_is_told_with_the_last_lines_of_the_log(tmp_path: Path
     found = check_fmu(built(failing('raise ValueError("no more")'), tmp_path))
     assert found.problems == (
         "fmi2DoStep at 0.015 s ended the run (fmi2Discard, terminated) after 3 of 20 steps",
-        "its log: failing.py:8: unit failing: update: ValueError: no more",
+        "its log: failing.py:7: unit failing: update: ValueError: no more",
     )
     assert not found.ran
     assert found.variables[0].before == 0.0

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from foreign_fmus import HANGS, NAN_OUTPUT, STAIR, TAKES_MEMORY, fmu, trouble_in
-from urmpipe_fmus.check import Checked, check_fmu
+from urmpipe_fmus.check import CheckReport, check_fmu
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs signals and /proc")
 
@@ -40,14 +40,14 @@ def breaking(call: str, code: str) -> Path:
     return fmu(replace(trouble_in(call, late), variable_step=False))
 
 
-def of_run(found: Checked) -> tuple[str, ...]:
+def of_run(found: CheckReport) -> tuple[str, ...]:
     """Return the problems of the run: none of the description, which lacks the InitialUnknowns."""
     first, *others = found.problems
     assert first.startswith("ModelStructure/InitialUnknowns does not contain the expected set of variables.")
     return tuple(others)
 
 
-def checked(paths: list[Path], *, timeout: float = 60.0) -> list[Checked]:
+def checked(paths: list[Path], *, timeout: float = 60.0) -> list[CheckReport]:
     """Check FMUs at the same time."""
     with ThreadPoolExecutor(len(CALLS)) as pool:
         return list(pool.map(partial(check_fmu, timeout=timeout), paths))
