@@ -1,4 +1,4 @@
-"""The robots that urmpipe brings along, and the one way to get a robot from a name or a file."""
+"""Catalogue of robots, and the robot of a name or a file."""
 
 from __future__ import annotations
 
@@ -17,20 +17,27 @@ from urmpipe_models.robots.urdf import read_urdf
 
 def robot_names() -> tuple[str, ...]:
     """Return the names of the catalogue, families together and small arms first."""
-    return tuple(sorted((path.stem for path in ROBOTS.glob("*.toml")), key=_by_size))
+
+    def by_size(name: str) -> tuple[str, str, int]:
+        """Order urm4 before urm6, ur5 before ur10, and ur10 before ur3e."""
+        family, size, generation = re.fullmatch(r"(\D*)(\d*)(.*)", name).groups()  # type: ignore[union-attr]
+        return family, generation, int(size or 0)
+
+    return tuple(sorted((path.stem for path in ROBOTS.glob("*.toml")), key=by_size))
 
 
 @cache
 def kinematically_distinct_names() -> tuple[str, ...]:
-    """Return the names without those of arms that move as an earlier one, and differ in masses or drives."""
-    found: dict[str, Chain] = {}
+    """Return the names without those of arms that differ from an earlier one in masses or drives only."""
+    geometries = []
+    names = []
     for name in robot_names():
-        arm = _of_catalogue(name)
-        if not any(
-            (one.joints, one.base, one.tip) == (arm.joints, arm.base, arm.tip) for one in found.values()
-        ):
-            found[name] = arm
-    return tuple(found)
+        arm = _load_catalogue_robot(name)
+        geometry = arm.joints, arm.base, arm.tip
+        if geometry not in geometries:
+            geometries.append(geometry)
+            names.append(name)
+    return tuple(names)
 
 
 def load_robot(
@@ -44,7 +51,7 @@ def load_robot(
         tip_link: Link of a URDF where the chain ends; see `read_urdf`.
 
     Raises:
-        RobotError: If there is no such robot, or with everything that is wrong with its file.
+        RobotError: If there is no such robot, or with all errors of its file.
         OptionError: If links are chosen of a robot that is no URDF.
     """
     path = Path(name_or_path)
@@ -57,7 +64,7 @@ def load_robot(
         return read_robot_file(path)
     names = robot_names()
     if (name := str(name_or_path).lower()) in names:
-        return _of_catalogue(name)
+        return _load_catalogue_robot(name)
     hint = format_suggestion(str(name_or_path), names)
     raise RobotError(
         f"unknown robot {format_value(str(name_or_path))}{hint};"
@@ -66,16 +73,16 @@ def load_robot(
 
 
 @cache
-def _of_catalogue(name: str) -> Chain:
-    """Return a robot of the catalogue, read once: a log may be held against all of them."""
+def _load_catalogue_robot(name: str) -> Chain:
+    """Return a robot of the catalogue, read once: a log may be compared with all of them."""
     return read_robot_file(ROBOTS / f"{name}.toml")
 
 
 def parse_offset(text: str) -> Transform:
-    """Return the frame written as X,Y,Z or X,Y,Z,RX,RY,RZ, in [m] and [rad]: Rz(RZ) Ry(RY) Rx(RX).
+    """Return the frame of X,Y,Z or X,Y,Z,RX,RY,RZ, in [m] and [rad]: Rz(RZ) Ry(RY) Rx(RX).
 
     Raises:
-        OptionError: If the text is anything else.
+        OptionError: If the text has another form.
     """
     try:
         values = [float(part) for part in text.split(",")]
@@ -86,9 +93,3 @@ def parse_offset(text: str) -> Transform:
             f"found {format_value(text)}, allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15"
         )
     return from_offset(values)
-
-
-def _by_size(name: str) -> tuple[str, str, int]:
-    """Order urm4 before urm6, ur5 before ur10, and ur10 before ur3e."""
-    family, size, generation = re.fullmatch(r"(\D*)(\d*)(.*)", name).groups()  # type: ignore[union-attr]
-    return family, generation, int(size or 0)

@@ -138,10 +138,10 @@ def test_everything_wrong_is_said_at_once_with_its_line(urdf: Any) -> None:
         '<joint type="fixed"/>',
     )  # fmt: skip
     assert complaint(urdf, text) == [
-        "arm.urdf:4: link a: name stands already in line 3",
+        "arm.urdf:4: link a: duplicate name; first defined in line 3",
         "arm.urdf:5: link without a name",
         "arm.urdf:8: joint j1: found type 'spinning'; allowed: revolute, continuous, prismatic, fixed",
-        "arm.urdf:9: joint j1: name stands already in line 8",
+        "arm.urdf:9: joint j1: duplicate name; first defined in line 8",
         "arm.urdf:10: joint j2: origin xyz: found '0 abc 0', expected three numbers",
         "arm.urdf:10: joint j2: origin rpy: found '1 2', expected three numbers",
         "arm.urdf:10: joint j2: axis is zero; allowed: a direction",
