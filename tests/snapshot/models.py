@@ -3,6 +3,8 @@
 All names of the product stand in the imports below, so that they can be rewritten when modules move.
 """
 
+# mypy: ignore-errors - a script whose variables take results of every type in turn
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -36,24 +38,30 @@ from urmpipe_models.dynamics.driven_arm import (
     ArmState,
     Motor,
     arm_energy,
-    at_rest,
+    find_equilibrium,
     joint_accelerations,
     joint_torques,
-    motor_rates,
-    powers,
+    max_stable_step,
+    motor_derivatives,
+    power_flow,
     spectral_radius,
-    stable_step,
 )
 from urmpipe_models.dynamics.equations import (
     energies_over_log,
     forward_dynamics,
     inverse_dynamics,
     mass_matrix,
-    terms_over_log,
-    torque_over_log,
     torque_terms,
+    torque_terms_over_log,
+    torques_over_log,
 )
-from urmpipe_models.dynamics.links import Wrench, kinetic_energy, mass_centres, potential_energy, wrench_power
+from urmpipe_models.dynamics.links import (
+    Wrench,
+    centres_of_mass,
+    kinetic_energy,
+    potential_energy,
+    wrench_power,
+)
 from urmpipe_models.elementwise import cosine_sine
 from urmpipe_models.hand_eye import rotation_residual, solve_hand_eye
 from urmpipe_models.ik.closed import closed_form
@@ -105,8 +113,8 @@ from urmpipe_models.networks.forces import compute_forces
 from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import analyse_mobility
 from urmpipe_models.networks.rates import close_network, compute_rates
-from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.joints import joints_along, largest_usage, law_of_limits
+from urmpipe_models.planning.from_rows import rows_to_path
+from urmpipe_models.planning.joints import joint_limited_law, joints_along, max_limit_utilisation
 from urmpipe_models.planning.laws import jerk_law, trapezoid_law
 from urmpipe_models.planning.path import PathRows, arc_at_corner, cube_rows
 from urmpipe_models.robots.catalogue import load_robot, robot_names
@@ -220,8 +228,8 @@ for _name in robot_names():
     _wrench = Wrench((1.0, -2.0, 3.0), (0.1, 0.2, -0.3))
     _tau = inverse_dynamics(_chain, *_one, _wrench)
     dynamics[_name] = {
-        "torque": torque_over_log(_chain, _q, _qd, _qdd),
-        "terms": terms_over_log(_chain, _q, _qd, _qdd),
+        "torque": torques_over_log(_chain, _q, _qd, _qdd),
+        "terms": torque_terms_over_log(_chain, _q, _qd, _qdd),
         "energies": energies_over_log(_chain, _q, _qd),
         "matrix": np.array(mass_matrix(_chain, _one[0]), dtype=float),
         "inverse": np.array(_tau, dtype=float),
@@ -229,7 +237,7 @@ for _name in robot_names():
         "one_terms": [np.array(one, dtype=float) for one in torque_terms(_chain, *_one, _wrench)],
         "energy": [float(kinetic_energy(_chain, *_one[:2])), float(potential_energy(_chain, _one[0]))],
         "power": float(wrench_power(_chain, *_one[:2], _wrench)),
-        "centres": np.array(mass_centres(_chain, _one[0]), dtype=float),
+        "centres": np.array(centres_of_mass(_chain, _one[0]), dtype=float),
     }
 
 # Drives, alone and in an arm
@@ -259,11 +267,11 @@ drives = {
     "trapezoid": np.array([[float(one) for one in trapezoid(t, 0.1, 0.0, 0.5, 1.0, 5.0)] for t in _t]),
     "arm_torques": np.array(joint_torques(_state), dtype=float),
     "arm_accelerations": np.array(joint_accelerations(_driven, _state), dtype=float),
-    "motors": np.array([[float(v) for v in one] for one in motor_rates(_state).values()]),
-    "powers": [float(one) for one in powers(_driven, _state)],
+    "motors": np.array([[float(v) for v in one] for one in motor_derivatives(_state).values()]),
+    "powers": [float(one) for one in power_flow(_driven, _state)],
     "energy": float(arm_energy(_driven, _state)),
-    "rest": np.array([[float(v) for v in one] for one in at_rest(_driven)]),
-    "stable": float(stable_step(_driven)),
+    "rest": np.array([[float(v) for v in one] for one in find_equilibrium(_driven)]),
+    "stable": float(max_stable_step(_driven)),
     "radius": float(spectral_radius(_driven, np.array(_state.q))),
 }
 
@@ -280,7 +288,7 @@ for _name, _rows in {
     "wall": cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.4])),
     "diagonal": cube_rows("diagonal", 0.2, 0.02, np.array([0.45, 0.0, 0.4])),
 }.items():
-    _path = path_of(_rows)
+    _path = rows_to_path(_rows)
     _joints_of = joints_along(_limited, _path)
     _laws = {
         "trapezoid": trapezoid_law(_path, 0.5, 6.0),
@@ -288,8 +296,8 @@ for _name, _rows in {
         "jerk": jerk_law(_path, 0.5, 6.0, 60.0, "tangential"),
     }
     if _joints_of.reached:
-        _laws["limits"] = law_of_limits(_joints_of)
-        planning[f"{_name}.usage"] = float(largest_usage(_joints_of, _laws["trapezoid"]).share)
+        _laws["limits"] = joint_limited_law(_joints_of)
+        planning[f"{_name}.usage"] = float(max_limit_utilisation(_joints_of, _laws["trapezoid"]).share)
     for _law, _made in _laws.items():
         _moved = _made.at(_made.duration * _t)
         planning[f"{_name}.{_law}"] = {
