@@ -3,7 +3,8 @@
 All names of the product stand in the imports below, so that they can be rewritten when modules move.
 """
 
-# mypy: ignore-errors - a script whose variables take results of every type in turn
+# Variables of this script take results of every type in turn.
+# mypy: ignore-errors
 
 from __future__ import annotations
 
