@@ -9,7 +9,8 @@
    joint this is p' = v + w x p and the rate of the rotation vector (inverse of its left Jacobian); of an
    element the scalar product with its wrench. Lengths that are functions of controls add their derivatives.
 3. `evaluate_scaled_closure`: the same in lengths of the mechanism and [rad].
-4. `solve_closure`: Levenberg-Marquardt from many starts side by side.
+4. `solve_closure`: Levenberg-Marquardt from many starts side by side; `close_by_newton` from configurations
+   that nearly close.
 
 Mobility, redundant constraints and idle spins follow from the same Jacobian: `mobility`. For FMUs, `rates`
 has Newton steps of a fixed number that can be traced to C.
@@ -54,6 +55,7 @@ MIN_DAMPING = 1e-13  # singular directions, as of redundant constraints, must no
 # 0 nearby. On the way to a singular assembly |e| falls as the square of the distance, the cosine as the
 # distance.
 MIN_COSINE = 1e-3
+CHUNK_SIZE = 4096  # configurations solved side by side: their Jacobians fit the cache
 TRANSLATION_SCREWS: Twists = [  # twists (w, v) of a body that translates along the axes of the ground
     ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
@@ -396,3 +398,35 @@ def _is_active(now: Closure, gain: FloatArray, to_minimum: bool) -> BoolArray:
     can_descend = slope * slope > min_cosine**2 * square * column_squares(now.jacobian)
     is_open = (square > ROUNDING_ERROR**2) & (square < np.inf) & (gain < GAINS[1])
     return np.asarray(is_open & can_descend.any(axis=0))
+
+
+def close_by_newton(
+    mechanism: Mechanism, x: FloatArray, free: IndexArray, *, wrap: bool = False
+) -> FloatArray:
+    """Return configurations that close next to others, by Newton's method with some variables free.
+
+    Args:
+        mechanism: The network.
+        x: Configurations near, shape (variables, n), in [m], [rad] and as controls are given.
+        free: The numbers of the variables that may change, shape (free,) [-].
+        wrap: Whether rotation vectors are wrapped to pi at most.
+
+    Returns:
+        The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    """
+    x, scales = np.array(x), mechanism.column_scales[free, np.newaxis]
+    for _ in range(10):
+        closure = evaluate_scaled_closure(mechanism, x)
+        step = damped_step(closure.jacobian[:, free], -closure.residual, MIN_DAMPING)
+        x[free] += step * scales
+        for part in mechanism.rotations if wrap else ():
+            x[part] = wrap_rotation_vector(tuple(x[part]))
+        if not (np.sqrt(np.einsum("kn,kn->n", step, step)) > 1e-13).any():
+            break
+    return x
+
+
+def iter_chunks(count: int) -> Iterator[slice]:
+    """Yield slices of at most CHUNK configurations, in their order."""
+    for start in range(0, count, CHUNK_SIZE):
+        yield slice(start, min(start + CHUNK_SIZE, count))

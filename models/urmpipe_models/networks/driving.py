@@ -1,11 +1,11 @@
-"""From drives by name to a motion: which variables are prescribed, which follow, and where it begins.
+"""Driven motion of a network, from drives by name: which variables follow, where it begins, its rows.
 
-1. `find_driven`: controls and joint variables by name.
+1. `find_driven_variables`: controls and joint variables by name.
 2. `split_variables`: which variables follow. Controls without a drive keep their value; if joints are
    driven in their place, controls follow.
 3. `move_to`: from an assembly along a straight line of the drives to where the motion begins.
 4. `drive_rows`: the motion along rows of the drives, on a line (`motion`) or not (`row_motion`).
-5. `compute_shares`: how far along the line it is over time.
+5. `compute_shares`: the place along the line over time.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -53,7 +52,7 @@ class DrivenVariables:
     Attributes:
         names: Their names, as they are given.
         places: Their numbers among the variables, shape (driven,) [-].
-        units: rad, m, or "" of a control that drives neither an angle nor a length by itself.
+        units: rad, m, or "" of a control that alone drives neither an angle nor a length.
     """
 
     names: tuple[str, ...]
@@ -88,35 +87,17 @@ def find_driven_variables(mechanism: Mechanism, names: Sequence[str]) -> DrivenV
     Raises:
         NetworkError: With every name that stands for no variable that can be driven.
     """
-    joints = {joint.name: joint for joint in mechanism.network.joints}
-    controls = {control.name: control for control in mechanism.network.controls}
     faults: list[Finding] = []
     places: list[int] = []
     units: list[str] = []
     for name in names:
-        owner, index = _indexed(name)
-        fault = ""
-        if name in controls:
-            if controls[name].value is not None:
-                fault = f"{name} is a function of other controls, allowed: a control that can be set"
-            owner, index = name, 0
-        elif owner not in joints:
-            free = [name for name, joint in joints.items() if None in joint.drives]
-            allowed = [*(name for name, control in controls.items() if control.value is None), *free]
-            fault = (
-                f"drive {format_unknown_name(name, allowed)}"
-                if allowed
-                else f"found {name}, but nothing can be driven"
-            )
+        try:
+            place, unit = _find_variable(mechanism, name)
+        except NetworkError as error:
+            faults += error.findings
         else:
-            fault = _joint_fault(name, owner, index, joints[owner].units, joints[owner].drives)
-            index = max(index or 1, 1) - 1
-        if fault:
-            faults.append(Finding(fault, parameter="drives"))
-        else:
-            places.append(mechanism.variable_index[owner, index or 0])
-            unit = mechanism.network.control_unit(name) if name in controls else None
-            units.append(unit[0] if unit else "" if name in controls else joints[owner].units[index or 0])
+            places.append(place)
+            units.append(unit)
     repeated = [name for k, name in enumerate(names) if len(places) == len(names) and places[k] in places[:k]]
     faults += [Finding(f"{name} is driven twice, allowed: once", parameter="drives") for name in repeated]
     if faults:
@@ -124,26 +105,41 @@ def find_driven_variables(mechanism: Mechanism, names: Sequence[str]) -> DrivenV
     return DrivenVariables(tuple(names), np.array(places, dtype=np.intp), tuple(units))
 
 
-def _indexed(name: str) -> tuple[str, int | None]:
-    """Return the owner and the number of NAME[k]."""
+def _find_variable(mechanism: Mechanism, name: str) -> tuple[int, str]:
+    """Return number and unit of the variable with a name; raise a `NetworkError` if it cannot be driven."""
+    joints = {joint.name: joint for joint in mechanism.network.joints}
+    controls = {control.name: control for control in mechanism.network.controls}
+    if name in controls:
+        if controls[name].value is not None:
+            raise _drive_error(f"{name} is a function of other controls, allowed: a control that can be set")
+        unit = mechanism.network.control_unit(name)
+        return mechanism.variable_index[name, 0], unit[0] if unit else ""
     match = re.fullmatch(r"(.+)\[(\d+)\]", name)
-    return (match[1], int(match[2])) if match else (name, None)
-
-
-def _joint_fault(
-    name: str, owner: str, index: int | None, units: Sequence[str], drives: Sequence[object]
-) -> str:
-    """Return why a variable of a joint cannot be driven by name; empty if it can."""
+    owner, number = (match[1], int(match[2])) if match else (name, None)
+    if owner not in joints:
+        settable = [control.name for control in controls.values() if control.value is None]
+        allowed = [*settable, *(joint.name for joint in joints.values() if None in joint.drives)]
+        if not allowed:
+            raise _drive_error(f"found {name}, but nothing can be driven")
+        raise _drive_error(f"drive {format_unknown_name(name, allowed)}")
+    units = joints[owner].units
     if not units:
-        return f"{name} is a user joint without variables, allowed: a control or another joint"
-    if index is None and len(units) > 1:
+        raise _drive_error(f"{name} is a user joint without variables, allowed: a control or another joint")
+    if number is None and len(units) > 1:
         listed = ", ".join(f"{owner}[{k}]" for k in range(1, len(units) + 1))
-        return f"{name} has {len(units)} variables, allowed: {listed}"
-    if index is not None and not 1 <= index <= len(units):
-        return f"{name} has {len(units)} variables, allowed: a number from 1 to {len(units)}"
-    if drives[(index or 1) - 1] is not None:
-        return f"{name} is a function of controls, allowed: the controls themselves, or a joint that is free"
-    return ""
+        raise _drive_error(f"{name} has {len(units)} variables, allowed: {listed}")
+    if number is not None and not 1 <= number <= len(units):
+        allowed_numbers = f"a number from 1 to {len(units)}"
+        raise _drive_error(f"{name} has {len(units)} variables, allowed: {allowed_numbers}")
+    index = (number or 1) - 1
+    if joints[owner].drives[index] is not None:
+        allowed_drives = "the controls themselves, or a joint that is free"
+        raise _drive_error(f"{name} is a function of controls, allowed: {allowed_drives}")
+    return mechanism.variable_index[owner, index], units[index]
+
+
+def _drive_error(message: str) -> NetworkError:
+    return NetworkError(Finding(message, parameter="drives"))
 
 
 def split_variables(mechanism: Mechanism, x: FloatArray, driven: DrivenVariables) -> IndexArray:
@@ -158,30 +154,30 @@ def split_variables(mechanism: Mechanism, x: FloatArray, driven: DrivenVariables
         NetworkError: If the drives leave the motion open, or it is not clear which controls keep their value.
     """
     places = set(driven.places.tolist())
-    others = [k for k in mechanism.controls.tolist() if k not in places]
+    undriven = [k for k in mechanism.controls.tolist() if k not in places]
     spins = len(find_spinning_bodies(mechanism, x))
-    every = np.arange(len(mechanism.variables))
-    kept: list[int] = others
-    if len(places) > len(mechanism.controls) - len(others):  # joints are driven in the place of controls
-        mobility = nearby_mobility(mechanism, x, every) - spins
+    variables = np.arange(len(mechanism.variables))
+    kept: list[int] = undriven
+    if len(places) > len(mechanism.controls) - len(undriven):  # joints are driven in the place of controls
+        mobility = nearby_mobility(mechanism, x, variables) - spins
         needed = mobility - len(places)
         if needed < 0:
-            found = f"found {len(places)} drives, {', '.join(driven.names)}"
-            raise NetworkError(Finding(f"{found}, allowed: {mobility}, the mobility", parameter="drives"))
-        if 0 < needed < len(others):
-            names = ", ".join(mechanism.variables[k].owner for k in others)
-            allowed = f"values of {needed} more of them, such as {mechanism.variables[others[0]].owner}=VALUE"
-            message = f"it is not clear which of the controls {names} keep their value; allowed: {allowed}"
-            raise NetworkError(Finding(message, parameter="drives"))
-        kept = others if needed > 0 else []
-    free = np.setdiff1d(every, [*places, *kept])
+            names = ", ".join(driven.names)
+            raise _drive_error(f"found {len(places)} drives, {names}, allowed: {mobility}, the mobility")
+        if 0 < needed < len(undriven):
+            names = ", ".join(mechanism.variables[k].owner for k in undriven)
+            allowed = (
+                f"values of {needed} more of them, such as {mechanism.variables[undriven[0]].owner}=VALUE"
+            )
+            message = f"it is not clear which of the controls {names} keep their value"
+            raise _drive_error(f"{message}; allowed: {allowed}")
+        kept = undriven if needed > 0 else []
+    free = np.setdiff1d(variables, [*places, *kept])
     remaining = nearby_mobility(mechanism, x, free) - spins if len(free) else 0
     if remaining > 0:
         names = ", ".join(dict.fromkeys(mechanism.variables[k].owner for k in free[:12].tolist()))
         message = f"with {', '.join(driven.names)} driven, the network still moves, with mobility {remaining}"
-        raise NetworkError(
-            Finding(f"{message}; allowed: {remaining} more drives, of {names}", parameter="drives")
-        )
+        raise _drive_error(f"{message}; allowed: {remaining} more drives, of {names}")
     return np.asarray(free, dtype=np.intp)
 
 
@@ -202,12 +198,12 @@ def variable_limits(mechanism: Mechanism) -> FloatArray:
     return limits
 
 
-def shift_into_limits(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> FloatArray:
-    """Return an assembly with angles beyond their limits turned by whole turns, if that helps.
+def _shift_into_limits(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> FloatArray:
+    """Return an assembly with angles beyond their limits shifted by whole turns, where that is within them.
 
     Args:
         mechanism: The network.
-        x: The assembly, shape (variables,), in [m], [rad] and as controls are given; what is returned, too.
+        x: The assembly, shape (variables,), in [m], [rad] and as controls are given.
         limits: Lower and upper limits, likewise, shape (variables, 2).
 
     Returns:
@@ -217,8 +213,8 @@ def shift_into_limits(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -
     for k in mechanism.angles.tolist():
         lower, upper = limits[k]
         if np.isfinite(limits[k]).all() and not lower <= x[k] <= upper:
-            turned = x[k] + 2.0 * np.pi * np.ceil((lower - x[k]) / (2.0 * np.pi))
-            x[k] = turned if turned <= upper else x[k]
+            shifted = x[k] + 2.0 * np.pi * np.ceil((lower - x[k]) / (2.0 * np.pi))
+            x[k] = shifted if shifted <= upper else x[k]
     return x
 
 
@@ -285,30 +281,45 @@ def drive_rows(
             first row.
     """
     limits, places = variable_limits(mechanism), driven.places
-    x = shift_into_limits(mechanism, x, limits)
+    x = _shift_into_limits(mechanism, x, limits)
     # a driven angle begins at the turn that is nearest to the assembly
     turns = np.isin(places, mechanism.angles)
     x[places[turns]] += 2.0 * np.pi * np.round((values[0] - x[places])[turns] / (2.0 * np.pi))
     free = split_variables(mechanism, x, driven)
     spins = len(find_spinning_bodies(mechanism, x))
-    scaled = values / mechanism.column_scales[places]
-    line = _find_line(scaled)
+    setup = _Setup(mechanism, driven, free, limits)
+    line = _find_line(values / mechanism.column_scales[places])
     if line is None:
-        x = _approach(mechanism, x, driven, values[0], free, limits)
-        moved = follow_rows(mechanism, x, places, values, free, limits, progress)
-        motion = DrivenMotion(moved.x, free, spins, tuple(moved.singular), moved.stop)
-    elif not len(free) or not line[1].any():
-        x = _approach(mechanism, x, driven, values[0], free, limits)
+        x = _approach(setup, x, values[0])
+        followed = follow_rows(mechanism, x, places, values, free, limits, progress)
+        motion = DrivenMotion(followed.x, free, spins, tuple(followed.singular), followed.stop)
+    elif not len(free) or not line.change.any():
+        x = _approach(setup, x, values[0])
         rows = np.repeat(x[:, np.newaxis], len(values), axis=1)
         rows[places] = values.T
         motion = DrivenMotion(rows, free, spins)
     else:
-        motion = _drive_along(mechanism, x, driven, values, *line, free, limits, progress)
+        motion = _drive_along(setup, x, values, line, progress)
     return _stop_at_driven_limits(mechanism, motion)
 
 
-def _find_line(scaled: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return begin and change of the line through all rows, and their places on it, 0..1; None if not."""
+class _Setup(NamedTuple):
+    mechanism: Mechanism
+    driven: DrivenVariables
+    free: IndexArray
+    limits: FloatArray
+
+
+class _Line(NamedTuple):
+    """A straight line in scaled drives, and the places of rows on it, 0..1, shape (n,)."""
+
+    begin: FloatArray
+    change: FloatArray
+    shares: FloatArray
+
+
+def _find_line(scaled: FloatArray) -> _Line | None:
+    """Return the line through all rows, from the lowest place to the highest; None if there is none."""
     offsets = scaled - scaled[0]
     sizes = np.linalg.norm(offsets, axis=1)
     direction = offsets[int(np.argmax(sizes))]
@@ -318,52 +329,47 @@ def _find_line(scaled: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] 
         return None
     low, high = float(along.min()), float(along.max())
     shares = (along - low) / (high - low) if high > low else along
-    return scaled[0] + low * direction, (high - low) * direction, shares
+    return _Line(scaled[0] + low * direction, (high - low) * direction, shares)
 
 
 def _drive_along(
-    mechanism: Mechanism,
-    x: FloatArray,
-    driven: DrivenVariables,
-    values: FloatArray,
-    begin: FloatArray,
-    scaled: FloatArray,
-    shares: FloatArray,
-    free: IndexArray,
-    limits: FloatArray,
-    progress: Callable[[float], None],
+    setup: _Setup, x: FloatArray, values: FloatArray, line: _Line, progress: Callable[[float], None]
 ) -> DrivenMotion:
-    """Return a motion whose drives are on a scaled line, at places of it, shape (n,)."""
-    places, scales = driven.places, mechanism.column_scales[driven.places]
-    _check_length(driven, float(np.linalg.norm(scaled)))
-    offset = x[places] / scales - begin
-    at = float(offset @ scaled) / float(scaled @ scaled)
-    if np.linalg.norm(offset - at * scaled) > SAME_TOLERANCE:
-        x, at = _approach(mechanism, x, driven, values[0], free, limits), float(shares[0])
+    """Return a motion whose drives are on a line: its branch is traced to both ends, then sampled."""
+    mechanism, driven, free, limits = setup
+    places, scales, shares = driven.places, mechanism.column_scales[driven.places], line.shares
+    length = float(np.linalg.norm(line.change))
+    if length > MAX_LENGTH:
+        distance = f"{', '.join(driven.names)} moves by {length:.6g} rad or lengths of the mechanism"
+        raise _drive_error(f"{distance}, allowed: {MAX_LENGTH:g}; split the motion")
+    offset = x[places] / scales - line.begin
+    at = float(offset @ line.change) / float(line.change @ line.change)
+    if np.linalg.norm(offset - at * line.change) > SAME_TOLERANCE:
+        x, at = _approach(setup, x, values[0]), float(shares[0])
     base, change = np.array(x), np.zeros(len(x))
-    base[places], change[places] = begin * scales, scaled * scales
+    base[places], change[places] = line.begin * scales, line.change * scales
     drive = Drive(mechanism, base, change, free, limits)
     _check_start(drive, x, at, driven)
-    ways = {
-        end: trace_branch(drive, at, end, progress) for end in (1.0, 0.0) if (at < end if end else at > 0.0)
-    }
-    back, forward = ways.get(0.0, Trace(complete=True)), ways.get(1.0, Trace(complete=True))
-    segments = back.segments + forward.segments
+    back, forward = Trace(complete=True), Trace(complete=True)
+    if at < 1.0:
+        forward = trace_branch(drive, at, 1.0, progress)
+    if at > 0.0:
+        back = trace_branch(drive, at, 0.0, progress)
     ends = _check_ends(driven, values[0], float(shares[0]), back, forward, drive.length)
     outside = (shares < ends[0] - SAME_TOLERANCE) | (shares > ends[1] + SAME_TOLERANCE)
     count = int(np.argmax(outside)) if outside.any() else len(shares)
-    branch = Trace(segments, [*back.singular, *forward.singular])
+    branch = Trace(back.segments + forward.segments, [*back.singular, *forward.singular])
     motion, slopes = sample_branch(drive, branch, np.clip(shares[:count], *ends))
     motion[places] = values[:count].T
     motion = reset_idle_spins(mechanism, find_idle_spins(mechanism), motion, x)
-    row = partial(_find_row, shares[: count + 1])
-    rows = [(pose, row(pose.s)) for pose, _ in branch.singular]
-    poses = [replace(pose, s=place) for pose, place in rows if place is not None]
+    rows = [(pose, _find_row(shares[: count + 1], pose.s)) for pose, _ in branch.singular]
+    poses = [replace(pose, s=row) for pose, row in rows if row is not None]
     poses.sort(key=lambda pose: pose.s)
     stop = None
     if outside.any():
         stop = forward.stop if shares[count] > ends[1] else back.stop
-        stop = None if stop is None else replace(stop, s=row(stop.s) or 0.0)
+        if stop is not None:
+            stop = replace(stop, s=_find_row(shares[: count + 1], stop.s) or 0.0)
     return DrivenMotion(motion, free, drive.spins, tuple(poses), stop, tuple(slopes))
 
 
@@ -377,18 +383,11 @@ def _check_ends(
     """
     segments = back.segments + forward.segments
     if not segments:
-        _refuse_begin(driven, begin, forward if back.complete else back)
+        raise _begin_error(driven, begin, forward if back.complete else back)
     ends = float(segments[0][0].z[-1]) / length, float(segments[-1][1].z[-1]) / length
     if share < ends[0] - SAME_TOLERANCE or share > ends[1] + SAME_TOLERANCE:
-        _refuse_begin(driven, begin, back if share < ends[0] else forward)
+        raise _begin_error(driven, begin, back if share < ends[0] else forward)
     return ends
-
-
-def _check_length(driven: DrivenVariables, length: float) -> None:
-    if length > MAX_LENGTH:
-        distance = f"{', '.join(driven.names)} moves by {length:.6g} rad or lengths of the mechanism"
-        message = f"{distance}, allowed: {MAX_LENGTH:g}; split the motion"
-        raise NetworkError(Finding(message, parameter="drives"))
 
 
 def _find_row(shares: FloatArray, s: float) -> float | None:
@@ -423,10 +422,8 @@ def _stop_at_driven_limits(mechanism: Mechanism, motion: DrivenMotion) -> Driven
             row = int(beyond[0])
             limit = bounds[int(values[row] > bounds[1])]
             if row == 0:
-                message = (
-                    f"{joint.name} is at {values[0]:.6g}, beyond its limit {limit:.6g}, at the first row"
-                )
-                raise NetworkError(Finding(message, parameter="drives"))
+                place = f"{joint.name} is at {values[0]:.6g}"
+                raise _drive_error(f"{place}, beyond its limit {limit:.6g}, at the first row")
             share = float((limit - values[row - 1]) / (values[row] - values[row - 1]))
             x = motion.x[:, row - 1] + share * (motion.x[:, row] - motion.x[:, row - 1])
             name = joint.name if len(joint.units) == 1 else f"{joint.name}[{k + 1}]"
@@ -436,22 +433,16 @@ def _stop_at_driven_limits(mechanism: Mechanism, motion: DrivenMotion) -> Driven
     return motion
 
 
-def _approach(
-    mechanism: Mechanism,
-    x: FloatArray,
-    driven: DrivenVariables,
-    begin: FloatArray,
-    free: IndexArray,
-    limits: FloatArray,
-) -> FloatArray:
+def _approach(setup: _Setup, x: FloatArray, begin: FloatArray) -> FloatArray:
     """Return the configuration at the begin of the drives.
 
     Raises:
         NetworkError: If no motion from the assembly leads there on a straight line.
     """
+    mechanism, driven, free, limits = setup
     there, branch = move_to(mechanism, x, driven.places, begin, free, limits)
     if branch is not None and not branch.complete:
-        _refuse_begin(driven, begin, branch)
+        raise _begin_error(driven, begin, branch)
     return there
 
 
@@ -459,34 +450,34 @@ def _check_start(drive: Drive, x: FloatArray, s: float, driven: DrivenVariables)
     """Raise a `NetworkError` if the branch of an assembly is not defined, or does not move."""
     node = drive.node(drive.coordinates(x, s))
     if abs(node.tangent[-1]) < SINGULAR and node.distance > SINGULAR:
-        message = f"{', '.join(driven.names)} cannot move at the start: the network has too many drives"
-        raise NetworkError(Finding(message, parameter="drives"))
+        raise _drive_error(
+            f"{', '.join(driven.names)} cannot move at the start: the network has too many drives"
+        )
     if node.distance < SINGULAR:
-        at = _values_words(driven, x[driven.places])
+        at = _format_values(driven, x[driven.places])
         message = f"found a singular pose at the start, {at}, where branches meet or the motion turns back"
         allowed = "a start away from it: other start values in the file, or --start and --branch"
-        raise NetworkError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
+        raise _drive_error(f"{message}; allowed: {allowed}")
 
 
-def _refuse_begin(driven: DrivenVariables, begin: FloatArray, branch: Trace) -> None:
-    """Raise a `NetworkError`: the begin of the drives is not reached from the assembly, as a trace tells."""
+def _begin_error(driven: DrivenVariables, begin: FloatArray, branch: Trace) -> NetworkError:
+    """Return the error that the begin of the drives is not reached from the assembly, as a trace shows."""
     why = "no step of the continuation succeeds"
     ends = [pose for pose, _ in branch.singular if pose.passage == "turns back"]
     if branch.stop is not None:
         unit = f" {branch.stop.unit}" if branch.stop.unit else ""
         why = f"{branch.stop.name} reaches its limit {branch.stop.limit:.6g}{unit} before"
     elif ends:
-        why = f"the motion turns back at {_values_words(driven, ends[0].x[driven.places])}"
-    message = f"no motion from the assembly at the start leads to {_values_words(driven, begin)}: {why}"
+        why = f"the motion turns back at {_format_values(driven, ends[0].x[driven.places])}"
+    message = f"no motion from the assembly at the start leads to {_format_values(driven, begin)}: {why}"
     allowed = "a range on its branch, or another assembly by --branch or --start"
-    raise NetworkError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
+    return _drive_error(f"{message}; allowed: {allowed}")
 
 
-def _values_words(driven: DrivenVariables, values: FloatArray) -> str:
+def _format_values(driven: DrivenVariables, values: FloatArray) -> str:
     """Return the drives with values, as controls are given, in [rad] and [m] of joints."""
-    return ", ".join(
-        f"{name} = {value:.9g}" for name, value in zip(driven.names, values.tolist(), strict=True)
-    )
+    pairs = zip(driven.names, values.tolist(), strict=True)
+    return ", ".join(f"{name} = {value:.9g}" for name, value in pairs)
 
 
 def compute_shares(law: Law, shares: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -503,19 +494,14 @@ def compute_shares(law: Law, shares: FloatArray) -> tuple[FloatArray, FloatArray
         s, ds/du and d2s/du2, shape (n,) each [-].
     """
     u, moves = np.minimum(shares, 1.0), np.where(shares > 1.0 + 1e-12, 0.0, 1.0)
-    s, speed, curvature = _compute_law(law, u)
-    return s, speed * moves, curvature * moves
-
-
-def _compute_law(law: Law, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    s, speed, curvature = np.array(u), np.ones_like(u), np.zeros_like(u)
     if law == "quintic":
         s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
-        return s, 30.0 * u * u * (1.0 - u) ** 2, 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
-    if law == "trapezoid":
+        speed, curvature = 30.0 * u * u * (1.0 - u) ** 2, 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
+    elif law == "trapezoid":
         late = 1.0 - u
-        s = np.where(
-            u < 1 / 3, 2.25 * u * u, np.where(late < 1 / 3, 1.0 - 2.25 * late * late, 1.5 * u - 0.25)
-        )
+        braked = np.where(late < 1 / 3, 1.0 - 2.25 * late * late, 1.5 * u - 0.25)
+        s = np.where(u < 1 / 3, 2.25 * u * u, braked)
         speed = np.minimum(1.5, 4.5 * np.minimum(u, late))
-        return s, speed, np.where(u < 1 / 3, 4.5, np.where(late < 1 / 3, -4.5, 0.0))
-    return np.array(u), np.ones_like(u), np.zeros_like(u)
+        curvature = np.where(u < 1 / 3, 4.5, np.where(late < 1 / 3, -4.5, 0.0))
+    return s, speed * moves, curvature * moves

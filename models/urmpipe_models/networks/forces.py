@@ -8,20 +8,28 @@ the variables that follow, and the drives the rest:
 lambda are the wrenches of cut joints and the forces of elements; the joints of the spanning tree transmit
 what the bodies beyond them need for equilibrium. If constraints are redundant, lambda is not unique:
 components of reactions that depend on the choice are NaN, as they depend on the elasticity of the bodies.
+
+Wrenches are moment [N.m] about the origin of the ground, then force [N], along the axes of the ground.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.elementwise import FloatArray, IndexArray, Vector, cross, dot, subtract
+from urmpipe_models.elementwise import FloatArray, IndexArray, Vector, add, cross, dot, subtract
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.closure import body_twists, evaluate_closure, iter_twist_maps
+from urmpipe_models.networks.closure import (
+    body_twists,
+    evaluate_closure,
+    iter_chunks,
+    iter_twist_maps,
+    stack_elements,
+)
 from urmpipe_models.networks.mechanism import Mechanism, Placements
-from urmpipe_models.networks.motion import BranchDerivatives, iter_chunks
+from urmpipe_models.networks.motion import BranchDerivatives
 from urmpipe_models.networks.parts import Joint
 
 UNDETERMINED = 1e-7  # share of a unit multiplier that a component takes from redundant constraints
@@ -86,8 +94,7 @@ def compute_forces(
     """
     n = x.shape[1]
     drives = np.zeros((len(driven), n))
-    names = [joint.name for joint in mechanism.network.joints]
-    reactions = {name: np.zeros((6, n)) for name in names}
+    reactions = {joint.name: np.zeros((6, n)) for joint in mechanism.network.joints}
     reactions |= {element.name: np.zeros((1, n)) for element in mechanism.network.elements}
     for rows in iter_chunks(n):
         equilibrium = _Equilibrium(mechanism, x[:, rows], driven, free, wrenches, torques or {})
@@ -104,7 +111,7 @@ def compute_forces(
 
 
 class _Equilibrium:
-    """The equilibrium of some configurations."""
+    """The equilibrium at some configurations: forces on the variables, of the drives, and multipliers."""
 
     def __init__(
         self,
@@ -148,8 +155,7 @@ class _Equilibrium:
         reactions = self._transmitted(self.multipliers, self.loads)
         for k in range(self.redundant.shape[1]):
             shares = self._transmitted(self.redundant[:, k], {})
-            sizes = self.mechanism.length * np.ones((6, 1))
-            sizes[:3] = 1.0
+            sizes = np.array([1.0] * 3 + [self.mechanism.length] * 3)[:, np.newaxis]  # of force, of moment
             for name, share in shares.items():
                 unknown = np.abs(share) * self.mechanism.length > UNDETERMINED * sizes[: len(share)]
                 reactions[name] = np.where(unknown, np.nan, reactions[name])
@@ -161,13 +167,13 @@ class _Equilibrium:
         on_bodies = {name: np.array(loads.get(name, np.zeros((6, n)))) for name in network.body_names}
         ground_wrenches: dict[str, FloatArray] = {}
         reactions: dict[str, FloatArray] = {}
-        for tie, rows, carrier in iter_twist_maps(self.mechanism, self.x):
-            wrench = np.einsum("rkn,rn->kn", carrier, multipliers[rows])
-            on_bodies[tie.bodies[1]] += wrench
-            on_bodies[tie.bodies[0]] -= wrench
-            ground_wrenches[tie.name] = wrench
-            if len(carrier) == 1:
-                reactions[tie.name] = multipliers[rows]
+        for constraint, rows, twist_map in iter_twist_maps(self.mechanism, self.x):
+            wrench = np.einsum("rkn,rn->kn", twist_map, multipliers[rows])
+            on_bodies[constraint.bodies[1]] += wrench
+            on_bodies[constraint.bodies[0]] -= wrench
+            ground_wrenches[constraint.name] = wrench
+            if len(twist_map) == 1:
+                reactions[constraint.name] = multipliers[rows]
         posed = self.mechanism.placements(self.x)
         cut_names = {network.joints[cut].name for cut in self.mechanism.graph.cuts}
         for joint, wrench in self._pair_wrenches(multipliers, posed):
@@ -185,12 +191,14 @@ class _Equilibrium:
             reactions[joint.name] = _at_frame(ground_wrenches[joint.name], posed.joints[joint.name])
         return reactions
 
-    def _pair_wrenches(self, multipliers: FloatArray, posed: Placements) -> list[tuple[Joint, FloatArray]]:
-        """Return what pairs exert along the variables of their joints, on second bodies, in the ground.
+    def _pair_wrenches(
+        self, multipliers: FloatArray, posed: Placements
+    ) -> Iterator[tuple[Joint, FloatArray]]:
+        """Yield what pairs exert along the variables of their joints, on second bodies, in the ground.
 
         The moment about n of an angle, the force along n of a length, as wrenches, shape (6, n).
         """
-        mechanism, wrenches = self.mechanism, []
+        mechanism = self.mechanism
         joints = {joint.name: joint for joint in mechanism.network.joints}
         controls = mechanism.control_values(self.x)
         for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
@@ -200,11 +208,8 @@ class _Equilibrium:
                 n = at.columns[1]
                 turns = joint.units[index] == "rad"
                 twist = (*n, 0.0, 0.0, 0.0) if turns else (*cross(at.translation, n), *n)
-                wrench = np.empty((6, self.x.shape[1]))
-                for k, component in enumerate(twist):
-                    wrench[k] = component * rate * multipliers[row]
-                wrenches.append((joint, wrench))
-        return wrenches
+                components = [component * rate * multipliers[row] for component in twist]
+                yield joint, stack_elements(components, self.x.shape[1])
 
 
 def _wrenches_in_ground(
@@ -215,11 +220,8 @@ def _wrenches_in_ground(
     loads: dict[str, FloatArray] = {}
     for wrench in wrenches:
         arm = cross(poses[wrench.body].point(wrench.point), wrench.force)
-        moment = [lever + equilibrium for lever, equilibrium in zip(arm, wrench.moment, strict=True)]
-        rows = np.zeros((6, x.shape[1]))
-        for k, component in enumerate((*moment, *wrench.force)):
-            rows[k] = component
-        loads[wrench.body] = loads.get(wrench.body, 0.0) + rows
+        components = (*add(arm, wrench.moment), *wrench.force)
+        loads[wrench.body] = loads.get(wrench.body, 0.0) + stack_elements(components, x.shape[1])
     return loads
 
 
@@ -227,7 +229,5 @@ def _at_frame(wrench: FloatArray, at: Transform) -> FloatArray:
     """Return force and moment of a wrench in the ground along the axes of a frame about its origin."""
     moment, force = tuple(wrench[:3]), tuple(wrench[3:])
     moment = subtract(moment, cross(at.translation, force))
-    rows = np.empty_like(wrench)
-    for k, axis in enumerate(at.columns):
-        rows[k], rows[3 + k] = dot(axis, force), dot(axis, moment)
-    return rows
+    components = [dot(axis, vector) for vector in (force, moment) for axis in at.columns]
+    return stack_elements(components, wrench.shape[1])

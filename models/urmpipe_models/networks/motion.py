@@ -2,23 +2,23 @@
 
 1. `Drive`: which variables are prescribed and which follow; the closure F(y, s) = 0 along a straight line
    of the prescribed ones, x_d = x_d0 + s dx_d, in scaled coordinates z = (y, s).
-2. `trace`: predictor-corrector continuation of F = 0 by arc length. The tangent t spans the null space of
-   dF/dz; each step follows it and returns to the curve at right angles to it; the steps follow the curvature.
-   The orientation det [dF/dz; t^T] has one sign along a branch. A step that changes it is refined, until the
-   branch itself bends, or the point is reached where two branches cross.
+2. `trace_branch`: predictor-corrector continuation of F = 0 by arc length. The tangent t spans the null space
+   of dF/dz; each step follows it and returns to the curve at right angles to it; the steps follow the
+   curvature. The orientation det [dF/dz; t^T] has one sign along a branch. A step that changes it is refined,
+   until the branch itself bends, or the point is reached where two branches cross.
 3. Singular poses, where the rank of dF/dy falls: the motion turns back (dF/ds is not in the range of dF/dy),
    branches (two curves cross), or goes through.
-4. `sample`: configurations at values of s, by Newton from cubic curves between the nodes; about singular
-   poses by polynomials through configurations around them.
+4. `sample_branch`: configurations at values of s, by Newton from cubic curves between the nodes; about
+   singular poses by polynomials through configurations around them.
 
-Rows of a log that are not on a line: `row_motion`.
+`row_motion` follows rows of a log that are not on a line.
 
 Source: Allgower and Georg 2003, Introduction to Numerical Continuation Methods, chapters 2, 6 and 8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
@@ -26,8 +26,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray
-from urmpipe_models.ik.numeric import damped_step
-from urmpipe_models.networks.closure import MIN_DAMPING, evaluate_scaled_closure
+from urmpipe_models.networks.closure import close_by_newton, evaluate_scaled_closure, iter_chunks
 from urmpipe_models.networks.joint_motion import wrap_rotation_vector
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import find_spinning_bodies
@@ -46,7 +45,6 @@ SINGULAR = 1e-6  # smallest singular value of the scaled Jacobian that counts as
 STENCIL = 4e-3  # arc length between the configurations around a singular pose that interpolate it
 OVERRUN = 0.02  # arc length of the drive that is traced beyond an end near a singular pose
 MAX_LENGTH = 2000.0  # scaled length of a drive: 300 turns of a crank, which take some minutes
-CHUNK_SIZE = 4096  # configurations solved side by side: their Jacobians fit the cache
 
 Segment: TypeAlias = "tuple[Node, Node]"
 
@@ -218,25 +216,20 @@ class Drive:
 
 
 def _orientation(before: Node, after: Node, spins: int) -> tuple[float, float]:
-    """Return the cosine between the orientations of two nodes, and det(A^T B) / det(A^T A).
+    """Return the cosine between the orientations of nodes with matrices A, B, and det(A^T B) / det(A^T A).
 
-    A and B are the matrices of the nodes. By Cauchy and Binet det(A^T B) is the scalar product of their
-    minors, defined for redundant rows, too. Its sign changes where branches cross.
+    By Cauchy and Binet det(A^T B) is the scalar product of their minors, defined for redundant rows, too. Its
+    sign changes where branches cross.
     """
     first, second = before.matrix, after.matrix
     if spins and np.linalg.det(second[-1 - spins : -1] @ first[-1 - spins : -1].T) < 0.0:
-        second = np.array(second)  # the basis of the spins has either orientation: the same is taken
+        second = np.array(second)  # the basis of the spins has either orientation: that of the first is taken
         second[-2] = -second[-2]
     sign, size = np.linalg.slogdet(first.T @ second)
     local = [float(np.linalg.slogdet(matrix.T @ matrix)[1]) for matrix in (first, second)]
     with np.errstate(under="ignore", invalid="ignore"):
         cosine, share = np.exp(size - 0.5 * (local[0] + local[1])), np.exp(size - local[0])
     return float(np.nan_to_num(sign * cosine)), float(np.nan_to_num(sign * share))
-
-
-def _turn(before: Node, after: Node) -> float:
-    """Return the angle between the tangents of two nodes in [rad]."""
-    return float(np.arccos(np.clip(before.tangent @ after.tangent, -1.0, 1.0)))
 
 
 # ---------------------------------------------------------------------------------------- continuation
@@ -294,7 +287,7 @@ class _Tracer:
                 self.progress(abs((there.z[-1] - self.begin) / (self.end - self.begin)))
 
     def _append(self, there: Node) -> None:
-        """Add a segment, and go on from its end, in coordinates that are far from singular."""
+        """Add a segment, and continue from its end in coordinates that are far from singular."""
         self.trace.segments.append((self.here, there))
         self.before, z = self.here, self.drive.wrapped(there.z)
         if (z != there.z).any():
@@ -312,7 +305,12 @@ class _Tracer:
         here = self.here
         while self.step > MIN_STEP:
             there = self._try(here, self.step)
-            if there is not None and (turn := _turn(here, there)) < MAX_TURN:
+            turn = (
+                np.inf
+                if there is None
+                else float(np.arccos(np.clip(here.tangent @ there.tangent, -1.0, 1.0)))
+            )
+            if there is not None and turn < MAX_TURN:
                 cosine, _ = _orientation(here, there, self.drive.spins)
                 crossing = self._crossing(here, there) if cosine < 0.0 else None
                 if crossing is not None:
@@ -334,9 +332,8 @@ class _Tracer:
     def _crossing(self, here: Node, there: Node) -> Node | None:
         """Return where branches cross between two nodes: the determinant is continuous, and 0 there.
 
-        None where it jumps: the step went from one branch to another that is near. The pose itself is the
-        root of a cubic polynomial through configurations around it: there Newton's method loses half of the
-        digits.
+        None where it jumps: the step went from one branch to another that is near. The pose is the root of a
+        cubic polynomial through configurations around it: there Newton's method loses half of the digits.
         """
 
         def share(node: Node) -> float:
@@ -347,17 +344,13 @@ class _Tracer:
             return None
         middle = float(here.tangent @ (rough.z - here.z))
         steps = middle + STENCIL * np.array([-2.0, -1.0, 1.0, 2.0])
-        nodes = [self._try(here, step) for step in steps.tolist()]
-        around = [node for node in nodes if node is not None]
-        if len(around) < len(nodes):
+        nodes = [node for step in steps.tolist() if (node := self._try(here, step)) is not None]
+        if len(nodes) < len(steps):
             return rough
-        shares = np.polyfit(steps - middle, [share(node) for node in around], 3)
-        roots = np.roots(shares)
+        roots = np.roots(np.polyfit(steps - middle, [share(node) for node in nodes], 3))
         root = float(roots[np.argmin(np.abs(roots))].real)
-        z = np.array(
-            [np.polyval(part, root) for part in np.polyfit(steps - middle, [node.z for node in around], 3).T]
-        )
-        return self.drive.node(z, here.tangent)
+        cubics = np.polyfit(steps - middle, [node.z for node in nodes], 3).T
+        return self.drive.node(np.array([np.polyval(cubic, root) for cubic in cubics]), here.tangent)
 
     def _turn_back(self, there: Node) -> None:
         """End at the pose between two nodes where s has its extreme."""
@@ -407,40 +400,37 @@ class _Tracer:
             falls = max(before.distance, there.distance) * (high - low)
             if best.distance < SINGULAR or best.distance > 4.0 * falls:
                 break  # at 0, or in a valley above it
-        known = [node for _, node in self.trace.singular]
-        if best.distance < 10.0 * SINGULAR and not any(
-            np.allclose(best.z, node.z, atol=1e-4) for node in known
-        ):
+        is_known = any(np.allclose(best.z, node.z, atol=1e-4) for _, node in self.trace.singular)
+        if best.distance < 10.0 * SINGULAR and not is_known:
             passage: Passage = "branches" if self._branches(best, here.tangent) else "goes through"
             self._record(passage, best, here.tangent)
 
     def _branches(self, node: Node, tangent: FloatArray) -> bool:
         """Return whether another curve of solutions passes through a singular node."""
-        rows = self.drive.mechanism.rows
-        _, values, vectors = np.linalg.svd(node.matrix[:rows])
+        _, values, vectors = np.linalg.svd(node.matrix[: self.drive.mechanism.rows])
         null = vectors[int((values > 1e-4).sum()) :].T
-        radius = 1e-2
-        for direction in np.random.default_rng(0).normal(size=(24, null.shape[1])):
-            way = null @ (direction / np.linalg.norm(direction))
-            z = self.drive.correct(node.z + radius * way, way)
-            away = np.zeros_like(way) if z is None else z - node.z
-            size = float(np.linalg.norm(away))
-            if 0.5 * radius < size < 2.0 * radius and abs(away @ tangent) < 0.9 * size:
+        radius = 1e-2  # arc length of the trials
+        for weights in np.random.default_rng(0).normal(size=(24, null.shape[1])):
+            direction = null @ (weights / np.linalg.norm(weights))
+            z = self.drive.correct(node.z + radius * direction, direction)
+            offset = np.zeros_like(direction) if z is None else z - node.z
+            size = float(np.linalg.norm(offset))
+            if 0.5 * radius < size < 2.0 * radius and abs(offset @ tangent) < 0.9 * size:
                 return True
         return False
 
     def _reach(self, there: Node) -> bool:
-        """Add the node at the end of the drive, or at the first limit before it; return whether to go on."""
+        """Add the node at the end of the drive or at a limit before it; return whether to continue."""
         drive, here = self.drive, self.here
         share, coordinate, value = np.inf, -1, self.end
         if self.sign * (there.z[-1] - self.end) >= 0.0:
-            share = _share_of(here, there, -1, self.end)
+            share = _first_share(here, there, -1, self.end)
         limits = drive.limits[drive.free] / drive.scales[:, np.newaxis]
         for k, (lower, upper) in enumerate(limits.tolist()):
             for bound, sign in ((lower, -1.0), (upper, 1.0)):
                 if sign * (there.z[k] - bound) > 0.0:  # beyond it there; perhaps here already
                     is_beyond = sign * (here.z[k] - bound) >= 0.0
-                    at = 0.0 if is_beyond else _share_of(here, there, k, bound)
+                    at = 0.0 if is_beyond else _first_share(here, there, k, bound)
                     if at < share:
                         share, coordinate, value = at, k, bound
         if share == 0.0:
@@ -462,13 +452,13 @@ class _Tracer:
         return True
 
     def _stop(self, coordinate: int, value: float, node: Node) -> None:
-        """Note the limit that ends the trace, unless it is beyond the end of the drive."""
-        drive = self.drive
+        """Record the limit that ends the trace, unless it is beyond the end of the drive."""
+        drive, mechanism = self.drive, self.drive.mechanism
         if self.trace.complete:
             return
         place, x = int(drive.free[coordinate]), drive.at(node.z[:, np.newaxis])[:, 0]
-        mechanism, limit = drive.mechanism, value * float(drive.scales[coordinate])
-        unit, s = mechanism.variables[place].unit, float(node.z[-1]) / drive.length
+        limit, s = value * float(drive.scales[coordinate]), float(node.z[-1]) / drive.length
+        unit = mechanism.variables[place].unit
         self.trace.stop = LimitStop(mechanism.labels[place], unit, limit, s, x)
 
     def _record(self, passage: Passage, node: Node, tangent: FloatArray) -> None:
@@ -518,7 +508,7 @@ class _Cubic(NamedTuple):
         return 0.5 * (low + high)
 
 
-def _share_of(here: Node, there: Node, coordinate: int, value: float) -> float:
+def _first_share(here: Node, there: Node, coordinate: int, value: float) -> float:
     """Return where the cubic curve between two nodes takes a value of a coordinate first."""
     curve, shares = _Cubic.between(here, there), np.linspace(0.0, 1.0, 65)
     values = curve.at(shares)[coordinate] - value
@@ -549,7 +539,7 @@ class BranchDerivatives(NamedTuple):
 
 
 def sample_branch(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArray, list[BranchDerivatives]]:
-    """Return the configurations of a trace at places s, shape (variables, n), and slopes at branch points.
+    """Return the configurations of a trace at places s, and its derivatives where branches meet.
 
     Args:
         drive: The drive.
@@ -557,21 +547,21 @@ def sample_branch(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArra
         s: The places [-], shape (n,).
 
     Returns:
-        Configurations in [m], [rad] and as controls are given, and slopes.
+        Configurations in [m], [rad] and as controls are given, shape (variables, n), and derivatives.
     """
     at = s * drive.length
     ends = np.array([second.z[-1] for _, second in branch.segments])
     which = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
     stacks = [np.array([pair[k].z for pair in branch.segments]).T for k in (0, 1)]
     chords = np.linalg.norm(stacks[1] - stacks[0], axis=0)
-    slopes = [chords * np.array([pair[k].tangent for pair in branch.segments]).T for k in (0, 1)]
+    tangents = [chords * np.array([pair[k].tangent for pair in branch.segments]).T for k in (0, 1)]
     x = np.empty((len(drive.x), len(s)))
     for rows in iter_chunks(len(s)):
         local = which[rows]
-        curve = _Cubic(*(part[:, local] for part in (*stacks, *slopes)))
+        curve = _Cubic(*(part[:, local] for part in (*stacks, *tangents)))
         z = curve.at(curve.shares(at[rows]))
         z[-1] = at[rows]
-        x[:, rows] = close_by_newton(drive.mechanism, drive.at(z), drive.free)[0]
+        x[:, rows] = close_by_newton(drive.mechanism, drive.at(z), drive.free)
     interpolated = [_interpolate(drive, pose, node, at, x) for pose, node in branch.singular]
     return x, [slopes for slopes in interpolated if slopes is not None]
 
@@ -582,7 +572,7 @@ def _interpolate(
     """Replace configurations next to a singular pose, where Newton's method loses half of the digits.
 
     The branch is smooth in its arc length through the pose, where it turns back, too: a polynomial passes
-    through eight configurations around it. Where s has its extreme, only the way there is of the motion.
+    through eight configurations around it. Where s has its extreme, only the part before it is of the motion.
     Where the polynomial does not close, as at two singular poses next to each other, nothing is replaced.
     """
     places = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
@@ -616,57 +606,9 @@ def _interpolate(
     first, second = (np.array([term.deriv(k)(place) for term in terms]) for k in (1, 2))
     rates = first / first[-1] * drive.length
     curvatures = (second - first / first[-1] * second[-1]) / np.square(first[-1]) * drive.length**2
-    slopes = [np.repeat(drive.change[:, np.newaxis], len(near), axis=1), np.zeros((len(drive.x), len(near)))]
+    slopes = BranchDerivatives(
+        near, np.repeat(drive.change[:, np.newaxis], len(near), axis=1), np.zeros((len(drive.x), len(near)))
+    )
     scales = drive.scales[:, np.newaxis]
-    slopes[0][drive.free], slopes[1][drive.free] = rates[:-1] * scales, curvatures[:-1] * scales
-    return BranchDerivatives(near, slopes[0], slopes[1])
-
-
-def close_by_newton(
-    mechanism: Mechanism, x: FloatArray, free: IndexArray, *, wrap: bool = False
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return configurations that close next to others, by Newton's method with some variables free.
-
-    Args:
-        mechanism: The network.
-        x: Configurations near, shape (variables, n), in [m], [rad] and as controls are given.
-        free: The numbers of the variables that may change, shape (free,) [-].
-        wrap: Whether rotation vectors are turned back to pi at most.
-
-    Returns:
-        The configurations, the scaled size of the first step and of the last one, shape (n,) each [-].
-    """
-    x, scales = np.array(x), mechanism.column_scales[free, np.newaxis]
-    first = last = np.zeros(x.shape[1])
-    for count in range(10):
-        closure = evaluate_scaled_closure(mechanism, x)
-        step = damped_step(closure.jacobian[:, free], -closure.residual, MIN_DAMPING)
-        x[free] += step * scales
-        for part in mechanism.rotations if wrap else ():
-            x[part] = wrap_rotation_vector(tuple(x[part]))
-        last = np.sqrt(np.einsum("kn,kn->n", step, step))
-        first = first if count else last
-        if not (last > 1e-13).any():
-            break
-    return x, first, last
-
-
-def nearest_rotations(mechanism: Mechanism, x: FloatArray, to: FloatArray) -> FloatArray:
-    """Return configurations whose rotation vectors are those of the same rotations nearest to others.
-
-    q and (1 - 2 pi / |q|) q are one rotation. All arrays have the shape (variables, n), in [m], [rad] and as
-    controls are given.
-    """
-    x = np.array(x)
-    for part in mechanism.rotations:
-        angle = np.sqrt(np.einsum("kn,kn->n", x[part], x[part]))
-        other = x[part] * (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9))
-        squares = [np.square(vector - to[part]).sum(axis=0) for vector in (x[part], other)]
-        x[part] = np.where((squares[1] < squares[0]) & (angle > 1e-9), other, x[part])
-    return x
-
-
-def iter_chunks(count: int) -> Iterator[slice]:
-    """Yield slices of at most CHUNK configurations, in their order."""
-    for start in range(0, count, CHUNK_SIZE):
-        yield slice(start, min(start + CHUNK_SIZE, count))
+    slopes.first[drive.free], slopes.second[drive.free] = rates[:-1] * scales, curvatures[:-1] * scales
+    return slopes

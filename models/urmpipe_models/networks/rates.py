@@ -1,38 +1,31 @@
-"""Values with two derivatives by time, as an element: velocity and acceleration of what a model computes.
+"""The closure of a network elementwise: Newton steps that can be traced to C, and rates along a motion.
 
-A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration of
-a model's outputs come from the same lines as the outputs: (f(u))' = f' u', (f(u))'' = f'' u'^2 + f' u''.
-
-Source: Griewank and Walther 2008, Evaluating Derivatives, chapter 13.
-
-Newton steps that keep a network closed, element by element: floats, columns and symbols pass alike.
-
-`closure.py` and `descent.py` solve many configurations by arrays and stop where each is closed. Here the
-number of steps is fixed and nothing branches on a value, so that the steps can be traced to C:
+`closure` solves many configurations by arrays and stops where each is closed. Here floats, columns, symbols
+and Taylor series pass through the same lines, the number of steps is fixed and nothing branches on a value.
 
 1. `closure_residual`: e, what does not close. Of a cut joint, whose frames are R_1, p_1 and R_2, p_2 from its
-   two sides, p_2 - p_1 and the skew part of R_2 R_1^T; of an element what it is too long by.
+   two sides, p_2 - p_1 and the skew part of R_2 R_1^T; of an element its excess length.
 2. `closure_jacobian`: J = de/dx of the free variables, by the twists of joints and the wrenches of elements.
    It is exact where the network is closed, which is enough for steps that converge quadratically.
 3. `damped_normal_step`: (J^T J + mu I) dx = -J^T e by an L D L^T factor without pivots. Redundant rows add
    up; along an idle spin, which no row determines, mu keeps dx small.
-4. `close_network`: a number of such steps; rotation vectors are kept within half a turn.
-5. `predict_variables`: where steps begin: on the line through the last two configurations, so that a motion
-   goes straight on through a special configuration, where several branches meet.
+4. `close_network`: a number of such steps; rotation vectors are kept within half a turn. `predict_variables`:
+   where steps begin: on the line through the last two configurations, so that a motion continues straight
+   through a special configuration, where several branches meet.
+5. `Taylor`: a value with two derivatives by time, as an element: (f(u))' = f' u', (f(u))'' = f'' u'^2 + f'
+   u''. So velocity and acceleration of the outputs of a model come from the same lines as the outputs.
+6. `compute_rates`: with the prescribed variables d and those that follow y, the closure F(y, d) = 0 gives
 
-Rows are in lengths of the mechanism and [rad], and so are columns: J is a list of columns.
+       J_y y' = -J_d d'                         velocities
+       J_y y'' = -J_d d'' - J' x'               accelerations
+       T = dy/dd = -J_y^+ J_d                   transmission
 
-Rates along a motion of a network: velocities, accelerations, transmission, distance to a singular pose.
+   J' x' is the second derivative of F for y'' = d'' = 0: `Taylor` carries it exactly through the lines that
+   compute F. `point_motion`: position, velocity and acceleration of points of bodies likewise.
 
-With the prescribed variables d and those that follow y, the closure F(y, d) = 0 gives
+Residual rows and columns of J are in lengths of the mechanism and [rad]; J is a list of columns.
 
-    J_y y' = -J_d d'                         velocities
-    J_y y'' = -J_d d'' - J' x'               accelerations
-    T = dy/dd = -J_y^+ J_d                   transmission
-
-J' x' is the second derivative of F for y'' = d'' = 0: `taylor.Taylor` carries it exactly through the lines
-that compute F. Points of bodies get their velocity and acceleration likewise from those that compute their
-place.
+Source: Griewank and Walther 2008, Evaluating Derivatives, chapter 13 (`Taylor`).
 """
 
 from __future__ import annotations
@@ -66,7 +59,9 @@ from urmpipe_models.networks.closure import (
     MIN_DAMPING,
     TRANSLATION_SCREWS,
     evaluate_scaled_closure,
+    iter_chunks,
     relative_movers,
+    stack_elements,
 )
 from urmpipe_models.networks.joint_motion import (
     Twists,
@@ -77,8 +72,256 @@ from urmpipe_models.networks.joint_motion import (
     wrap_rotation_vector,
 )
 from urmpipe_models.networks.mechanism import Mechanism, Placements, ValueWithGradient, evaluate_expression
-from urmpipe_models.networks.mobility import find_idle_spins, spin_angles
-from urmpipe_models.networks.motion import BranchDerivatives, iter_chunks
+from urmpipe_models.networks.mobility import IdleSpin, find_idle_spins, spin_angles
+from urmpipe_models.networks.motion import BranchDerivatives
+
+Column: TypeAlias = list[Element]  # one element per row
+
+MAX_STEP = 0.5  # rad or lengths that a Newton step changes a variable by: beyond, the tangent leads astray
+MAX_RATIO = 2.0  # steps ahead in steps of the past: farther on, a line is no better than Newton's tangent
+MIN_SQUARE = 1e-24  # of a past step in rad or lengths: a shorter one is rounding and has no direction
+
+
+# ---------------------------------------------------------------------------------------- closure
+
+
+def closure_residual(mechanism: Mechanism, x: Sequence[Element]) -> Column:
+    """Return the residual in lengths of the mechanism and [rad].
+
+    Rows: of each cut joint its gap along x, y, z of the ground and the skew part of its rotation about them,
+    which is sin(a) u of a rotation by a about u; then of each element its error, of a pair in its own unit.
+
+    Args:
+        mechanism: The network.
+        x: The variables in [m], [rad] and as controls are given, one element each.
+    """
+    return _residual(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
+
+
+def largest_residual(mechanism: Mechanism, x: Sequence[Element]) -> Element:
+    """Return the largest absolute entry of `closure_residual`; 0 of a network without loops."""
+    sizes = [np.abs(row) for row in closure_residual(mechanism, x)]
+    return reduce(np.maximum, sizes) if sizes else 0.0
+
+
+def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]:
+    """Return the derivatives of `closure_residual` by each free variable, exact where the network is closed.
+
+    Args:
+        mechanism: The network.
+        x: The variables in [m], [rad] and as controls are given, one element each.
+    """
+    return _jacobian(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
+
+
+def _residual(
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
+) -> Column:
+    per_length = 1.0 / mechanism.length
+    rows: Column = []
+    for first, second in iter_cut_frames(mechanism, x, posed, controls):
+        rows += scale(per_length, subtract(second.translation, first.translation))
+        # of small turns d the sum over the axes c of c x (c + d x c) is 2 d
+        pairs = zip(first.columns, second.columns, strict=True)
+        rows += scale(0.5, reduce(add, (cross(before, after) for before, after in pairs)))
+    scales = mechanism.row_scales[len(rows) :].tolist()
+    for element, per_unit in zip(mechanism.network.elements, scales, strict=True):
+        if element.is_pair:
+            rows.append(times(per_unit, mechanism.pair_error(element, x, controls)[0].value))
+            continue
+        frames = (posed.bodies[name].frame for name in element.bodies)
+        length = evaluate_expression(element.length, controls).value
+        rows.append(times(per_length, minus(measure_element(element, *frames).distance, length)))
+    return rows
+
+
+def _jacobian(
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
+) -> list[Column]:
+    per_length, scales = 1.0 / mechanism.length, mechanism.column_scales
+    screws = _free_screws(mechanism, x, posed, controls)
+    first_free = len(mechanism.controls)
+    columns: list[Column] = [[0.0] * mechanism.rows for _ in mechanism.free]
+    cut_joints = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
+    frames = iter_cut_frames(mechanism, x, posed, controls)
+    for row, (joint, (here, _)) in enumerate(zip(cut_joints, frames, strict=True)):
+        for mover, sign in relative_movers(posed.bodies, joint.bodies, joint.name).items():
+            for k, w, v in screws[mover]:
+                factor = sign * float(scales[k])
+                velocity = add(v, cross(w, here.translation))
+                entries = (*scale(factor * per_length, velocity), *scale(factor, w))
+                columns[k - first_free][6 * row : 6 * row + 6] = entries
+    for row, element in enumerate(mechanism.network.elements, 6 * len(cut_joints)):
+        if element.is_pair:
+            error, _ = mechanism.pair_error(element, x, controls)
+            for k in error.gradient.keys() & set(mechanism.free.tolist()):
+                factor = float(scales[k] * mechanism.row_scales[row])
+                columns[k - first_free][row] = times(factor, error.gradient[k])
+            continue
+        measured = measure_element(element, *(posed.bodies[name].frame for name in element.bodies))
+        for mover, sign in relative_movers(posed.bodies, element.bodies).items():
+            for k, w, v in screws[mover]:
+                rate = plus(dot(measured.moment, w), dot(measured.force, v))
+                columns[k - first_free][row] = times(sign * float(scales[k]) * per_length, rate)
+    return columns
+
+
+def iter_cut_frames(
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
+) -> Iterator[tuple[Transform, Transform]]:
+    """Yield the frame of each cut joint in the ground, once from each of its two bodies."""
+    for cut in mechanism.graph.cuts:
+        joint = mechanism.network.joints[cut]
+        moved = joint_frame(joint, [value.value for value in mechanism.joint_values(joint, x, controls)])
+        yield posed.joints[joint.name] @ moved, posed.bodies[joint.bodies[1]].frame @ joint.frames[1]
+
+
+def _free_screws(
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
+) -> dict[str, list[tuple[int, Vector, Vector]]]:
+    """Return the free variables of each mover by number, with the twist in the ground of one unit of each."""
+    twists: dict[str, list[tuple[int, Vector, Vector]]] = {}
+    for joint in mechanism.network.joints:
+        drives = joint.drives
+        screws: Twists = []
+        if any(drive is None for drive in drives):
+            values = [value.value for value in mechanism.joint_values(joint, x, controls)]
+            screws = joint_twists(joint, values, posed.joints[joint.name])
+        twists[joint.name] = [
+            (mechanism.variable_index[joint.name, index], *screw)
+            for index, (drive, screw) in enumerate(zip(drives, screws, strict=False))
+            if drive is None
+        ]
+    for name in mechanism.graph.roots[1:]:
+        first = mechanism.variable_index[name, 0]
+        p = posed.bodies[name].frame.translation
+        axes = left_jacobian((x[first + 3], x[first + 4], x[first + 5]))
+        screws = [*TRANSLATION_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
+        twists[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
+    return twists
+
+
+def _vector(x: Sequence[Element], part: slice) -> Vector:
+    """Return the three variables that are a rotation vector in [rad]."""
+    return x[part.start], x[part.start + 1], x[part.start + 2]
+
+
+# ---------------------------------------------------------------------------------------- Newton steps
+
+
+def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> list[Element]:
+    """Return the variables after Newton steps with the controls held.
+
+    From a distance h to the closed configuration, in rad or lengths of the mechanism, a step leads to one of
+    the order of h^2. Where nothing closes nearby, it is where the steps ended: see `largest_residual`.
+
+    Args:
+        mechanism: The network.
+        x: The variables in [m], [rad] and as controls are given, one element each: floats, arrays of shape
+            (n,), or symbols.
+        steps: Their number.
+    """
+    closed = list(x)
+    scales = mechanism.column_scales
+    for _ in range(steps if len(mechanism.free) else 0):
+        posed, controls = mechanism.placements(closed), mechanism.control_values(closed)
+        residual = _residual(mechanism, closed, posed, controls)
+        columns = _jacobian(mechanism, closed, posed, controls)
+        step = damped_normal_step(columns, residual)
+        longest = reduce(np.maximum, (np.abs(change) for change in step))
+        part_taken = MAX_STEP / np.maximum(longest, MAX_STEP)
+        for k, change in zip(mechanism.free, step, strict=True):
+            closed[k] = plus(closed[k], times(float(scales[k]), times(part_taken, change)))
+        for part in mechanism.rotations:
+            closed[part] = wrap_rotation_vector(_vector(closed, part))
+    return closed
+
+
+def damped_normal_step(columns: Sequence[Column], residual: Column, damping: float = MIN_DAMPING) -> Column:
+    """Return dx of (J^T J + mu I) dx = -J^T e.
+
+    J^T J is positive semidefinite, so no pivot is less than mu; a smaller one is rounding and raised to mu.
+
+    Args:
+        columns: J, a list of columns.
+        residual: e.
+        damping: mu, above 0.
+    """
+    count = len(columns)
+    lower: list[Column] = [[] for _ in columns]  # L below its diagonal of ones, row by row
+    scaled: list[Column] = [[] for _ in columns]  # L D
+    inverse: Column = []
+    for j in range(count):
+        pivot = minus(_product(columns[j], columns[j]), _product(lower[j], scaled[j]))
+        inverse.append(1.0 / np.maximum(plus(pivot, damping), damping))
+        for i in range(j + 1, count):
+            entry = minus(_product(columns[i], columns[j]), _product(lower[i][:j], scaled[j]))
+            scaled[i].append(entry)
+            lower[i].append(times(entry, inverse[j]))
+    step: Column = []
+    for j in range(count):
+        right = times(-1.0, _product(columns[j], residual))
+        step.append(minus(right, _product(lower[j], step)))
+    step = [times(entry, factor) for entry, factor in zip(step, inverse, strict=True)]
+    for j in range(count - 1, -1, -1):
+        below = [lower[i][j] for i in range(j + 1, count)]
+        step[j] = minus(step[j], _product(below, step[j + 1 :]))
+    return step
+
+
+def _product(first: Sequence[Element], second: Sequence[Element]) -> Element:
+    """Return the scalar product of two lists; constants that are 0 cost nothing."""
+    total: Element = 0.0
+    for a, b in zip(first, second, strict=True):
+        total = plus(total, times(a, b))
+    return total
+
+
+def predict_variables(
+    mechanism: Mechanism, x: Sequence[Element], change: Sequence[Element], ahead: Sequence[Element]
+) -> list[Element]:
+    """Return the variables on the line through the last two configurations, at other values of the controls.
+
+    The change of the free variables counts as often as the step of the controls projected on the step before
+    has the length of that, at most MAX_RATIO times; not at all if the controls stood still.
+
+    Args:
+        mechanism: The network.
+        x: The variables at the last configuration in [m], [rad] and as controls are given, one element each.
+        change: How they have changed from the configuration before, see `changes`.
+        ahead: The controls that can be set, as they are given.
+    """
+    scales = mechanism.column_scales
+    past = [change[k] / float(scales[k]) for k in mechanism.controls]
+    step = [(value - x[k]) / float(scales[k]) for k, value in zip(mechanism.controls, ahead, strict=True)]
+    square = _product(past, past)
+    ratio = _product(past, step) / np.maximum(square, MIN_SQUARE)
+    ratio = np.maximum(np.minimum(ratio, MAX_RATIO), -MAX_RATIO)
+    predicted = [*ahead, *(x[k] + ratio * change[k] for k in mechanism.free)]
+    for part in mechanism.rotations:
+        predicted[part] = wrap_rotation_vector(_vector(predicted, part))
+    return predicted
+
+
+def variable_changes(mechanism: Mechanism, before: Sequence[Element], x: Sequence[Element]) -> list[Element]:
+    """Return how variables have changed: of a rotation vector as if it had not been wrapped on the way.
+
+    Args:
+        mechanism: The network.
+        before: The variables of the configuration before in [m], [rad] and as controls are given.
+        x: Those of a configuration.
+    """
+    start = list(before)
+    for part in mechanism.rotations:
+        vector = _vector(start, part)
+        difference = subtract(_vector(x, part), vector)
+        angle = np.sqrt(dot(vector, vector))
+        other = 1.0 - 2.0 * np.pi / np.maximum(angle, 1.0)  # the same rotation, the other way round
+        start[part] = scale(np.where(dot(difference, difference) > np.pi**2, other, 1.0), vector)
+    return [now - then for now, then in zip(x, start, strict=True)]
+
+
+# ---------------------------------------------------------------------------------------- Taylor series
 
 
 class Taylor(NDArrayOperatorsMixin):
@@ -231,246 +474,7 @@ _RULES: dict[str, Callable[..., Taylor]] = {
 }
 
 
-Column: TypeAlias = list[Element]
-"""One element per row."""
-
-MAX_STEP = 0.5  # rad or lengths that a Newton step changes a variable by: beyond, the tangent leads astray
-MAX_RATIO = 2.0  # steps ahead in steps of the past: farther on, a line is no better than Newton's tangent
-MIN_SQUARE = 1e-24  # of a past step in rad or lengths: a shorter one is rounding and has no direction
-
-
-def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> list[Element]:
-    """Return the variables after Newton steps with the controls held.
-
-    From a distance h to the closed configuration, in rad or lengths of the mechanism, a step leads to one of
-    the order of h^2. Where nothing closes nearby, it is where the steps ended: see `largest_residual`.
-
-    Args:
-        mechanism: The network.
-        x: The variables in [m], [rad] and as controls are given, one element each: floats, arrays of shape
-            (n,), or symbols.
-        steps: How many.
-    """
-    closed = list(x)
-    scales = mechanism.column_scales
-    for _ in range(steps if len(mechanism.free) else 0):
-        posed, controls = mechanism.placements(closed), mechanism.control_values(closed)
-        residual = _residual(mechanism, closed, posed, controls)
-        columns = _jacobian(mechanism, closed, posed, controls)
-        step = damped_normal_step(columns, residual)
-        longest = reduce(np.maximum, (np.abs(change) for change in step))
-        part_taken = MAX_STEP / np.maximum(longest, MAX_STEP)
-        for k, change in zip(mechanism.free, step, strict=True):
-            closed[k] = plus(closed[k], times(float(scales[k]), times(part_taken, change)))
-        for part in mechanism.rotations:
-            closed[part] = wrap_rotation_vector(_vector(closed, part))
-    return closed
-
-
-def predict_variables(
-    mechanism: Mechanism, x: Sequence[Element], change: Sequence[Element], ahead: Sequence[Element]
-) -> list[Element]:
-    """Return the variables on the line through the last two configurations, at other values of the controls.
-
-    The change of the free variables counts as often as the step of the controls projected on the step before
-    has the length of that, at most MAX_RATIO times; not at all if the controls stood still.
-
-    Args:
-        mechanism: The network.
-        x: The variables at the last configuration in [m], [rad] and as controls are given, one element each.
-        change: How they have changed from the configuration before, see `changes`.
-        ahead: The controls that can be set, as they are given.
-    """
-    scales = mechanism.column_scales
-    past = [change[k] / float(scales[k]) for k in mechanism.controls]
-    step = [(value - x[k]) / float(scales[k]) for k, value in zip(mechanism.controls, ahead, strict=True)]
-    square = _product(past, past)
-    ratio = _product(past, step) / np.maximum(square, MIN_SQUARE)
-    ratio = np.maximum(np.minimum(ratio, MAX_RATIO), -MAX_RATIO)
-    predicted = [*ahead, *(x[k] + ratio * change[k] for k in mechanism.free)]
-    for part in mechanism.rotations:
-        predicted[part] = wrap_rotation_vector(_vector(predicted, part))
-    return predicted
-
-
-def variable_changes(mechanism: Mechanism, before: Sequence[Element], x: Sequence[Element]) -> list[Element]:
-    """Return how variables have changed: of a rotation vector as if it had not been wrapped on the way.
-
-    Args:
-        mechanism: The network.
-        before: The variables of the configuration before in [m], [rad] and as controls are given.
-        x: Those of a configuration.
-    """
-    start = list(before)
-    for part in mechanism.rotations:
-        vector = _vector(start, part)
-        difference = subtract(_vector(x, part), vector)
-        angle = np.sqrt(dot(vector, vector))
-        other = 1.0 - 2.0 * np.pi / np.maximum(angle, 1.0)  # the same rotation, the other way round
-        start[part] = scale(np.where(dot(difference, difference) > np.pi**2, other, 1.0), vector)
-    return [now - then for now, then in zip(x, start, strict=True)]
-
-
-def closure_residual(mechanism: Mechanism, x: Sequence[Element]) -> Column:
-    """Return what does not close, in lengths of the mechanism and [rad].
-
-    Rows: of each cut joint its gap along x, y, z of the ground and the skew part of its rotation about them,
-    which is sin(a) u of a rotation by a about u; then of each element its error, of a pair in its own unit.
-
-    Args:
-        mechanism: The network.
-        x: The variables in [m], [rad] and as controls are given, one element each.
-    """
-    return _residual(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
-
-
-def largest_residual(mechanism: Mechanism, x: Sequence[Element]) -> Element:
-    """Return the largest absolute entry of `closure_residual`; 0 of a network without loops."""
-    sizes = [np.abs(row) for row in closure_residual(mechanism, x)]
-    return reduce(np.maximum, sizes) if sizes else 0.0
-
-
-def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]:
-    """Return the derivatives of `closure_residual` by each free variable, exact where the network is closed.
-
-    Args:
-        mechanism: The network.
-        x: The variables in [m], [rad] and as controls are given, one element each.
-    """
-    return _jacobian(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
-
-
-def damped_normal_step(columns: Sequence[Column], residual: Column, damping: float = MIN_DAMPING) -> Column:
-    """Return dx of (J^T J + mu I) dx = -J^T e.
-
-    As J^T J is positive semidefinite, no pivot is less than mu; rounding may not make it
-    so.
-
-    Args:
-        columns: J, a list of columns.
-        residual: e.
-        damping: mu, above 0.
-    """
-    count = len(columns)
-    lower: list[Column] = [[] for _ in columns]  # L below its diagonal of ones, row by row
-    scaled: list[Column] = [[] for _ in columns]  # L D
-    inverse: Column = []
-    for j in range(count):
-        pivot = minus(_product(columns[j], columns[j]), _product(lower[j], scaled[j]))
-        inverse.append(1.0 / np.maximum(plus(pivot, damping), damping))
-        for i in range(j + 1, count):
-            entry = minus(_product(columns[i], columns[j]), _product(lower[i][:j], scaled[j]))
-            scaled[i].append(entry)
-            lower[i].append(times(entry, inverse[j]))
-    step: Column = []
-    for j in range(count):
-        right = times(-1.0, _product(columns[j], residual))
-        step.append(minus(right, _product(lower[j], step)))
-    step = [times(entry, factor) for entry, factor in zip(step, inverse, strict=True)]
-    for j in range(count - 1, -1, -1):
-        below = [lower[i][j] for i in range(j + 1, count)]
-        step[j] = minus(step[j], _product(below, step[j + 1 :]))
-    return step
-
-
-def _residual(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> Column:
-    per_length = 1.0 / mechanism.length
-    rows: Column = []
-    for first, second in iter_cut_frames(mechanism, x, posed, controls):
-        rows += scale(per_length, subtract(second.translation, first.translation))
-        # of small turns d the sum over the axes c of c x (c + d x c) is 2 d
-        pairs = zip(first.columns, second.columns, strict=True)
-        rows += scale(0.5, reduce(add, (cross(before, after) for before, after in pairs)))
-    scales = mechanism.row_scales[len(rows) :].tolist()
-    for element, per_unit in zip(mechanism.network.elements, scales, strict=True):
-        if element.is_pair:
-            rows.append(times(per_unit, mechanism.pair_error(element, x, controls)[0].value))
-            continue
-        frames = (posed.bodies[name].frame for name in element.bodies)
-        length = evaluate_expression(element.length, controls).value
-        rows.append(times(per_length, minus(measure_element(element, *frames).distance, length)))
-    return rows
-
-
-def _jacobian(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> list[Column]:
-    per_length, scales = 1.0 / mechanism.length, mechanism.column_scales
-    screws = _free_screws(mechanism, x, posed, controls)
-    first_free = len(mechanism.controls)
-    columns: list[Column] = [[0.0] * mechanism.rows for _ in mechanism.free]
-    cut_joints = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
-    frames = iter_cut_frames(mechanism, x, posed, controls)
-    for row, (joint, (here, _)) in enumerate(zip(cut_joints, frames, strict=True)):
-        for mover, sign in relative_movers(posed.bodies, joint.bodies, joint.name).items():
-            for k, w, v in screws[mover]:
-                factor = sign * float(scales[k])
-                velocity = add(v, cross(w, here.translation))
-                entries = (*scale(factor * per_length, velocity), *scale(factor, w))
-                columns[k - first_free][6 * row : 6 * row + 6] = entries
-    for row, element in enumerate(mechanism.network.elements, 6 * len(cut_joints)):
-        if element.is_pair:
-            error, _ = mechanism.pair_error(element, x, controls)
-            for k in error.gradient.keys() & set(mechanism.free.tolist()):
-                factor = float(scales[k] * mechanism.row_scales[row])
-                columns[k - first_free][row] = times(factor, error.gradient[k])
-            continue
-        measured = measure_element(element, *(posed.bodies[name].frame for name in element.bodies))
-        for mover, sign in relative_movers(posed.bodies, element.bodies).items():
-            for k, w, v in screws[mover]:
-                rate = plus(dot(measured.moment, w), dot(measured.force, v))
-                columns[k - first_free][row] = times(sign * float(scales[k]) * per_length, rate)
-    return columns
-
-
-def iter_cut_frames(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> Iterator[tuple[Transform, Transform]]:
-    """Yield the frame of each cut joint in the ground, once from each of its two bodies."""
-    for cut in mechanism.graph.cuts:
-        joint = mechanism.network.joints[cut]
-        moved = joint_frame(joint, [value.value for value in mechanism.joint_values(joint, x, controls)])
-        yield posed.joints[joint.name] @ moved, posed.bodies[joint.bodies[1]].frame @ joint.frames[1]
-
-
-def _free_screws(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> dict[str, list[tuple[int, Vector, Vector]]]:
-    """Return the free variables of each mover by number, with the twist in the ground of one unit of each."""
-    twists: dict[str, list[tuple[int, Vector, Vector]]] = {}
-    for joint in mechanism.network.joints:
-        drives = joint.drives
-        screws: Twists = []
-        if any(drive is None for drive in drives):
-            values = [value.value for value in mechanism.joint_values(joint, x, controls)]
-            screws = joint_twists(joint, values, posed.joints[joint.name])
-        twists[joint.name] = [
-            (mechanism.variable_index[joint.name, index], *screw)
-            for index, (drive, screw) in enumerate(zip(drives, screws, strict=False))
-            if drive is None
-        ]
-    for name in mechanism.graph.roots[1:]:
-        first = mechanism.variable_index[name, 0]
-        p = posed.bodies[name].frame.translation
-        axes = left_jacobian((x[first + 3], x[first + 4], x[first + 5]))
-        screws = [*TRANSLATION_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
-        twists[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
-    return twists
-
-
-def _vector(x: Sequence[Element], part: slice) -> Vector:
-    """Return the three variables that are a rotation vector in [rad]."""
-    return x[part.start], x[part.start + 1], x[part.start + 2]
-
-
-def _product(first: Sequence[Element], second: Sequence[Element]) -> Element:
-    """Return the scalar product of two lists; constants that are 0 cost nothing."""
-    total: Element = 0.0
-    for a, b in zip(first, second, strict=True):
-        total = plus(total, times(a, b))
-    return total
+# ---------------------------------------------------------------------------------------- rates
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -511,7 +515,7 @@ def compute_rates(
         xdd: Their accelerations per [s2], shape (driven, n).
         driven: Their numbers, shape (driven,) [-].
         free: The numbers of the variables that follow, shape (free,) [-].
-        spins: How many idle spins there are: they stay as they are.
+        spins: The number of idle spins: they stay as they are.
         slopes: Derivatives along the line of the drives at samples where branches meet: x' = x_s s' and
             x'' = x_ss s'^2 + x_s s'' there. The transmission by each of several drives is NaN there.
     """
@@ -520,6 +524,7 @@ def compute_rates(
     transmission = np.zeros((len(x), len(driven), x.shape[1]))
     transmission[driven, np.arange(len(driven))] = 1.0
     distance = np.full(x.shape[1], np.inf)
+    idle_spins = find_idle_spins(mechanism) if spins else ()
     for rows in iter_chunks(x.shape[1]) if len(free) else ():
         jacobian = evaluate_scaled_closure(mechanism, x[:, rows]).jacobian
         followers = jacobian[:, free]
@@ -528,14 +533,16 @@ def compute_rates(
             unit = _solve(followers, -jacobian[:, place] / scales[place]) * scales[free]
             transmission[free, k, rows] = unit
             velocity[free, rows] += unit * xd[k, rows]
-        _hold_spins(mechanism, followers, free, spins, x[:, rows], velocity[:, rows], None)
-        rest = np.zeros_like(x[:, rows])
+        terms = (x[:, rows], velocity[:, rows], acceleration[:, rows])
+        if idle_spins:
+            _hold_spins(mechanism, idle_spins, followers, free, spins, terms[:2])
+        rest = np.zeros_like(terms[0])
         rest[driven] = xdd[:, rows]
-        motion = [Taylor(*terms) for terms in zip(x[:, rows], velocity[:, rows], rest, strict=True)]
-        second = _stack([_derivative(row, 2) for row in closure_residual(mechanism, motion)], rest.shape[1])
-        second = _in_joint_frames(mechanism, x[:, rows], second)
+        residual = closure_residual(mechanism, _taylor(*terms[:2], rest))
+        second = _in_joint_frames(mechanism, terms[0], _stack_derivatives(residual, 2, rest.shape[1]))
         acceleration[free, rows] = _solve(followers, -second) * scales[free]
-        _hold_spins(mechanism, followers, free, spins, x[:, rows], velocity[:, rows], acceleration[:, rows])
+        if idle_spins:
+            _hold_spins(mechanism, idle_spins, followers, free, spins, terms)
         values = np.linalg.svd(followers.transpose(2, 0, 1), compute_uv=False)
         if (place := len(free) - spins - 1) < values.shape[1] and place >= 0:
             distance[rows] = values[:, place]
@@ -548,34 +555,6 @@ def compute_rates(
         for k in range(len(driven)):
             transmission[free[:, np.newaxis], k, near] = ratios
     return Rates(velocity, acceleration, transmission, distance)
-
-
-def point_motion(
-    mechanism: Mechanism,
-    x: FloatArray,
-    xd: FloatArray,
-    xdd: FloatArray,
-    body: str,
-    point: tuple[float, float, float],
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return position [m], velocity [m/s] and acceleration [m/s2] of a point of a body, shape (n, 3) each.
-
-    Args:
-        mechanism: The network.
-        x: Configurations, shape (variables, n), in [m], [rad] and as controls are given.
-        xd: Their velocities per [s], likewise.
-        xdd: Their accelerations per [s2], likewise.
-        body: Name of the body.
-        point: The point in the frame of the body in [m].
-    """
-    parts = np.zeros((3, x.shape[1], 3))
-    for rows in iter_chunks(x.shape[1]):
-        motion = [Taylor(*terms) for terms in zip(x[:, rows], xd[:, rows], xdd[:, rows], strict=True)]
-        place = mechanism.poses(motion)[body].point(point)
-        for k, coordinate in enumerate(place):
-            term = coordinate if isinstance(coordinate, Taylor) else Taylor(coordinate)
-            parts[0, rows, k], parts[1, rows, k], parts[2, rows, k] = term.value, term.first, term.second
-    return parts[0], parts[1], parts[2]
 
 
 def _in_joint_frames(mechanism: Mechanism, x: FloatArray, rows: FloatArray) -> FloatArray:
@@ -599,42 +578,60 @@ def _solve(jacobian: FloatArray, load: FloatArray) -> FloatArray:
 
 def _hold_spins(
     mechanism: Mechanism,
+    spins: Sequence[IdleSpin],
     followers: FloatArray,
     free: IndexArray,
     count: int,
-    x: FloatArray,
-    xd: FloatArray,
-    xdd: FloatArray | None,
+    terms: tuple[FloatArray, ...],
 ) -> None:
-    """Add to velocities, or to accelerations, what keeps the angles of idle spins, along their directions."""
-    spins = find_idle_spins(mechanism)
-    if not (count and spins):
-        return
+    """Add to the last term of x, x', x'' what keeps the angles of idle spins, along their directions."""
+    x, target, order = terms[0], terms[-1], len(terms) - 1
     n = x.shape[1]
     directions = np.linalg.svd(followers.transpose(2, 0, 1))[2][:, len(free) - count :]
     scales = mechanism.column_scales[free, np.newaxis]
-    target = xd if xdd is None else xdd
-    motion = [Taylor(*terms) for terms in zip(x, xd, np.zeros_like(x) if xdd is None else xdd, strict=True)]
-    angles = spin_angles(mechanism, spins, motion)
-    rates = _stack([_derivative(angle, 1 if xdd is None else 2) for angle in angles], n)
+    rates = _stack_derivatives(spin_angles(mechanism, spins, _taylor(*terms)), order, n)
     by_direction = np.empty((len(spins), count, n))
     for k in range(count):
         unit = np.zeros_like(x)
         unit[free] = directions[:, k].T * scales
-        motion = [Taylor(*terms) for terms in zip(x, unit, strict=True)]
-        by_direction[:, k] = _stack([_derivative(one, 1) for one in spin_angles(mechanism, spins, motion)], n)
+        by_direction[:, k] = _stack_derivatives(spin_angles(mechanism, spins, _taylor(x, unit)), 1, n)
     shares = np.einsum("nks,sn->kn", np.linalg.pinv(by_direction.transpose(2, 0, 1)), -rates)
     target[free] += np.einsum("nkf,kn->fn", directions, shares) * scales
 
 
-def _derivative(element: Element, order: int) -> Element:
-    if not isinstance(element, Taylor):
-        return 0.0
-    return element.first if order == 1 else element.second
+def _taylor(*terms: FloatArray) -> list[Taylor]:
+    """Return one series per variable of x, x', x'', shape (variables, n) each."""
+    return [Taylor(*row) for row in zip(*terms, strict=True)]
 
 
-def _stack(elements: Sequence[Element], n: int) -> FloatArray:
-    rows = np.zeros((len(elements), n))
-    for k, element in enumerate(elements):
-        rows[k] = element
-    return rows
+def _stack_derivatives(elements: Sequence[Element], order: int, n: int) -> FloatArray:
+    """Return first or second derivatives of elements as rows, shape (k, n); 0 of constants."""
+    series = [element if isinstance(element, Taylor) else Taylor(element) for element in elements]
+    return stack_elements([term.first if order == 1 else term.second for term in series], n)
+
+
+def point_motion(
+    mechanism: Mechanism,
+    x: FloatArray,
+    xd: FloatArray,
+    xdd: FloatArray,
+    body: str,
+    point: tuple[float, float, float],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return position [m], velocity [m/s] and acceleration [m/s2] of a point of a body, shape (n, 3) each.
+
+    Args:
+        mechanism: The network.
+        x: Configurations, shape (variables, n), in [m], [rad] and as controls are given.
+        xd: Their velocities per [s], likewise.
+        xdd: Their accelerations per [s2], likewise.
+        body: Name of the body.
+        point: The point in the frame of the body in [m].
+    """
+    parts = np.zeros((3, x.shape[1], 3))
+    for rows in iter_chunks(x.shape[1]):
+        motion = _taylor(x[:, rows], xd[:, rows], xdd[:, rows])
+        for k, coordinate in enumerate(mechanism.poses(motion)[body].point(point)):
+            term = coordinate if isinstance(coordinate, Taylor) else Taylor(coordinate)
+            parts[0, rows, k], parts[1, rows, k], parts[2, rows, k] = term.value, term.first, term.second
+    return parts[0], parts[1], parts[2]

@@ -1,10 +1,10 @@
 """Motion of a network along the rows of a log: one configuration per row, on the branch of the first one.
 
-1. `follow` solves coarse rows first, apart by a scaled length of COARSE of the drives, side by side: each
-   along a straight line of the drives from an earlier row, at most MAX_LINE away.
+1. `follow_rows` solves coarse rows first, apart by a scaled length of COARSE_LENGTH of the drives, side by
+   side: each along a straight line of the drives from an earlier row, at most MAX_LINE away.
 2. Such a line may end on another branch than the log does. So each pair of neighbours is verified: their
    difference must agree with the tangents at both, and the Jacobian must keep its orientation. Where a pair
-   fails, the rows between are traced one after another (`motion.trace`), until both agree again.
+   fails, the rows between are traced one after another (`motion.trace_branch`), until both agree again.
 3. The rows between are solved side by side, from the tangents at both neighbours, and verified likewise.
 """
 
@@ -17,7 +17,12 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
 from urmpipe_models.ik.numeric import damped_step
-from urmpipe_models.networks.closure import MIN_DAMPING, evaluate_scaled_closure
+from urmpipe_models.networks.closure import (
+    MIN_DAMPING,
+    close_by_newton,
+    evaluate_scaled_closure,
+    iter_chunks,
+)
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import find_idle_spins, reset_idle_spins
 from urmpipe_models.networks.motion import (
@@ -25,18 +30,13 @@ from urmpipe_models.networks.motion import (
     Drive,
     LimitStop,
     SingularPose,
-    close_by_newton,
-    iter_chunks,
-    nearest_rotations,
     sample_branch,
     trace_branch,
 )
 
-MAX_LINE = 3.0  # scaled length of the lines from a row along which others are solved, in steps of 2 COARSE
+MAX_LINE = 3.0  # scaled length of the lines from a row along which others are solved
 COARSE_LENGTH = 0.05  # scaled length of the drives between rows that are solved first
-MAX_DISAGREEMENT = (
-    0.1  # share of a difference by which the tangents may miss it; usual is the square of COARSE
-)
+MAX_DISAGREEMENT = 0.1  # share of a difference by which the tangents may miss it; COARSE_LENGTH^2 is usual
 SAME_SOLUTION = 1e-7  # scaled difference below which two solutions are the same
 
 
@@ -75,8 +75,7 @@ def follow_rows(
         limits: Lower and upper limits of all variables in [m], [rad], shape (variables, 2).
         progress: Called with the share that is done, 0..1.
     """
-    following = _Follower(mechanism, x, driven, rows, free, limits)
-    return following.run(progress)
+    return _Follower(mechanism, x, driven, rows, free, limits).run(progress)
 
 
 class _Follower:
@@ -103,7 +102,10 @@ class _Follower:
         """Solve the coarse rows piece by piece and verify them, then fill in the others, and verify all."""
         first, last = 0, 0
         while first < len(self.coarse) - 1:
-            piece = self._piece(first)
+            coarse = self.coarse[first:]
+            distance = np.linalg.norm(self.scaled[coarse] - self.scaled[coarse[0]], axis=1)
+            far = np.flatnonzero(distance > MAX_LINE)
+            piece = coarse[: max(int(far[0]), 2)] if len(far) else coarse
             with np.errstate(all="ignore"):  # rows out of reach: their values are not finite, and verified
                 self.motion.x[:, piece[1:]] = self._along_lines(int(piece[0]), piece[1:])
             last = self._verify(piece)
@@ -123,13 +125,6 @@ class _Follower:
         self.motion.singular = [poses[s] for s in sorted(poses)]
         return self.motion
 
-    def _piece(self, first: int) -> IndexArray:
-        """Return coarse rows from a number on whose lines to the first of them are short."""
-        coarse = self.coarse[first:]
-        away = np.linalg.norm(self.scaled[coarse] - self.scaled[coarse[0]], axis=1)
-        far = np.flatnonzero(away > MAX_LINE)
-        return coarse[: max(int(far[0]), 2)] if len(far) else coarse
-
     def _along_lines(self, row: int, ends: IndexArray) -> FloatArray:
         """Return configurations of rows, each along a line of the drives from one row."""
         start, values = self.motion.x[:, row], self.rows[ends].T
@@ -142,7 +137,7 @@ class _Follower:
             local = x[:, chunk]
             for step in range(1, steps + 1):
                 local[self.driven] = begin + step / steps * (values[:, chunk] - begin)
-                local = close_by_newton(self.mechanism, local, self.free, wrap=True)[0]
+                local = close_by_newton(self.mechanism, local, self.free, wrap=True)
             x[:, chunk] = local
         return reset_idle_spins(self.mechanism, self.spins, x, self.start)
 
@@ -150,21 +145,20 @@ class _Follower:
         """Verify coarse rows, correct those of other branches, and return the last row reached."""
         x = self.motion.x
         good = self._is_continuous(x[:, coarse[:-1]], x[:, coarse[1:]])
-        synchronous = True
+        is_on_line = True  # whether the last row is on the branch on which its line ended
         for k in range(len(coarse) - 1):
             first, second = int(coarse[k]), int(coarse[k + 1])
-            if synchronous and good[k]:
+            if is_on_line and good[k]:
                 continue
             line = x[:, second].copy()
-            end = self._step(x[:, first], second) if not synchronous else None
+            end = self._step(x[:, first], second) if not is_on_line else None
             if end is None:
                 last, end = self._trace_rows(first, second)
                 if last < second:
                     return last
             x[:, second] = end
-            synchronous = bool(
-                np.abs(self._difference(line[:, np.newaxis], end[:, np.newaxis])).max() < SAME_SOLUTION
-            )
+            difference = self._difference(line[:, np.newaxis], end[:, np.newaxis])
+            is_on_line = bool(np.abs(difference).max() < SAME_SOLUTION)
         return int(coarse[-1])
 
     def _step(self, x: FloatArray, row: int) -> FloatArray | None:
@@ -173,12 +167,8 @@ class _Follower:
         end[self.driven] = self.rows[row][:, np.newaxis]
         change = end - x[:, np.newaxis]
         end[self.free] += self._tangents(x[:, np.newaxis], change)[self.free]
-        end = reset_idle_spins(
-            self.mechanism,
-            self.spins,
-            close_by_newton(self.mechanism, end, self.free, wrap=True)[0],
-            self.start,
-        )
+        end = close_by_newton(self.mechanism, end, self.free, wrap=True)
+        end = reset_idle_spins(self.mechanism, self.spins, end, self.start)
         return end[:, 0] if self._is_continuous(x[:, np.newaxis], end)[0] else None
 
     def _trace_rows(self, first: int, second: int) -> tuple[int, FloatArray]:
@@ -221,10 +211,10 @@ class _Follower:
             change = np.zeros_like(x)
             change[self.driven] = x[self.driven] - known[:, ends][self.driven]
             predicted.append(known[:, ends] + self._tangents(known[:, ends], change))
-        near = nearest_rotations(self.mechanism, predicted[1], predicted[0])
+        near = _nearest_rotations(self.mechanism, predicted[1], predicted[0])
         x[self.free] = ((1.0 - weight) * predicted[0] + weight * near)[self.free]
         with np.errstate(all="ignore"):  # rows out of reach between coarse rows that are within
-            solved = close_by_newton(self.mechanism, x, self.free, wrap=True)[0]
+            solved = close_by_newton(self.mechanism, x, self.free, wrap=True)
             solved = reset_idle_spins(self.mechanism, self.spins, solved, self.start)
             good = self._is_continuous(known[:, first], solved)
         known[:, rows] = solved
@@ -248,11 +238,11 @@ class _Follower:
             change[self.driven] = other[self.driven] - local[self.driven]
             mean = 0.5 * (self._tangents(local, change) + self._tangents(other, change))
             scales = self.mechanism.column_scales[:, np.newaxis]
-            miss = np.linalg.norm(((difference - mean) / scales)[self.free], axis=0)
+            error = np.linalg.norm(((difference - mean) / scales)[self.free], axis=0)
             size = np.linalg.norm((difference / scales)[self.free], axis=0)
             closures = [evaluate_scaled_closure(self.mechanism, x) for x in (local, other)]
             closed = np.abs(closures[1].residual).max(axis=0, initial=0.0) < 1e3 * ROUNDING
-            is_good = closed & (miss < MAX_DISAGREEMENT * size + SAME_SOLUTION)
+            is_good = closed & (error < MAX_DISAGREEMENT * size + SAME_SOLUTION)
             if not self.spins:
                 jacobians = [closure.jacobian[:, self.free] for closure in closures]
                 products = np.einsum("kin,kjn->nij", *jacobians)
@@ -263,7 +253,7 @@ class _Follower:
 
     def _difference(self, first: FloatArray, second: FloatArray) -> FloatArray:
         """Return x_2 - x_1 with rotation vectors next to each other."""
-        return np.asarray(nearest_rotations(self.mechanism, second, first) - first)
+        return np.asarray(_nearest_rotations(self.mechanism, second, first) - first)
 
     def _tangents(self, x: FloatArray, change: FloatArray) -> FloatArray:
         """Return how all variables change with the driven ones, to first order, shape (variables, n)."""
@@ -290,3 +280,17 @@ class _Follower:
         x = before + share * (after - before)
         self.motion.stop = LimitStop(labels[place], unit, limit, row - 1 + share, x)
         self.motion.x = self.motion.x[:, :row]
+
+
+def _nearest_rotations(mechanism: Mechanism, x: FloatArray, to: FloatArray) -> FloatArray:
+    """Return configurations whose rotation vectors are the same rotations, nearest to those of others.
+
+    q and (1 - 2 pi / |q|) q are one rotation.
+    """
+    x = np.array(x)
+    for part in mechanism.rotations:
+        angle = np.sqrt(np.einsum("kn,kn->n", x[part], x[part]))
+        other = x[part] * (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9))
+        squares = [np.square(vector - to[part]).sum(axis=0) for vector in (x[part], other)]
+        x[part] = np.where((squares[1] < squares[0]) & (angle > 1e-9), other, x[part])
+    return x
