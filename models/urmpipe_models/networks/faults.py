@@ -1,90 +1,103 @@
-"""What is wrong with the parts of a network: names, bodies, joints, elements and controls.
+"""Validation of the parts of a network: every error, with its place in a file.
 
-What is wrong with a network at values of its controls: numbers, lengths, user joints, parallel lines.
+1. `validate_parts`: the structure, then values, then parallel lines.
+2. Structure: names, bodies and their starts, joints and their limits, elements, higher pairs, controls.
+3. `validate_values`: the values of functions at values of the controls: finite numbers, lengths, and the axes
+   of user joints, which must be orthonormal over the ranges of the controls.
+4. Lines of crc elements that are parallel at the start of assembly.
+
+An error that may follow from an unreadable part of a file has a kind: "untied", a body without a joint or an
+element, "idle", a control that drives nothing, "parallel", two lines, and "coupled", a joint of a pair.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, get_args
+from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 
 from urmpipe_models.elementwise import Element, FloatArray, Vector, cross, dot, subtract
 from urmpipe_models.errors import Finding, closest_name, format_unknown_name, format_value
-from urmpipe_models.networks.elements import pair_faults
+from urmpipe_models.networks.joint_motion import TURN
 from urmpipe_models.networks.mechanism import build_graph, build_mechanism
 from urmpipe_models.networks.parts import (
     AXES_TOLERANCE,
     JOINT_UNITS,
+    MAX_POINTS,
+    MIN_POINTS,
+    PAIR_JOINTS,
     POSE_UNITS,
     ConstraintElement,
     Control,
     ElementKind,
     Joint,
     Parts,
-    control_faults,
+    PlacedExpression,
+    Profile,
+    is_control_name,
+    pair_bodies,
     sample_range,
     sort_controls,
 )
 
-if TYPE_CHECKING:
-    from urmpipe_models.math3d import Transform
-
-MOST = 500
-"""Joints and elements of a network at most: the search for an assembly solves for all of them at once."""
+MAX_CONSTRAINTS = 500  # joints and elements: the search for an assembly solves for all of them at once
+MAX_VALUE = 1e9  # [m], [rad] of a mechanism: beyond, rounding leaves no digits of it
+MIN_SINE = 1e-9  # of the angle of two lines that have a common normal
+SAMPLES = 11  # values of a control, over its range, at which user joints are checked
 
 
 def validate_parts(parts: Parts) -> Iterator[Finding]:
-    """Yield what is wrong with the parts of a network.
-
-    What may follow from something that could not be read has a kind: "untied", a body that nothing ties,
-    "idle", a control that drives nothing, "parallel", two lines, and "coupled", a joint of a pair.
-    """
-    found = [*_structure_faults(parts), *validate_values(parts)]
-    yield from found or lines_faults(parts)
+    """Yield the errors of the parts of a network; of parallel lines only if there are no others."""
+    faults = [*_validate_structure(parts), *validate_values(parts)]
+    yield from faults or _validate_lines(parts)
 
 
-def _structure_faults(parts: Parts) -> Iterator[Finding]:
-    """Yield what is wrong whatever the values of controls are."""
+def _validate_structure(parts: Parts) -> Iterator[Finding]:
+    """Yield errors that do not depend on the values of controls."""
     if not parts.constraints:
         message = "found none, and no elements; allowed: at least one of them"
         yield Finding(message, about="joints", kind="untied")
-    if len(parts.constraints) > MOST:
-        message = f"found {len(parts.constraints)} with elements and those of chains, allowed: {MOST} at most"
+    if (count := len(parts.constraints)) > MAX_CONSTRAINTS:
+        message = f"found {count} with elements and those of chains, allowed: {MAX_CONSTRAINTS} at most"
         yield Finding(message, about="joints")
-    yield from _name_faults(parts)
-    yield from _body_faults(parts)
-    for where, tie in parts.constraints:
-        if isinstance(tie, Joint) or not tie.is_pair:
-            yield from _tie_faults(where, tie, parts.body_names)
+    yield from _validate_names(parts)
+    yield from _validate_bodies(parts)
+    yield from _validate_starts(parts)
+    for where, constraint in parts.constraints:
+        if isinstance(constraint, Joint) or not constraint.is_pair:
+            yield from _validate_ends(where, constraint, parts.body_names)
     for joint in parts.joints:
-        yield from _joint_faults(f"joints.{joint.name}", joint)
-        yield from _limit_faults(f"joints.{joint.name}", joint)
+        yield from _validate_joint(f"joints.{joint.name}", joint)
+        yield from _validate_limits(f"joints.{joint.name}", joint)
     for element in parts.elements:
         if element.is_pair:
-            yield from pair_faults(f"elements.{element.name}", element, parts)
+            yield from _validate_pair(f"elements.{element.name}", element, parts)
         else:
-            yield from _element_faults(f"elements.{element.name}", element)
-    yield from control_faults(parts)
+            yield from _validate_element(f"elements.{element.name}", element)
+    yield from _validate_controls(parts)
 
 
-def _name_faults(parts: Parts) -> Iterator[Finding]:
-    """Yield names that stand for two things.
+# --- names and bodies
 
-    A body may have the name of the joint that carries it, as those of a chain, unless it has freedoms of its
-    own: these would be called like the joint's.
+
+def _validate_names(parts: Parts) -> Iterator[Finding]:
+    """Yield duplicate names.
+
+    A body may have the name of the joint that carries it, as those of a chain, unless it has freedoms: these
+    would have the names of the joint's.
     """
     known, free = set(parts.body_names), set(build_graph(parts).roots)
-    carriers = (one for one in parts.joints if one.name == one.bodies[1])
-    carried = {one.name for one in carriers if one.name not in free or one.bodies[0] not in known}
-    named = [("bodies", name) for name in parts.body_names if name not in carried]
-    named += [("joints", one.name) for one in parts.joints]
-    named += [("elements", one.name) for one in parts.elements]
-    named += [("controls", one.name) for one in parts.controls]
+    carriers = (joint for joint in parts.joints if joint.name == joint.bodies[1])
+    carried = {joint.name for joint in carriers if joint.name not in free or joint.bodies[0] not in known}
+    names = [("bodies", name) for name in parts.body_names if name not in carried]
+    names += [("joints", joint.name) for joint in parts.joints]
+    names += [("elements", element.name) for element in parts.elements]
+    names += [("controls", control.name) for control in parts.controls]
     first: dict[str, str] = {}
-    for table, name in named:
+    for table, name in names:
         where = f"{table}.{name}"
         if table != "controls" and not name.strip():
             yield Finding(f"found {format_value(name)} as a name, allowed: one that can be seen", about=where)
@@ -93,9 +106,8 @@ def _name_faults(parts: Parts) -> Iterator[Finding]:
         first.setdefault(name, where)
 
 
-def _body_faults(parts: Parts) -> Iterator[Finding]:
-    """Yield bodies that nothing ties, and starts that are not allowed."""
-    tied = {name for _, tie in parts.constraints for name in tie.bodies}
+def _validate_bodies(parts: Parts) -> Iterator[Finding]:
+    tied = {name for _, constraint in parts.constraints for name in constraint.bodies}
     tied |= {closest_name(name, parts.body_names) or "" for name in tied - set(parts.body_names)}
     for body in parts.bodies:
         where = f"bodies.{body.name}"
@@ -105,54 +117,93 @@ def _body_faults(parts: Parts) -> Iterator[Finding]:
         if body.start and len(body.start) != len(POSE_UNITS):
             count = f"{len(body.start)} numbers, allowed: 6: x, y, z and a rotation vector"
             yield Finding(f"found {count}", about=f"{where}.start")
-        yield from _finite_faults(f"{where}.start", body.start)
-    yield from _start_faults(parts)
+        yield from _validate_numbers(f"{where}.start", body.start)
 
 
-def _start_faults(parts: Parts) -> Iterator[Finding]:
-    """Yield starts of bodies whose pose joints give."""
-    started = {one.name for one in parts.bodies if one.start}
+def _validate_starts(parts: Parts) -> Iterator[Finding]:
+    """Yield starts of bodies whose pose follows from joints."""
+    started = {body.name for body in parts.bodies if body.start}
     for cluster in build_graph(parts).clusters:
-        if cluster[0] == parts.ground:
-            reason, others = f"joints tie it to {parts.ground}", started.intersection(cluster)
-        else:  # a root is a body with a start, if there is one
-            reason, others = (
-                f"joints tie it to {cluster[0]}, which has one",
-                started.intersection(cluster[1:]),
-            )
-        for name in sorted(others):
+        root = cluster[0]  # a body with a start, if there is one
+        if root == parts.ground:
+            reason, needless = f"joints tie it to {root}", started.intersection(cluster)
+        else:
+            reason, needless = f"joints tie it to {root}, which has one", started.intersection(cluster[1:])
+        for name in sorted(needless):
             allowed = "one for all bodies that joints tie together, none for those tied to the ground"
             yield Finding(f"found a start, but {reason}; allowed: {allowed}", about=f"bodies.{name}.start")
 
 
-def _tie_faults(where: str, tie: Joint | ConstraintElement, names: tuple[str, ...]) -> Iterator[Finding]:
-    """Yield what is wrong with the bodies of a joint or an element."""
-    for name in tie.bodies:
+def _validate_ends(
+    where: str, constraint: Joint | ConstraintElement, names: tuple[str, ...]
+) -> Iterator[Finding]:
+    first, second = constraint.bodies
+    for name in (first, second):
         if name not in names:
             yield Finding(f"body {format_unknown_name(name, names)}", about=f"{where}.bodies")
-    if tie.bodies[0] == tie.bodies[1]:
-        yield Finding(f"found {tie.bodies[0]} twice, allowed: two bodies", about=f"{where}.bodies")
+    if first == second:
+        yield Finding(f"found {first} twice, allowed: two bodies", about=f"{where}.bodies")
 
 
-def _joint_faults(where: str, joint: Joint) -> Iterator[Finding]:
-    """Yield what is wrong with a joint by itself."""
+def _validate_numbers(where: str, numbers: tuple[float, ...]) -> Iterator[Finding]:
+    """Yield the first number that is not finite, else the first that is too large."""
+    if infinite := [number for number in numbers if not math.isfinite(number)]:
+        yield Finding(f"found {infinite[0]:g}, allowed: a finite number", about=where)
+    elif large := [number for number in numbers if abs(number) > MAX_VALUE]:
+        yield Finding(f"found {large[0]:g}, allowed: {MAX_VALUE:g} at most, in m or rad", about=where)
+
+
+# --- joints and elements
+
+
+def _validate_joint(where: str, joint: Joint) -> Iterator[Finding]:
     if joint.kind not in JOINT_UNITS:
         yield Finding(format_unknown_name(joint.kind, JOINT_UNITS), about=f"{where}.kind")
         return
-    if joint.kind == "user":
-        yield from _user_faults(where, joint)
-        return
-    count = len(joint.units)
-    for key, given in (("start", joint.start), ("value", joint.values)):
-        if len(given) not in {0, count}:
-            yield Finding(f"found {len(given)} of them, allowed: {count}", about=f"{where}.{key}")
-    yield from _finite_faults(f"{where}.start", joint.start)
-    yield from _finite_faults(f"{where}.pitch", (joint.pitch,))
-    yield from _frame_faults(where, joint.frames)
+    count, is_user = len(joint.units), joint.kind == "user"
+    for key, values in (("start", joint.start), ("value", joint.values)):
+        if is_user and values:
+            message = "found some, allowed: none of a user joint: m, n and a move it"
+            yield Finding(message, about=f"{where}.{key}")
+        elif len(values) not in {0, count}:
+            yield Finding(f"found {len(values)} of them, allowed: {count}", about=f"{where}.{key}")
+    if is_user and len(joint.motion) != 9:
+        allowed = "9: of m, n and a three each"
+        yield Finding(f"found {len(joint.motion)} functions, allowed: {allowed}", about=where)
+    if not is_user:
+        yield from _validate_numbers(f"{where}.start", joint.start)
+        yield from _validate_numbers(f"{where}.pitch", (joint.pitch,))
+    yield from _validate_frames(where, joint)
 
 
-def _limit_faults(where: str, joint: Joint) -> Iterator[Finding]:
-    """Yield limits that a joint cannot have."""
+def _validate_frames(where: str, joint: Joint) -> Iterator[Finding]:
+    """Yield frames whose axes are not orthonormal, one error if both are the same."""
+    is_same = joint.frames[0] == joint.frames[1]
+    for frame, body in zip(joint.frames[: 1 if is_same else 2], ("first", "second"), strict=False):
+        m, n, k = frame.columns
+        errors = math.sqrt(dot(m, m)) - 1.0, math.sqrt(dot(n, n)) - 1.0, dot(m, n)
+        of = "" if is_same else f" in the {body} body"
+        is_unit_m, is_unit_n, is_perpendicular = (abs(error) <= AXES_TOLERANCE for error in errors)
+        if is_unit_m and is_unit_n and abs(errors[2]) > AXES_TOLERANCE:
+            allowed = f"{AXES_TOLERANCE:g} at most, or no m: then one perpendicular to n is taken"
+            message = f"m is not perpendicular to n{of}: m . n = {errors[2]:.3g}; allowed: {allowed}"
+            yield Finding(message, about=f"{where}.m")
+        elif not (is_unit_m and is_unit_n and is_perpendicular):
+            key = "m" if is_unit_n and is_perpendicular else "n"
+            yield Finding(_format_axes_error(errors, of), about=f"{where}.{key}")
+        elif not all(abs(error) <= AXES_TOLERANCE for error in subtract(cross(m, n), k)):
+            yield Finding(f"the third axis{of} is not m x n", about=where)
+        yield from _validate_numbers(f"{where}.a", frame.translation)
+
+
+def _format_axes_error(errors: Sequence[float] | FloatArray, place: str) -> str:
+    """Return the message of axes with the errors |m| - 1, |n| - 1 and m . n [-] at a place."""
+    m, n, product = errors
+    values = f"|m| - 1 = {m:.3g}, |n| - 1 = {n:.3g}, m . n = {product:.3g}"
+    return f"m and n are not orthonormal{place}: {values}; allowed: {AXES_TOLERANCE:g} at most"
+
+
+def _validate_limits(where: str, joint: Joint) -> Iterator[Finding]:
     if not joint.limits:
         return
     count = 0 if joint.kind in ("global", "user") else len(joint.units)
@@ -166,175 +217,246 @@ def _limit_faults(where: str, joint: Joint) -> Iterator[Finding]:
             yield Finding(message, about=f"{where}.lower")
 
 
-def _user_faults(where: str, joint: Joint) -> Iterator[Finding]:
-    """Yield what a user joint has and may not have, or the other way round."""
-    for key, given in (("start", joint.start), ("value", joint.values)):
-        if given:
-            yield Finding(
-                "found some, allowed: none of a user joint: m, n and a move it", about=f"{where}.{key}"
-            )
-    if len(joint.motion) != 9:
-        allowed = "9: of m, n and a three each"
-        yield Finding(f"found {len(joint.motion)} functions, allowed: {allowed}", about=where)
-    yield from _frame_faults(where, joint.frames)
-
-
-def _frame_faults(where: str, frames: tuple[Transform, Transform]) -> Iterator[Finding]:
-    """Yield the frames of a joint whose axes are not orthonormal, one finding if both are the same."""
-    for frame, body in zip(frames[: 1 + (frames[0] != frames[1])], ("first", "second"), strict=False):
-        m, n, k = frame.columns
-        off = math.sqrt(dot(m, m)) - 1.0, math.sqrt(dot(n, n)) - 1.0, dot(m, n)
-        of = f" in the {body} body" if frames[0] != frames[1] else ""
-        if all(abs(one) <= AXES_TOLERANCE for one in off[:2]) and abs(off[2]) > AXES_TOLERANCE:
-            allowed = f"{AXES_TOLERANCE:g} at most, or no m: then one perpendicular to n is taken"
-            message = f"m is not perpendicular to n{of}: m . n = {off[2]:.3g}; allowed: {allowed}"
-            yield Finding(message, about=f"{where}.m")
-        elif not all(abs(one) <= AXES_TOLERANCE for one in off):
-            key = "m" if all(abs(one) <= AXES_TOLERANCE for one in off[1:]) else "n"
-            yield Finding(not_orthonormal(off, of), about=f"{where}.{key}")
-        elif not all(abs(one) <= AXES_TOLERANCE for one in subtract(cross(m, n), k)):
-            yield Finding(f"the third axis{of} is not m x n", about=where)
-        yield from _finite_faults(f"{where}.a", frame.translation)
-
-
-def _element_faults(where: str, element: ConstraintElement) -> Iterator[Finding]:
-    """Yield what is wrong with an element by itself."""
+def _validate_element(where: str, element: ConstraintElement) -> Iterator[Finding]:
     kinds = get_args(ElementKind)
     if element.kind not in kinds:
         yield Finding(format_unknown_name(element.kind, kinds), about=f"{where}.kind")
         return
     normals: tuple[Vector, ...] = {"gg": (), "crc": element.normals}.get(element.kind, element.normals[:1])
     for n in dict.fromkeys(normals):
-        off = math.sqrt(dot(n, n)) - 1.0
-        if not abs(off) <= AXES_TOLERANCE:
-            message = f"is not a unit vector: |n| - 1 = {off:.3g}; allowed: {AXES_TOLERANCE:g} at most"
+        error = math.sqrt(dot(n, n)) - 1.0
+        if not abs(error) <= AXES_TOLERANCE:
+            message = f"is not a unit vector: |n| - 1 = {error:.3g}; allowed: {AXES_TOLERANCE:g} at most"
             yield Finding(message, about=f"{where}.n")
     for point in element.points[element.kind == "eg" :]:
-        yield from _finite_faults(f"{where}.a", point)
+        yield from _validate_numbers(f"{where}.a", point)
 
 
-def _finite_faults(where: str, numbers: tuple[float, ...]) -> Iterator[Finding]:
-    """Yield the first number that is none, infinite or of no mechanism."""
-    if wrong := [one for one in numbers if not math.isfinite(one)]:
-        yield Finding(f"found {wrong[0]:g}, allowed: a finite number", about=where)
-    elif wrong := [one for one in numbers if abs(one) > LARGEST]:
-        yield Finding(f"found {wrong[0]:g}, allowed: {LARGEST:g} at most, in m or rad", about=where)
+# --- higher pairs
 
 
-LARGEST = 1e9
-"""No length in [m] or angle in [rad] of a mechanism is larger: rounding would leave nothing of it."""
+def _validate_pair(where: str, element: ConstraintElement, parts: Parts) -> Iterator[Finding]:
+    yield from _validate_coupled(where, element, parts)
+    if element.kind == "gear":
+        yield from _validate_teeth(f"{where}.teeth", element.teeth)
+    elif element.kind == "rack" and not 0.0 < abs(element.radius) <= MAX_VALUE:
+        allowed = f"a radius other than 0, {MAX_VALUE:g} m at most; its sign is that of the motion"
+        yield Finding(f"found {element.radius:g} m, allowed: {allowed}", about=f"{where}.radius")
+    elif element.kind == "cam":
+        yield from _validate_profile(f"{where}.profile", element.profile)
 
-PARALLEL = 1e-9
-"""Below this sine of their angle two lines have no common normal."""
 
-SAMPLES = 11
-"""At so many values of a control, from its least to its largest, a user joint is looked at."""
+def _validate_coupled(where: str, element: ConstraintElement, parts: Parts) -> Iterator[Finding]:
+    """Yield unknown joints, joints of the wrong kind, and a joint that is named twice."""
+    place, joints = f"{where}.joints", {joint.name: joint for joint in parts.joints}
+    if len(element.joints) != 2:
+        yield Finding(f"found {len(element.joints)}, allowed: the names of two joints", about=place)
+        return
+    if element.joints[0] == element.joints[1]:
+        yield Finding(f"found {element.joints[0]} twice, allowed: two joints", about=place)
+    kinds = PAIR_JOINTS[element.kind]
+    for name, allowed, order in zip(element.joints, kinds, ("first", "second"), strict=True):
+        if name not in joints:
+            yield Finding(f"joint {format_unknown_name(name, joints)}", about=place, kind="coupled")
+        elif joints[name].kind not in allowed:
+            message = f"found {name}, a {joints[name].kind} joint, allowed as the {order} of a {element.kind}"
+            yield Finding(f"{message}: {', '.join(allowed)}", about=place, kind="coupled")
+    known = [joints[name] for name in element.joints if name in joints]
+    if len(known) == 2 and element.bodies != (ends := pair_bodies(*known)):
+        message = f"found {', '.join(element.bodies)}, allowed: those of its joints, {', '.join(ends)}"
+        yield Finding(message, about=f"{where}.bodies")
+
+
+def _validate_teeth(where: str, teeth: tuple[float, ...]) -> Iterator[Finding]:
+    allowed = "two numbers other than 0, at most one of them negative: that of an internal wheel"
+    if len(teeth) != 2 or not all(0.0 < abs(count) <= MAX_VALUE for count in teeth) or max(teeth) < 0.0:
+        yield Finding(f"found {', '.join(f'{count:g}' for count in teeth)}, allowed: {allowed}", about=where)
+
+
+def _validate_profile(where: str, profile: Profile) -> Iterator[Finding]:
+    """Yield a number of points, numbers and angles that do not define a periodic spline."""
+    if not MIN_POINTS <= len(profile) <= MAX_POINTS:
+        yield Finding(f"found {len(profile)} points, allowed: {MIN_POINTS} to {MAX_POINTS}", about=where)
+    for k, row in enumerate(profile):
+        if not all(abs(number) <= MAX_VALUE for number in row):  # NaN is not, either
+            text = ", ".join(f"{number:g}" for number in row)
+            yield Finding(f"found {text}, allowed: finite numbers of a mechanism", about=f"{where}[{k}]")
+    for k, ((before, _), (angle, _)) in enumerate(pairwise(profile), 1):
+        if angle <= before:
+            message = f"found the angle {angle:g} rad after {before:g} rad"
+            yield Finding(f"{message}, allowed: angles that increase", about=f"{where}[{k}]")
+    if profile and profile[-1][0] - profile[0][0] >= TURN - 1e-9:
+        span = f"found angles over {profile[-1][0] - profile[0][0]:.6g} rad"
+        reason = "the first point repeats after it"
+        yield Finding(f"{span}, allowed: less than a full turn: {reason}", about=where)
+
+
+# --- controls
+
+
+def _validate_controls(parts: Parts) -> Iterator[Finding]:
+    """Yield errors of controls, and unknown names in functions of them."""
+    for control in parts.controls:
+        yield from _validate_control(f"controls.{control.name}", control)
+    names = sorted({control.name for control in parts.controls})
+    driving = (*parts.joint_functions, *parts.length_functions)
+    unknown: set[str] = set()
+    for where, function in (*parts.control_functions, *driving):
+        for name in sorted(function.names.difference(names)):
+            unknown.add(name)
+            yield Finding(f"control {format_unknown_name(name, names)}", about=where)
+    for cycle in _iter_cycles(parts.controls):
+        way = " -> ".join((*cycle, cycle[0]))
+        message = f"is a function of itself: {way}; allowed: functions of other controls"
+        yield Finding(message, about=f"controls.{cycle[0]}.value")
+    yield from _validate_use(parts.controls, driving, unknown)
+
+
+def _validate_control(where: str, control: Control) -> Iterator[Finding]:
+    if not is_control_name(control.name):
+        allowed = "a letter, then letters, digits, _; not pi, a function or a word of Python"
+        yield Finding(f"found {format_value(control.name)} as a name, allowed: {allowed}", about=where)
+    if control.value is not None:
+        return
+    lower, start, upper = control.lower, control.start, control.upper
+    if not lower <= upper:
+        message = f"found {lower:g}, above upper, {upper:g}; allowed: at most upper"
+        yield Finding(message, about=f"{where}.lower")
+    elif not math.isfinite(start):
+        yield Finding(f"found {start:g}, allowed: a finite number", about=f"{where}.start")
+    elif not lower <= start <= upper:
+        yield Finding(f"found {start:g}, allowed: {lower:g} to {upper:g}", about=f"{where}.start")
+
+
+def _iter_cycles(controls: tuple[Control, ...]) -> Iterator[list[str]]:
+    """Yield the names of controls that are functions of each other, in a ring."""
+    names = {control.name for control in controls}
+    needs = {
+        control.name: control.value.names & names if control.value else frozenset() for control in controls
+    }
+    while needs:
+        while ready := [name for name, needed in needs.items() if not needed & needs.keys()]:
+            for name in ready:
+                del needs[name]
+        if needs:  # each of these needs another of these
+            way = [next(iter(needs))]
+            while (following := min(needs[way[-1]] & needs.keys())) not in way:
+                way.append(following)
+            cycle = way[way.index(following) :]
+            yield cycle
+            for name in cycle:
+                del needs[name]
+
+
+def _validate_use(
+    controls: tuple[Control, ...], driving: Sequence[PlacedExpression], unknown: set[str]
+) -> Iterator[Finding]:
+    """Yield controls that drive nothing, except those for which an unknown name may stand."""
+    names = [control.name for control in controls]
+    functions = {control.name: control.value.names for control in controls if control.value is not None}
+    added = {name for _, function in driving for name in function.names}
+    added |= {closest_name(name, names) or "" for name in unknown}
+    used: set[str] = set()
+    while added:
+        used |= added
+        added = {name for user in added for name in functions.get(user, ())} - used
+    for name in names:
+        if name not in used:
+            message = "drives nothing; allowed: controls that drive a joint or an element"
+            yield Finding(message, about=f"controls.{name}", kind="idle")
+
+
+# --- values
 
 
 def validate_values(parts: Parts, at: str = "where controls start") -> Iterator[Finding]:
-    """Yield what is wrong with the values of functions, where controls start and over their ranges.
+    """Yield errors of the values of functions, at the starts of controls and over their ranges.
 
     Args:
         parts: The parts.
-        at: Where controls start, in words.
+        at: The values of the controls, as messages name them.
     """
-    values = control_values(parts.controls, {})
+    values = _control_values(parts.controls, {})
     finite = {name: float(value) for name, value in values.items() if math.isfinite(value)}
-    for where, one in (*parts.control_functions, *parts.joint_functions, *parts.length_functions):
-        value = float(one.value(finite)) if one.names <= finite.keys() else 0.0
-        if not abs(value) <= LARGEST:
-            allowed = f"{LARGEST:g} at most, in m or rad" if math.isfinite(value) else "a finite number"
+    for where, function in (*parts.control_functions, *parts.joint_functions, *parts.length_functions):
+        value = float(function.value(finite)) if function.names <= finite.keys() else 0.0
+        if not abs(value) <= MAX_VALUE:
+            allowed = f"{MAX_VALUE:g} at most, in m or rad" if math.isfinite(value) else "a finite number"
             yield Finding(f"found {value:g} {at}, allowed: {allowed}", about=where)
-    yield from _length_faults(parts, finite, at)
+    yield from _validate_lengths(parts, finite, at)
     for joint in parts.joints:
-        if len(joint.motion) == 9 and all(one.names <= finite.keys() for one in joint.motion):
-            yield from _motion_faults(joint, parts.controls, at)
+        if len(joint.motion) == 9 and all(entry.names <= finite.keys() for entry in joint.motion):
+            yield from _validate_motion(joint, parts.controls, at)
 
 
-def control_values(controls: tuple[Control, ...], given: Mapping[str, Element]) -> dict[str, Element]:
-    """Return the value of each control but those of a cycle.
-
-    Args:
-        controls: The controls.
-        given: Values of some that can be set, any elements; the others have their starts.
-    """
-    found: dict[str, Element] = {}
-    for one in sort_controls(controls):
-        found[one.name] = given.get(one.name, one.start) if one.value is None else one.value.value(found)
-    return found
+def _control_values(controls: tuple[Control, ...], settings: Mapping[str, Element]) -> dict[str, Element]:
+    """Return the value of each control, by `settings` or its start, except those of a cycle."""
+    values: dict[str, Element] = {}
+    for control in sort_controls(controls):
+        if control.value is None:
+            values[control.name] = settings.get(control.name, control.start)
+        else:
+            values[control.name] = control.value.value(values)
+    return values
 
 
-def _length_faults(parts: Parts, values: Mapping[str, float], at: str) -> Iterator[Finding]:
-    """Yield lengths that are too small where controls start; h and offsets may be less than 0."""
+def _validate_lengths(parts: Parts, values: Mapping[str, float], at: str) -> Iterator[Finding]:
+    """Yield lengths that are too small; h and offsets may be less than 0."""
     for element, (where, function) in zip(parts.elements, parts.length_functions, strict=True):
         if element.length_key == "d" and function.names <= values.keys():
             length, lines = float(function.value(values)), element.kind == "crc"
             if length < 0.0 or (length == 0.0 and not lines):
                 allowed = "0 or more" if lines else "more than 0"
-                message = f"found {length:g} m {at}, allowed: {allowed}"
-                yield Finding(message, about=where)
+                yield Finding(f"found {length:g} m {at}, allowed: {allowed}", about=where)
 
 
-def _motion_faults(joint: Joint, controls: tuple[Control, ...], at: str) -> Iterator[Finding]:
-    """Yield where m and n of a user joint are not orthonormal: at the start, or along each control."""
+def _validate_motion(joint: Joint, controls: tuple[Control, ...], at: str) -> Iterator[Finding]:
+    """Yield a user joint whose m and n are not orthonormal at the start, else along each control."""
     where = f"joints.{joint.name}.n"
-    worst = _worst(joint, control_values(controls, {}))[1]
-    if not np.max(np.abs(worst)) <= AXES_TOLERANCE:
-        yield Finding(not_orthonormal(worst, f" {at}"), about=where)
+    errors = _worst_axes(joint, _control_values(controls, {}))[1]
+    if not np.max(np.abs(errors)) <= AXES_TOLERANCE:
+        yield Finding(_format_axes_error(errors, f" {at}"), about=where)
         return
-    for one in controls:
-        if one.value is None:
-            low, high = sample_range(one)
-            sampled = np.linspace(low, high, SAMPLES)
-            k, worst = _worst(joint, control_values(controls, {one.name: sampled}))
-            if not np.max(np.abs(worst)) <= AXES_TOLERANCE:
-                message = not_orthonormal(worst, f" at {one.name} = {sampled[k]:.6g}")
-                yield Finding(message, about=where)
+    for control in controls:
+        if control.value is None:
+            samples = np.linspace(*sample_range(control), SAMPLES)
+            k, errors = _worst_axes(joint, _control_values(controls, {control.name: samples}))
+            if not np.max(np.abs(errors)) <= AXES_TOLERANCE:
+                place = f" at {control.name} = {samples[k]:.6g}"
+                yield Finding(_format_axes_error(errors, place), about=where)
 
 
-def _worst(joint: Joint, values: Mapping[str, Element]) -> tuple[int, FloatArray]:
-    """Return where m and n of a user joint are the least orthonormal, and |m| - 1, |n| - 1 and m . n there.
+def _worst_axes(joint: Joint, values: Mapping[str, Element]) -> tuple[int, FloatArray]:
+    """Return the sample with the largest of the errors |m| - 1, |n| - 1 and m . n, and these.
 
     Args:
-        joint: The joint.
+        joint: A user joint.
         values: Of each control a number, or numbers of shape (n,).
     """
-    parts = (np.asarray(one.value(values), float) for one in joint.motion[:6])
-    m, n = np.stack(np.broadcast_arrays(*parts)).reshape(2, 3, -1)
-    with np.errstate(all="ignore"):  # what is no number is the worst
-        off = np.array(
+    entries = (np.asarray(entry.value(values), float) for entry in joint.motion[:6])
+    m, n = np.stack(np.broadcast_arrays(*entries)).reshape(2, 3, -1)
+    with np.errstate(all="ignore"):  # NaN is the worst
+        errors = np.array(
             [np.linalg.norm(m, axis=0) - 1.0, np.linalg.norm(n, axis=0) - 1.0, np.sum(m * n, axis=0)]
         )
-    k = int(np.argmax(np.max(np.abs(np.nan_to_num(off, nan=np.inf)), axis=0)))
-    return k, off[:, k]
+    k = int(np.argmax(np.max(np.abs(np.nan_to_num(errors, nan=np.inf)), axis=0)))
+    return k, errors[:, k]
 
 
-def not_orthonormal(off: Sequence[float] | FloatArray, place: str) -> str:
-    """Return how far m and n are from orthonormal.
-
-    Args:
-        off: |m| - 1, |n| - 1 and m . n [-], shape (3,).
-        place: Where that is so, such as " in the first body".
-    """
-    m, n, both = off
-    found = f"|m| - 1 = {m:.3g}, |n| - 1 = {n:.3g}, m . n = {both:.3g}"
-    return f"m and n are not orthonormal{place}: {found}; allowed: {AXES_TOLERANCE:g} at most"
-
-
-def lines_faults(parts: Parts) -> Iterator[Finding]:
-    """Yield crc elements whose lines are parallel where assembly starts; nothing else may be wrong."""
-    skew = [one for one in parts.elements if one.kind == "crc"]
-    if not skew:
+def _validate_lines(parts: Parts) -> Iterator[Finding]:
+    """Yield crc elements whose lines are parallel at the start of assembly; all else must be valid."""
+    elements = [element for element in parts.elements if element.kind == "crc"]
+    if not elements:
         return
     mechanism = build_mechanism(parts)
     with np.errstate(all="ignore"):  # starts as large as 1e300
         poses = mechanism.poses(mechanism.start.tolist())  # constants: right angles are exact
-    for element in skew:
+    for element in elements:
         first, second = (
             poses[name].rotate(n) for name, n in zip(element.bodies, element.normals, strict=True)
         )
         normal = cross(first, second)
         sine = math.sqrt(dot(normal, normal))
-        if not sine >= PARALLEL:
+        if not sine >= MIN_SINE:
             message = f"the lines are parallel where assembly starts: |n1 x n2| = {sine:.3g}; allowed: more"
             yield Finding(message, about=f"elements.{element.name}.n", kind="parallel")

@@ -1,13 +1,19 @@
-"""A network: parts with which nothing is wrong.
+"""Networks, and their TOML files: read, made SI, and all errors reported at once, by file and line.
 
-Networks as TOML files: read, made SI, and everything that is wrong reported at once, by file and line.
+1. `load_network`: a network by the name of a shipped one, a file, or its tables; docs/networks.md has the
+   keys.
+2. `_Reader`: tables to parts, by `file_values` and `elements`. A valid part replaces each that cannot be
+   read.
+3. Errors of the parts (`faults`) at their places in the file, except those that may follow from a
+   replacement.
+4. `Network`: parts without errors.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -51,21 +57,33 @@ from urmpipe_models.networks.parts import (
 from urmpipe_models.robots.toml import Units
 from urmpipe_models.toml_tables import CheckedTable, read_toml
 
+# the keys that cause each kind of error of the parts if they cannot be read: a body seems to have no joint, a
+# control to drive nothing, lines to be parallel, a joint of a pair to be missing or of another kind
+CAUSES = {
+    "untied": {"bodies", "body", "robot"},
+    "idle": {"driven", "value", "m", "n", "a", "d", "h", "kind"},
+    "parallel": {"bodies", "body", "kind", "driven", "value", "m", "n", "a", "start", "pitch", "s", "theta"},
+    "coupled": {"robot", "kind"},
+}
+
+# the bodies that have points in an element
+POINTS: dict[ElementKind, VectorCount] = {"gg": "one or two", "eg": "one", "crc": "one or two", "gc": "two"}
+
 
 @dataclass(frozen=True, repr=False)
 class Network(Parts, Displayable):
-    """Bodies, and what ties them: joints, constraint elements, controls.
+    """Bodies, and the joints, constraint elements and controls that constrain them.
 
     `urmpipe.load_network` reads one from a file, or makes one of such tables.
 
     Attributes:
-        description: One line for people.
-        source: Where the numbers come from.
-        length_unit: m or mm: the unit in which its file has lengths, and people give them.
-        angle_unit: rad or deg, likewise of angles.
+        description: One line of description.
+        source: The source of the numbers.
+        length_unit: m or mm: the unit of lengths in its file, and of those that users enter.
+        angle_unit: rad or deg: that of angles.
 
     Raises:
-        NetworkError: With everything that is wrong.
+        NetworkError: With all errors.
     """
 
     description: str = ""
@@ -74,37 +92,27 @@ class Network(Parts, Displayable):
     angle_unit: str = field(default="rad", compare=False)
 
     def __post_init__(self) -> None:
-        if found := tuple(dict.fromkeys(validate_parts(self))):
-            raise NetworkError(*found)
+        if faults := tuple(dict.fromkeys(validate_parts(self))):
+            raise NetworkError(*faults)
 
     def _headline(self) -> str:
-        """Return its name, what it is, and how much there is of it."""
+        """Return its name, its description, and the number of its parts."""
         parts = {"body": len(self.bodies) + 1, "joint": len(self.joints), "element": len(self.elements)}
         counts = (
-            f"{count} bodies" if what == "body" else format_count(count, what)
-            for what, count in parts.items()
+            f"{count} bodies" if part == "body" else format_count(count, part)
+            for part, count in parts.items()
             if count
         )
         return format_headline(self.name, self.description, ", ".join(counts))
 
     def _table(self) -> str:
-        """Return a row a joint or element: its name, kind and bodies."""
+        """Return one row per joint or element: its name, kind and bodies."""
         rows = "".join(
-            f"<tr><td>{escape_html(one.name)}</td><td>{one.kind}</td><td>{escape_html(one.bodies[0])}</td>"
-            f"<td>{escape_html(one.bodies[1])}</td></tr>"
-            for _, one in self.constraints
+            f"<tr><td>{escape_html(part.name)}</td><td>{part.kind}</td><td>{escape_html(part.bodies[0])}</td>"
+            f"<td>{escape_html(part.bodies[1])}</td></tr>"
+            for _, part in self.constraints
         )
         return f"<table><tr><th>name</th><th>kind</th><th>body</th><th>body</th></tr>{rows}</table>"
-
-
-READ_BY = {
-    "untied": {"bodies", "body", "robot"},
-    "idle": {"driven", "value", "m", "n", "a", "d", "h", "kind"},
-    "parallel": {"bodies", "body", "kind", "driven", "value", "m", "n", "a", "start", "pitch", "s", "theta"},
-    "coupled": {"robot", "kind"},
-}
-"""The keys without which a body seems to be untied, a control to drive nothing, lines to be parallel, and a
-joint of a pair to be missing or of another kind."""
 
 
 def network_names() -> tuple[str, ...]:
@@ -120,35 +128,38 @@ def load_network(network: str | Path | Mapping[str, Any]) -> Network:
             such as {"joints": {"A": {"kind": "revolute", "bodies": ["ground", "crank"]}}, ...}.
 
     Raises:
-        NetworkError: If there is no such network, or with everything that is wrong with its tables. A
-            finding's `about` is the table or key, such as joints.A.n.
+        NetworkError: If there is no such network, or with all errors of its tables. A finding's `about` is
+            the table or key, such as joints.A.n.
     """
     if isinstance(network, Mapping):
-        return _network(network, "network", Path())
-    path = _path_of(network)
-    data = read_toml(path, NetworkError)
+        return _read_network(network, "network", Path())
+    path = _find_file(network)
+    tables = read_toml(path, NetworkError)
     try:
-        return _network(data, path.stem, path.parent)
+        return _read_network(tables, path.stem, path.parent)
     except NetworkError as error:
         faults = add_line_numbers(path, str(network), error.findings)
-        raise NetworkError(*sorted(faults, key=lambda one: one.line or 0)) from error
+        raise NetworkError(*sorted(faults, key=lambda fault: fault.line or 0)) from error
 
 
-def _network(tables: Mapping[str, Any], name: str, folder: Path) -> Network:
-    """Return the network of tables.
+def _find_file(name_or_path: str | Path) -> Path:
+    path, names = Path(name_or_path), network_names()
+    if path.suffix.lower() == ".toml":
+        return path
+    name = str(name_or_path).casefold().replace("_", "-")
+    if name in names:
+        return NETWORKS / f"{name}.toml"
+    unknown = f"{format_value(str(name_or_path))}{format_suggestion(str(name_or_path), names)}"
+    raise NetworkError(f"unknown network {unknown}; allowed: {', '.join(names)}, or a .toml file")
 
-    Args:
-        tables: The tables.
-        name: Its name where the tables have none.
-        folder: Where files of robots are relative to.
 
-    Raises:
-        NetworkError: With everything that is wrong.
-    """
-    read = _Reader(tables, folder)
-    texts = {key: read.table.text(key, default) for key, default in _texts(name).items()}
-    parts = read.parts()
-    if faults := [*dict.fromkeys((*read.faults, *read.further(parts)))]:
+def _read_network(tables: Mapping[str, Any], default_name: str, folder: Path) -> Network:
+    """Return the network of tables; files of robots and profiles are relative to the folder."""
+    reader = _Reader(tables, folder)
+    defaults = {"name": default_name, "description": "", "source": ""}
+    texts = {key: reader.table.text(key, default) for key, default in defaults.items()}
+    parts = reader.read_parts()
+    if faults := [*dict.fromkeys((*reader.faults, *reader.validate(parts)))]:
         raise NetworkError(*faults)
     return Network(
         bodies=parts.bodies,
@@ -156,34 +167,18 @@ def _network(tables: Mapping[str, Any], name: str, folder: Path) -> Network:
         elements=parts.elements,
         controls=parts.controls,
         ground=parts.ground,
-        length_unit="mm" if read.units.millimetres else "m",
-        angle_unit="deg" if read.units.degrees else "rad",
+        length_unit="mm" if reader.units.millimetres else "m",
+        angle_unit="deg" if reader.units.degrees else "rad",
         **texts,
     )
 
 
-def _texts(name: str) -> dict[str, str]:
-    return {"name": name, "description": "", "source": ""}
-
-
-def _path_of(name_or_path: str | Path) -> Path:
-    """Return the path of a network's file."""
-    path, names = Path(name_or_path), network_names()
-    if path.suffix.lower() == ".toml":
-        return path
-    name = str(name_or_path).casefold().replace("_", "-")
-    if name in names:
-        return NETWORKS / f"{name}.toml"
-    found = f"{format_value(str(name_or_path))}{format_suggestion(str(name_or_path), names)}"
-    raise NetworkError(f"unknown network {found}; allowed: {', '.join(names)}, or a .toml file")
-
-
 class _Reader:
-    """The tables of a network on their way to its parts.
+    """The reader of the tables of a network.
 
     Attributes:
-        faults: What is wrong with the tables, `about` a table or key each.
-        places: Where parts stand in the file that do not stand under their own names.
+        faults: The errors of the tables, `about` a table or key each.
+        places: The places in the file of parts that are not under their names.
     """
 
     def __init__(self, tables: Mapping[str, Any], folder: Path) -> None:
@@ -197,56 +192,58 @@ class _Reader:
         )
         self.ground = self.table.text("ground", DEFAULT_GROUND)
 
-    def parts(self) -> Parts:
-        """Return what the tables describe; what is wrong is in `faults`."""
-        bodies = [*self._bodies()]
-        controls = [self._control(*row) for row in self._rows("controls")]
-        joints = [self._joint(*row) for row in self._rows("joints")]
+    def read_parts(self) -> Parts:
+        """Return the parts of the tables; their errors are in `faults`."""
+        bodies = [*self._read_bodies()]
+        controls = [self._read_control(*row) for row in self._rows("controls")]
+        joints = [self._read_joint(*row) for row in self._rows("joints")]
         element_rows = [*self._rows("elements")]
         for joint, body in read_dh(self.table.table("dh"), self.units, self.ground, self.places):
             joints.append(joint)
             bodies += [] if body is None else [body]
-        unread = []
-        rows = dict(self._rows("chains"))
-        for name, table in rows.items():
+        unread: list[str] = []
+        chains = dict(self._rows("chains"))
+        for name, table in chains.items():
             chain = read_chain(name, table, self.units, self.folder, self.ground, self.places)
-            if _stands_on_itself(name, rows):
+            is_circular = _carries_itself(name, chains)
+            if is_circular:
                 table.add_error("body", f"found a body that {name} carries itself; allowed: another")
-            if chain is None or _stands_on_itself(name, rows):
+            if chain is None or is_circular:
                 unread.append(f"{name}.")
             else:
-                bodies, joints = bodies + chain.bodies, joints + chain.joints
+                bodies += chain.bodies
+                joints += chain.joints
                 controls += chain.controls
-        named = {one.name: one for one in joints}
-        elements = [self._element(*row, named) for row in element_rows]
+        joints_by_name = {joint.name: joint for joint in joints}
+        elements = [self._read_element(*row, joints_by_name) for row in element_rows]
         self.table.report_unknown_keys()
-        bodies += _standing_in(unread, (*joints, *elements))
+        # replace the bodies of unread chains that have joints or elements
+        constraints: list[Joint | ConstraintElement] = [*joints, *elements]
+        ends = dict.fromkeys(name for constraint in constraints for name in constraint.bodies)
+        bodies += [Body(name) for name in ends if name.startswith(tuple(unread))]
         return Parts("", tuple(bodies), tuple(joints), tuple(elements), tuple(controls), self.ground)
 
-    def further(self, parts: Parts) -> Iterator[Finding]:
-        """Yield what is wrong with the parts, unless it follows from what is wrong with the tables."""
-        unread = {re.sub(r"\[\d+\]$", "", one.about or "") for one in self.faults}
-        for one in validate_parts(parts):
-            fault = replace(one, about=self._place(one.about or ""))
-            if not _follows(fault, unread):
-                yield fault
-
-    def _place(self, about: str) -> str:
-        """Return where in the file a part stands."""
-        name = about
-        while name not in self.places and "." in name:
-            name = name.rpartition(".")[0]
-        return self.places.get(name, about)
+    def validate(self, parts: Parts) -> Iterator[Finding]:
+        """Yield the errors of the parts, except those that may follow from errors of the tables."""
+        unread = {re.sub(r"\[\d+\]$", "", fault.about or "") for fault in self.faults}
+        unread_keys = {place.rpartition(".")[2] for place in unread if place.count(".") > 1}
+        for fault in validate_parts(parts):
+            name = about = fault.about or ""
+            while name not in self.places and "." in name:
+                name = name.rpartition(".")[0]
+            where = self.places.get(name, about)
+            if where not in unread and not unread_keys & CAUSES.get(fault.kind, set()):
+                yield replace(fault, about=where)
 
     def _rows(self, key: str) -> Iterator[tuple[str, CheckedTable]]:
-        """Yield the tables in a table by their names; what is no table is noted and left out."""
-        given = self.table.value(key)
+        """Yield the tables in a table by their names; values that are no table are noted and omitted."""
+        values = self.table.value(key)
         for name, table in self.table.named_tables(key).items():
-            if isinstance(given[name], Mapping):
+            if isinstance(values[name], Mapping):
                 yield name, table
 
-    def _bodies(self) -> Iterator[Body]:
-        """Yield the bodies but for the ground, which may have a table without keys."""
+    def _read_bodies(self) -> Iterator[Body]:
+        """Yield the bodies except the ground, which may have a table without keys."""
         for name, table in self._rows("bodies"):
             if name == self.ground:
                 if table.has("start"):
@@ -254,38 +251,36 @@ class _Reader:
             else:
                 numbers = table.numbers("start", len(POSE_UNITS)) if table.has("start") else ()
                 pairs = zip(numbers, POSE_UNITS, strict=False)
-                yield Body(name, tuple(to_si(one, unit, self.units) for one, unit in pairs))
+                yield Body(name, tuple(to_si(number, unit, self.units) for number, unit in pairs))
             table.report_unknown_keys()
 
-    def _control(self, name: str, table: CheckedTable) -> Control:
-        """Read a control: its start and limits, or its function of others."""
-        many = len(self.faults)
+    def _read_control(self, name: str, table: CheckedTable) -> Control:
+        faults = len(self.faults)
         if table.has("value"):
             control = Control(name, value=read_expression(table, "value", "", self.units))
         else:
-            lower, upper = (
-                table.number(key, default, infinite=True)
-                for key, default in (("lower", -math.inf), ("upper", math.inf))
-            )
+            lower = table.number("lower", -math.inf, infinite=True)
+            upper = table.number("upper", math.inf, infinite=True)
             control = Control(name, table.number("start", 0.0), lower, upper)
-        if len(self.faults) > many:  # nothing is found of values that no number stands for
+        if len(self.faults) > faults:  # NaN: functions of it are not validated
             control = Control(name, math.nan)
         table.report_unknown_keys()
         return control
 
-    def _joint(self, name: str, table: CheckedTable) -> Joint:
-        """Read a joint; one whose kind is none holds its bodies together."""
-        ends = _ends(table)
-        kind = cast("JointKind", self._kind(table, tuple(JOINT_UNITS)))
+    def _read_joint(self, name: str, table: CheckedTable) -> Joint:
+        """Return a joint; one that cannot move if its kind is unknown."""
+        ends = _read_ends(table)
+        kind = cast("JointKind", self._read_kind(table, tuple(JOINT_UNITS)))
         if not kind:
             return Joint(name, "user", ends, motion=IDENTITY_MOTION)
         if kind == "user":
             joint = Joint(name, kind, ends, motion=read_motion(table, self.units))
         else:
-            frames, start = read_frames(table, self.units), read_start(table, JOINT_UNITS[kind], self.units)
-            values = read_drives(table, JOINT_UNITS[kind], self.units)
+            variables = JOINT_UNITS[kind]
+            frames, start = read_frames(table, self.units), read_start(table, variables, self.units)
+            values = read_drives(table, variables, self.units)
             pitch = self.units.length(table.number("pitch")) if kind == "helical" else 0.0
-            limits = () if kind == "global" else read_limits(table, JOINT_UNITS[kind], self.units)
+            limits = () if kind == "global" else read_limits(table, variables, self.units)
             joint = Joint(name, kind, ends, frames, start, values, pitch, limits=limits)
             self._check_start(table, joint)
             if table.has("driven"):
@@ -304,18 +299,17 @@ class _Reader:
             allowed = "at least lower" if end == "lower" else "at most upper"
             table.add_error("start", f"found {value / size:.6g}, allowed: {allowed}, {limit / size:.6g}")
 
-    def _kind(self, table: CheckedTable, kinds: tuple[str, ...]) -> str:
-        """Return the kind of a joint or an element; "" where it has none, and so no known keys."""
-        many = len(self.faults)
+    def _read_kind(self, table: CheckedTable, kinds: tuple[str, ...]) -> str:
+        """Return the kind of a joint or an element; "" if it is unknown, and so are its keys."""
+        faults = len(self.faults)
         kind = table.choice("kind", kinds)
-        return kind if len(self.faults) == many else ""
+        return kind if len(self.faults) == faults else ""
 
-    def _element(self, name: str, table: CheckedTable, joints: Mapping[str, Joint]) -> ConstraintElement:
-        """Read an element."""
+    def _read_element(self, name: str, table: CheckedTable, joints: Mapping[str, Joint]) -> ConstraintElement:
         if table.value("kind") in [*PAIR_JOINTS]:
             return read_pair(name, table.value("kind"), table, joints, self.units, self.folder)
-        ends = _ends(table)
-        kind = cast("ElementKind", self._kind(table, get_args(ElementKind)))
+        ends = _read_ends(table)
+        kind = cast("ElementKind", self._read_kind(table, get_args(ElementKind)))
         if not kind:
             return ConstraintElement(name, "gg", ends, Expression("1.0"))
         normals = (DEFAULT_N, DEFAULT_N)
@@ -323,47 +317,29 @@ class _Reader:
             first, second = read_vectors(table, "n", "one or two" if kind == "crc" else "one")
             normals = (first, second if kind == "crc" else DEFAULT_N)
         points = read_points(table, self.units, POINTS[kind])
+        points = (ZERO, points[1]) if kind == "eg" else points
         length = read_expression(table, "h" if kind == "eg" else "d", "m", self.units)
         table.report_unknown_keys()
-        return ConstraintElement(
-            name, kind, ends, length, (ZERO, points[1]) if kind == "eg" else points, normals
-        )
+        return ConstraintElement(name, kind, ends, length, points, normals)
 
 
-POINTS: dict[ElementKind, VectorCount] = {"gg": "one or two", "eg": "one", "crc": "one or two", "gc": "two"}
-"""Of which bodies an element has points."""
-
-
-def _ends(table: CheckedTable) -> tuple[str, str]:
+def _read_ends(table: CheckedTable) -> tuple[str, str]:
     """Return the two bodies of a joint or an element."""
-    many = len(table.faults)
+    faults = len(table.faults)
     names = table.texts("bodies")
     if len(names) == 2:
         return names[0], names[1]
-    if len(table.faults) == many:
+    if len(table.faults) == faults:
         table.add_error("bodies", f"found {len(names)}, allowed: the names of two bodies")
     return "", ""
 
 
-def _stands_on_itself(name: str, chains: Mapping[str, CheckedTable]) -> bool:
-    """Return whether a chain is carried by its own bodies, be it through other chains."""
-    on, passed = name, 0
-    while passed < len(chains):
-        carrier = str(chains[on].value("body"))
-        on = next((other for other in chains if carrier.startswith(f"{other}.")), "")
-        passed += 1
-        if on in ("", name):
-            return on == name
+def _carries_itself(name: str, chains: Mapping[str, CheckedTable]) -> bool:
+    """Return whether a chain is carried by one of its bodies, directly or through other chains."""
+    chain = name
+    for _ in chains:
+        carrier = str(chains[chain].value("body"))
+        chain = next((other for other in chains if carrier.startswith(f"{other}.")), "")
+        if chain in ("", name):
+            return chain == name
     return False
-
-
-def _standing_in(unread: list[str], ties: Iterable[Joint | ConstraintElement]) -> Iterator[Body]:
-    """Yield the bodies of chains that could not be read, as far as something is tied to them."""
-    names = {name: None for tie in ties for name in tie.bodies if name.startswith(tuple(unread))}
-    yield from map(Body, names)
-
-
-def _follows(fault: Finding, unread: set[str]) -> bool:
-    """Return whether a fault of the parts may come of what stands in for tables and keys that are wrong."""
-    keys = {one.rpartition(".")[2] for one in unread if one.count(".") > 1}
-    return fault.about in unread or bool(keys & READ_BY.get(fault.kind, set()))

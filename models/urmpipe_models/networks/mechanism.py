@@ -1,12 +1,20 @@
-"""The graph of a network: bodies as nodes, joints and constraint elements as edges.
+"""Mechanism: a network with its loops cut, its variables, and the poses of its bodies, elementwise.
 
-A network in numbers: its variables with their scales, and the poses of its bodies, elementwise.
+1. `build_graph`: bodies are nodes, joints and elements edges. A spanning forest of joints grows from the
+   ground, and from one body of each cluster that no joint connects to it; the other joints are cut.
+2. `Mechanism`: the variables, which are the controls, the free variables of joints, and the poses of bodies
+   without a joint; their start; the scales of variables (columns) and of equations (rows), with which all are
+   of [-] or [rad].
+3. Functions of the variables x, each with its derivatives: `control_values`, `lengths`, `joint_values`,
+   `pair_error`.
+4. `placements`: the pose of each body along the branches of the forest. A joint has R = A_1 T(q) A_2^-1, or
+   the inverse of it if its first body is the child.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from typing import Literal, NamedTuple, TypeAlias
@@ -15,13 +23,11 @@ import numpy as np
 
 from urmpipe_models.elementwise import Element, FloatArray, IndexArray, Vector, subtract
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.elements import transmission
-from urmpipe_models.networks.joint_motion import exp3, joint_frame
+from urmpipe_models.networks.joint_motion import exp3, joint_frame, transmission
 from urmpipe_models.networks.parts import (
     POSE_UNITS,
     ConstraintElement,
     Expression,
-    Gradient,
     Joint,
     Parts,
     sample_range,
@@ -29,17 +35,21 @@ from urmpipe_models.networks.parts import (
 )
 
 Structure = Literal["tree", "loops", "closed chain"]
+Configuration: TypeAlias = Sequence[Element] | FloatArray  # variables in [m], [rad] and units of controls
+SAMPLES = 11  # values of a control at which its effect is computed
 
 
-@dataclass(frozen=True, slots=True)
-class Branch:
+# --- graph
+
+
+class Branch(NamedTuple):
     """A joint of the spanning forest.
 
     Attributes:
-        joint: Its number among the joints.
+        joint: Its index among the joints.
         parent: The body nearer to the root.
         child: The body that the joint moves.
-        sign: 1 where the child is the joint's second body, -1 where it is its first.
+        sign: 1 if the child is the joint's second body, -1 if it is its first.
     """
 
     joint: int
@@ -50,14 +60,14 @@ class Branch:
 
 @dataclass(frozen=True)
 class Graph:
-    """What hangs on what.
+    """Spanning forest and loops of a network.
 
     Attributes:
         network: The network.
-        roots: The ground, and of each part that no joint ties to it the body that has its freedoms.
-        branches: The joints of the spanning forest, each after those that its parent hangs on.
-        cuts: The numbers of the joints that close loops: there these are cut.
-        clusters: Names of the bodies of each part that joints hold together, that of the ground first.
+        roots: The ground, and of each cluster that no joint connects to it the body that has its freedoms.
+        branches: The joints of the spanning forest, each after those of its parent.
+        cuts: The indices of the joints that close loops: there these are cut.
+        clusters: Names of the bodies of each part that joints connect, that of the ground first.
     """
 
     network: Parts
@@ -68,97 +78,93 @@ class Graph:
 
     @cached_property
     def loops(self) -> tuple[tuple[str, ...], ...]:
-        """Names of the joints and elements of each loop: of a cut joint the way between its bodies, and it.
+        """Names of the joints and elements of each loop: of a cut joint the path between its bodies, and it.
 
-        Then, elements one by one, those that close a loop with what ties the parts already.
+        Then, elements one by one, those that close a loop with the edges before them.
         """
-        edges = [(one.name, *one.bodies) for one in self.network.joints]
-        tree = [edges[one.joint] for one in self.branches]
-        found = [(*_way(tree, *edges[k][1:]), edges[k][0]) for k in self.cuts]
+        edges = [(joint.name, *joint.bodies) for joint in self.network.joints]
+        tree = [edges[branch.joint] for branch in self.branches]
+        loops = [(*_path(tree, *edges[k][1:]), edges[k][0]) for k in self.cuts]
         for element in self.network.elements:
-            way = _way(tree, *element.bodies)
-            if way:
-                found.append((*way, element.name))
+            path = _path(tree, *element.bodies)
+            if path:
+                loops.append((*path, element.name))
             else:
                 tree.append((element.name, *element.bodies))
-        return tuple(found)
+        return tuple(loops)
 
     @property
     def structure(self) -> Structure:
         """Tree, closed chain (loops, and at each body two joints or elements or more), or loops."""
         if not self.loops:
             return "tree"
-        ends = [name for _, one in self.network.constraints for name in one.bodies]
-        least = min(ends.count(name) for name in self.network.body_names)
-        return "closed chain" if least >= 2 else "loops"
+        ends = [name for _, constraint in self.network.constraints for name in constraint.bodies]
+        degree = min(ends.count(name) for name in self.network.body_names)
+        return "closed chain" if degree >= 2 else "loops"
 
 
 def build_graph(network: Parts) -> Graph:
-    """Return the graph of a network, its spanning forest grown joint by joint in breadth."""
-    placed = [one.name for one in network.bodies if one.start]
+    """Return the graph of a network, its spanning forest grown joint by joint, breadth first."""
+    started = [body.name for body in network.bodies if body.start]
     roots: list[str] = []
     branches: list[Branch] = []
     clusters: list[tuple[str, ...]] = []
     seen: set[str] = set()
-    for root in (network.ground, *placed, *network.body_names):
+    for root in (network.ground, *started, *network.body_names):
         if root not in seen:
-            grown = _grown(network, root, seen)
+            tree = _grow_tree(network, root, seen)
             roots.append(root)
-            branches += grown
-            clusters.append((root, *(one.child for one in grown)))
-    used = {one.joint for one in branches}
+            branches += tree
+            clusters.append((root, *(branch.child for branch in tree)))
+    used = {branch.joint for branch in branches}
     cuts = tuple(k for k in range(len(network.joints)) if k not in used)
     return Graph(network, tuple(roots), tuple(branches), cuts, tuple(clusters))
 
 
-def _grown(network: Parts, root: str, seen: set[str]) -> list[Branch]:
-    """Return the branches of the part that a body is in; its bodies become seen."""
+def _grow_tree(network: Parts, root: str, seen: set[str]) -> list[Branch]:
+    """Return the branches from a root; their bodies become seen."""
     branches: list[Branch] = []
     seen.add(root)
-    edge = [root]
-    while edge:
-        body = edge.pop(0)
+    queue = [root]
+    while queue:
+        body = queue.pop(0)
         for k, joint in enumerate(network.joints):
             for parent, child, sign in ((*joint.bodies, 1), (*joint.bodies[::-1], -1)):
                 if parent == body and child not in seen:
                     seen.add(child)
-                    edge.append(child)
+                    queue.append(child)
                     branches.append(Branch(k, parent, child, sign))
     return branches
 
 
-def _way(tree: Sequence[tuple[str, str, str]], start: str, end: str) -> tuple[str, ...]:
-    """Return the names of the edges on the way from a node to another; none if no way leads there."""
-    ways: dict[str, tuple[str, ...]] = {start: ()}
-    edge = [start]
-    while edge and end not in ways:
-        node = edge.pop(0)
+def _path(tree: Sequence[tuple[str, str, str]], start: str, end: str) -> tuple[str, ...]:
+    """Return the names of the edges of the path between two nodes; empty if there is none."""
+    paths: dict[str, tuple[str, ...]] = {start: ()}
+    queue = [start]
+    while queue and end not in paths:
+        node = queue.pop(0)
         for name, first, second in tree:
             for here, there in ((first, second), (second, first)):
-                if here == node and there not in ways:
-                    ways[there] = (*ways[node], name)
-                    edge.append(there)
-    return ways.get(end, ())
+                if here == node and there not in paths:
+                    paths[there] = (*paths[node], name)
+                    queue.append(there)
+    return paths.get(end, ())
 
 
-def components_without(network: Parts, left_out: Iterable[str]) -> list[set[str]]:
-    """Return the sets of bodies that hang together by joints and elements without some of these, by name."""
-    out = set(left_out)
-    edges = [one.bodies for _, one in network.constraints if one.name not in out]
-    parts: list[set[str]] = [{name} for name in network.body_names]
-    for first, second in edges:
-        a, b = (next(part for part in parts if name in part) for name in (first, second))
-        if a is not b:
-            parts.remove(b)
-            a |= b
-    return parts
+def components_without(network: Parts, omitted: Iterable[str]) -> list[set[str]]:
+    """Return the sets of bodies that are connected without some joints and elements, given by name."""
+    names = set(omitted)
+    components: list[set[str]] = [{name} for name in network.body_names]
+    for _, constraint in network.constraints:
+        if constraint.name not in names:
+            a, b = (next(part for part in components if name in part) for name in constraint.bodies)
+            if a is not b:
+                components.remove(b)
+                a |= b
+    return components
 
 
-Configuration: TypeAlias = Sequence[Element] | FloatArray
-"""The variables, one element each, in [m], [rad] and as controls are given."""
-
-SAMPLES = 11
-"""At so many values of a control its effect is looked at."""
+# --- mechanism
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,9 +172,9 @@ class Variable:
     """A variable of a network.
 
     Attributes:
-        owner: The control, the joint or the body that it is of.
-        kind: What that is.
-        index: Its number among those of its owner.
+        owner: The name of its control, joint or body.
+        kind: The kind of its owner.
+        index: Its index among those of its owner.
         unit: m, rad, or "" of a control.
     """
 
@@ -178,25 +184,24 @@ class Variable:
     unit: str
 
 
-@dataclass(frozen=True, slots=True)
-class ValueWithGradient:
+class ValueWithGradient(NamedTuple):
     """A value that is a variable or a function of controls.
 
     Attributes:
         value: The value, any element.
-        gradient: Its derivatives by the number of each variable.
+        gradient: Its derivatives by the index of each variable.
     """
 
     value: Element
-    gradient: dict[int, Element] = field(default_factory=dict)
+    gradient: dict[int, Element]
 
 
 class Pose(NamedTuple):
-    """A body's pose and which joints move it.
+    """A body's pose and the joints that move it.
 
     Attributes:
         frame: The body in the ground.
-        movers: The sign with which the motion of each joint, or body with freedoms of its own, moves it.
+        movers: The sign with which the motion of each joint, or of a body with freedoms, moves it.
     """
 
     frame: Transform
@@ -204,7 +209,7 @@ class Pose(NamedTuple):
 
 
 class Placements(NamedTuple):
-    """Where everything is.
+    """The frames of bodies and joints.
 
     Attributes:
         bodies: The pose of each body.
@@ -215,9 +220,14 @@ class Placements(NamedTuple):
     joints: dict[str, Transform]
 
 
+def build_mechanism(network: Parts) -> Mechanism:
+    """Return the mechanism of a network."""
+    return Mechanism(network, build_graph(network))
+
+
 @dataclass(frozen=True)
 class Mechanism:
-    """A network whose loops are cut, ready to be computed.
+    """A network whose loops are cut, with its variables and equations.
 
     Attributes:
         network: The network.
@@ -229,9 +239,11 @@ class Mechanism:
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
-        """Controls that can be set, the free variables of joints, and the poses of bodies that none ties."""
+        """Controls that can be set, the free variables of joints, and the poses of bodies without a joint."""
         controls = [
-            Variable(one.name, "control", 0, "") for one in self.network.controls if one.value is None
+            Variable(control.name, "control", 0, "")
+            for control in self.network.controls
+            if control.value is None
         ]
         joints = [
             Variable(joint.name, "joint", k, unit)
@@ -248,8 +260,8 @@ class Mechanism:
 
     @cached_property
     def variable_index(self) -> dict[tuple[str, int], int]:
-        """The number of each variable by its owner and its number there."""
-        return {(one.owner, one.index): k for k, one in enumerate(self.variables)}
+        """The index of each variable by its owner and its index there."""
+        return {(variable.owner, variable.index): k for k, variable in enumerate(self.variables)}
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
@@ -262,118 +274,119 @@ class Mechanism:
 
     @cached_property
     def controls(self) -> IndexArray:
-        """The numbers of the variables that are controls, shape (controls,) [-]."""
-        return np.array([k for k, one in enumerate(self.variables) if one.kind == "control"], dtype=np.intp)
+        """The indices of the variables that are controls, shape (controls,) [-]."""
+        kinds = [variable.kind for variable in self.variables]
+        return np.array([k for k, kind in enumerate(kinds) if kind == "control"], dtype=np.intp)
 
     @cached_property
     def free(self) -> IndexArray:
-        """The numbers of the variables that assembly finds: all but the controls, shape (free,) [-]."""
+        """The indices of the variables that assembly solves for: all except controls, shape (free,) [-]."""
         return np.arange(len(self.controls), len(self.variables))
 
     @cached_property
     def rotations(self) -> tuple[slice, ...]:
-        """Where three variables after each other are a rotation vector that nothing drives."""
+        """The slices of three variables that are a rotation vector that nothing drives."""
+        free = {
+            joint.name for joint in self.network.joints if joint.kind == "global" and not any(joint.drives)
+        }
         firsts = [
             k
-            for k, one in enumerate(self.variables)
-            if (one.kind == "body" and one.index == 3) or (one.index == 0 and self._is_global(one))
+            for k, variable in enumerate(self.variables)
+            if (variable.kind == "body" and variable.index == 3)
+            or (variable.kind == "joint" and variable.index == 0 and variable.owner in free)
         ]
         return tuple(slice(k, k + 3) for k in firsts)
 
     @cached_property
     def angles(self) -> IndexArray:
-        """The numbers of free variables that are the same after a full turn, shape (angles,) [-]."""
+        """The indices of free variables that are the same after a full turn, shape (angles,) [-]."""
         coupled = self.network.coupled_joints
-        kinds = {one.name: one.kind for one in self.network.joints if one.name not in coupled}
-        turning = ("revolute", "cylindrical")
-        found = [
+        kinds = {joint.name: joint.kind for joint in self.network.joints if joint.name not in coupled}
+        variables = ((k, self.variables[k]) for k in self.free)
+        angles = [
             k
-            for k in self.free
-            if self.variables[k].unit == "rad" and kinds.get(self.variables[k].owner) in turning
+            for k, variable in variables
+            if variable.unit == "rad" and kinds.get(variable.owner) in ("revolute", "cylindrical")
         ]
-        return np.array(found, dtype=np.intp)
-
-    def _is_global(self, one: Variable) -> bool:
-        joints = {joint.name: joint for joint in self.network.joints}
-        joint = joints.get(one.owner) if one.kind == "joint" else None
-        return joint is not None and joint.kind == "global" and not any(joint.drives)
+        return np.array(angles, dtype=np.intp)
 
     @cached_property
     def start(self) -> FloatArray:
-        """Where assembly starts, in [m], [rad] and as controls are given, shape (variables,)."""
-        given: dict[str, Sequence[float]] = {one.name: (one.start,) for one in self.network.controls}
-        given |= {one.name: one.start or (0.0,) * len(one.units) for one in self.network.joints}
-        given |= {
-            one.name: one.start or (0.0,) * 6 for one in self.network.bodies if one.name in self.graph.roots
+        """The start of assembly, in [m], [rad] and the units of controls, shape (variables,)."""
+        starts: dict[str, Sequence[float]] = {
+            control.name: (control.start,) for control in self.network.controls
         }
-        return np.array([given[one.owner][one.index] for one in self.variables], dtype=np.float64)
+        starts |= {joint.name: joint.start or (0.0,) * len(joint.units) for joint in self.network.joints}
+        starts |= {
+            body.name: body.start or (0.0,) * 6
+            for body in self.network.bodies
+            if body.name in self.graph.roots
+        }
+        values = [starts[variable.owner][variable.index] for variable in self.variables]
+        return np.array(values, dtype=np.float64)
 
     @property
     def rows(self) -> int:
-        """How many equations close it."""
+        """Number of equations that close it."""
         return 6 * len(self.graph.cuts) + len(self.network.elements)
 
     @cached_property
     def length(self) -> float:
         """The largest distance in [m] between two joints of a body, or length of an element; 1 if it is 0."""
         pairs = zip(self.network.elements, self.lengths(self.start), strict=True)
-        spans = [abs(float(length.value)) for one, length in pairs if one.length_key == "d"]
-        for some in self.points.values():
-            spans += [float(np.linalg.norm(subtract(a, b))) for a, b in combinations(some, 2)]
-        return max(spans, default=0.0) or 1.0
+        lengths = [abs(float(length.value)) for element, length in pairs if element.length_key == "d"]
+        for points in self.points.values():
+            lengths += [float(np.linalg.norm(subtract(a, b))) for a, b in combinations(points, 2)]
+        return max(lengths, default=0.0) or 1.0
 
     @cached_property
     def points(self) -> dict[str, list[Vector]]:
-        """Of each body the points in [m] where joints and elements tie it; a plane or a pair has none."""
-        found: dict[str, list[Vector]] = {name: [] for name in self.network.body_names}
+        """Of each body the points in [m] of its joints and elements; a plane or a pair has none."""
+        points: dict[str, list[Vector]] = {name: [] for name in self.network.body_names}
         for joint in self.network.joints:
             for name, frame in zip(joint.bodies, joint.frames, strict=True):
-                found[name].append(frame.translation)
-        for element in (one for one in self.network.elements if not one.is_pair):
-            skipped = int(element.kind == "eg")
-            for name, point in [*zip(element.bodies, element.points, strict=True)][skipped:]:
-                found[name].append(point)
-        return found
+                points[name].append(frame.translation)
+        for element in (element for element in self.network.elements if not element.is_pair):
+            first = int(element.kind == "eg")
+            for name, point in [*zip(element.bodies, element.points, strict=True)][first:]:
+                points[name].append(point)
+        return points
 
     @cached_property
     def row_scales(self) -> FloatArray:
-        """What makes each row one of [-] and [rad], shape (rows,): 1 / length of those in [m]."""
+        """The factor that makes each row one of [-] and [rad], shape (rows,): 1 / length of those in [m]."""
         loop = [1.0 / self.length] * 3 + [1.0] * 3
         elements = [1.0 / self.length if unit == "m" else 1.0 for unit in self.network.element_units]
         return np.array(loop * len(self.graph.cuts) + elements)
 
     @cached_property
     def column_scales(self) -> FloatArray:
-        """A step of each variable, shape (variables,): the length, 1 rad, of a control what moves so much.
+        """A step of each variable, shape (variables,): the length, 1 rad, of a control one of equal effect.
 
-        What moves by a control is the root of its squared slopes, the largest of some values of the control:
-        where it starts, its effect may stand still.
+        The effect of a control is the root of the sum of its squared derivatives, the largest at `SAMPLES` of
+        its values: at its start, the effect may be 0.
         """
-        scales = np.array([self.length if one.unit == "m" else 1.0 for one in self.variables])
+        scales = np.array([self.length if variable.unit == "m" else 1.0 for variable in self.variables])
+        ranges = {control.name: sample_range(control) for control in self.network.controls}
         for k in self.controls:
             x = np.repeat(self.start[:, np.newaxis], SAMPLES, axis=1)
-            x[k] = self._sampled(self.variables[k].owner)
-            moved = np.zeros(SAMPLES)
-            for given, unit in self._driven(x):
-                slope = np.nan_to_num(np.asarray(given.gradient.get(k, 0.0)), posinf=0.0, neginf=0.0)
-                moved += (slope / (self.length if unit == "m" else 1.0)) ** 2
-            scales[k] = 1.0 / np.sqrt(moved.max()) if moved.max() > 0.0 else 1.0
+            x[k] = np.linspace(*ranges[self.variables[k].owner], SAMPLES)
+            effect = np.zeros(SAMPLES)
+            for driven, unit in self._driven_values(x):
+                slope = np.nan_to_num(np.asarray(driven.gradient.get(k, 0.0)), posinf=0.0, neginf=0.0)
+                effect += (slope / (self.length if unit == "m" else 1.0)) ** 2
+            scales[k] = 1.0 / np.sqrt(effect.max()) if effect.max() > 0.0 else 1.0
         return scales
 
-    def _sampled(self, name: str) -> FloatArray:
-        """Return values of a control, shape (SAMPLES,): over its range, else from its start - 1 to + 1."""
-        (one,) = (one for one in self.network.controls if one.name == name)
-        return np.linspace(*sample_range(one), SAMPLES)
-
-    def _driven(self, x: FloatArray) -> Iterator[tuple[ValueWithGradient, str]]:
-        """Yield what controls make of joints and elements, and the unit."""
+    def _driven_values(self, x: FloatArray) -> Iterator[tuple[ValueWithGradient, str]]:
+        """Yield the values of joints and elements that are functions of controls, each with its unit."""
         controls = self.control_values(x)
         for joint in self.network.joints:
             for drive, unit in zip(joint.drives, joint.units, strict=True):
                 if drive is not None:
                     yield evaluate_expression(drive, controls), unit
-            for k, part in enumerate(joint.motion):
-                yield evaluate_expression(part, controls), "m" if k >= 6 else "rad"
+            for k, entry in enumerate(joint.motion):
+                yield evaluate_expression(entry, controls), "m" if k >= 6 else "rad"
         yield from zip(self.lengths(x), self.network.element_units, strict=True)
 
     def control_values(self, x: Configuration) -> dict[str, ValueWithGradient]:
@@ -382,19 +395,19 @@ class Mechanism:
         Args:
             x: The variables, one element each.
         """
-        found: dict[str, ValueWithGradient] = {}
-        for one in sort_controls(self.network.controls):
-            if one.value is None:
-                k = self.variable_index[one.name, 0]
-                found[one.name] = ValueWithGradient(x[k], {k: 1.0})
+        values: dict[str, ValueWithGradient] = {}
+        for control in sort_controls(self.network.controls):
+            if control.value is None:
+                k = self.variable_index[control.name, 0]
+                values[control.name] = ValueWithGradient(x[k], {k: 1.0})
             else:
-                found[one.name] = evaluate_expression(one.value, found)
-        return found
+                values[control.name] = evaluate_expression(control.value, values)
+        return values
 
     def lengths(self, x: Configuration) -> list[ValueWithGradient]:
         """Return the length of each element in [m] or [rad], and its derivatives."""
         controls = self.control_values(x)
-        return [evaluate_expression(one.length, controls) for one in self.network.elements]
+        return [evaluate_expression(element.length, controls) for element in self.network.elements]
 
     def joint_values(
         self, joint: Joint, x: Configuration, controls: dict[str, ValueWithGradient] | None = None
@@ -407,36 +420,36 @@ class Mechanism:
             controls: The result of `control_values`, if it is known.
         """
         controls = self.control_values(x) if controls is None else controls
-        found = []
+        values = []
         for index, drive in enumerate(joint.drives):
             if drive is None:
                 k = self.variable_index[joint.name, index]
-                found.append(ValueWithGradient(x[k], {k: 1.0}))
+                values.append(ValueWithGradient(x[k], {k: 1.0}))
             else:
-                found.append(evaluate_expression(drive, controls))
-        return found or [evaluate_expression(one, controls) for one in joint.motion]
+                values.append(evaluate_expression(drive, controls))
+        return values or [evaluate_expression(entry, controls) for entry in joint.motion]
 
     def pair_error(
         self, element: ConstraintElement, x: Configuration, controls: dict[str, ValueWithGradient]
     ) -> tuple[ValueWithGradient, dict[tuple[str, int], Element]]:
-        """Return q_2 - f(q_1) - offset of a pair, in [rad] or [m], see `higher_pairs`.
+        """Return q_2 - f(q_1) - offset of a pair, in [rad] or [m], see `joint_motion.transmission`.
 
-        Then, its derivatives by the values of its joints: by the joint and the value's number.
+        Then, its derivatives by the values of its joints: by the joint and the value's index.
 
         Args:
             element: The pair.
             x: The variables, one element each.
-            controls: What `control_values` returns.
+            controls: The result of `control_values`.
         """
         (first, j), (second, k) = self.network.pair_variables(element)
         angle, follower = self.joint_values(first, x, controls)[j], self.joint_values(second, x, controls)[k]
         offset = evaluate_expression(element.length, controls)
         value, rate = transmission(element, angle.value)
-        slopes: dict[int, Element] = {}
-        for factor, given in ((-rate, angle), (1.0, follower), (-1.0, offset)):
-            for place, slope in given.gradient.items():
-                slopes[place] = slopes.get(place, 0.0) + factor * slope
-        error = ValueWithGradient(follower.value - value - offset.value, slopes)
+        gradient: dict[int, Element] = {}
+        for factor, term in ((-rate, angle), (1.0, follower), (-1.0, offset)):
+            for index, slope in term.gradient.items():
+                gradient[index] = gradient.get(index, 0.0) + factor * slope
+        error = ValueWithGradient(follower.value - value - offset.value, gradient)
         return error, {(first.name, j): -rate, (second.name, k): 1.0}
 
     def poses(self, x: Configuration) -> dict[str, Transform]:
@@ -445,28 +458,30 @@ class Mechanism:
         Args:
             x: The variables, one element each: floats, arrays of shape (n,), or symbols.
         """
-        return {name: one.frame for name, one in self.placements(x).bodies.items()}
+        return {name: pose.frame for name, pose in self.placements(x).bodies.items()}
 
     def placements(self, x: Configuration) -> Placements:
-        """Return the pose of each body, what moves it, and where the joints are."""
+        """Return the pose of each body with the joints that move it, and the frames of joints.
+
+        Args:
+            x: As in `poses`.
+        """
         controls, joints = self.control_values(x), {}
         bodies = {self.network.ground: Pose(Transform(), {})}
         for name in self.graph.roots[1:]:
             first = self.variable_index[name, 0]
-            position, vector = (
-                (x[first], x[first + 1], x[first + 2]),
-                (x[first + 3], x[first + 4], x[first + 5]),
-            )
+            position = (x[first], x[first + 1], x[first + 2])
+            vector = (x[first + 3], x[first + 4], x[first + 5])
             bodies[name] = Pose(Transform(exp3(vector).rotation, position), {name: 1})
-        for branch, back in zip(self.graph.branches, self._backs, strict=True):
+        for branch, child_frame in zip(self.graph.branches, self._child_frames, strict=True):
             joint, parent = self.network.joints[branch.joint], bodies[branch.parent]
-            moved = joint_frame(joint, [one.value for one in self.joint_values(joint, x, controls)])
+            T = joint_frame(joint, [value.value for value in self.joint_values(joint, x, controls)])
             if branch.sign > 0:
                 at = parent.frame @ joint.frames[0]
-                child = at @ moved @ back
+                child = at @ T @ child_frame
             else:
-                at = parent.frame @ joint.frames[1] @ moved.inverse()
-                child = at @ back
+                at = parent.frame @ joint.frames[1] @ T.inverse()
+                child = at @ child_frame
             joints[joint.name] = at
             bodies[branch.child] = Pose(child, {**parent.movers, joint.name: branch.sign})
         for joint in (self.network.joints[cut] for cut in self.graph.cuts):
@@ -474,27 +489,20 @@ class Mechanism:
         return Placements(bodies, joints)
 
     @cached_property
-    def _backs(self) -> list[Transform]:
-        """Of each branch the child's frame in that of its joint."""
-        frames = [self.network.joints[one.joint].frames for one in self.graph.branches]
-        return [pair[one.sign > 0].inverse() for pair, one in zip(frames, self.graph.branches, strict=True)]
-
-
-def build_mechanism(network: Parts) -> Mechanism:
-    """Return a network in numbers."""
-    return Mechanism(network, build_graph(network))
+    def _child_frames(self) -> list[Transform]:
+        """Of each branch the child in the frame of its joint: A^-1."""
+        return [
+            self.network.joints[branch.joint].frames[branch.sign > 0].inverse()
+            for branch in self.graph.branches
+        ]
 
 
 def evaluate_expression(expression: Expression, controls: dict[str, ValueWithGradient]) -> ValueWithGradient:
     """Return the value of a function of controls, and its derivatives by the variables."""
-    value, slopes = expression.value_and_gradient({name: one.value for name, one in controls.items()})
-    return ValueWithGradient(value, _chained(slopes, controls))
-
-
-def _chained(slopes: Gradient, controls: dict[str, ValueWithGradient]) -> dict[int, Element]:
-    """Return derivatives by variables from those by controls."""
-    found: dict[int, Element] = {}
+    values = {name: control.value for name, control in controls.items()}
+    value, slopes = expression.value_and_gradient(values)
+    gradient: dict[int, Element] = {}
     for name, slope in slopes.items():
         for k, inner in controls[name].gradient.items():
-            found[k] = found.get(k, 0.0) + slope * inner
-    return found
+            gradient[k] = gradient.get(k, 0.0) + slope * inner
+    return ValueWithGradient(value, gradient)

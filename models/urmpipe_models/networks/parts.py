@@ -1,259 +1,37 @@
-"""Arithmetic in a text, such as `2 * s + 0.1`: parsed to a tree, never executed, with exact derivatives.
+"""Parts of a kinematic network, valid or not, and the expressions that drive them.
 
-The parts of a network: bodies, joints, constraint elements and controls, right or wrong.
+1. `Body`, `Joint`, `ConstraintElement`, `Control`: the parts, and `Parts`, all those of a network. The kinds
+   of joints and elements are those of [KinematicSystems]_ chapter 3, with gears, racks and cams.
+2. Functions of a part: its axes' frame, the bodies of a pair, limits that values exceed, the range of a
+   control.
+3. `Expression`: a function of controls as text, such as `2 * s + 0.1`. It is parsed to a tree of arithmetic,
+   never executed, and evaluated with its exact derivatives.
 
-What is wrong with the controls of a network, and with the names in functions of them.
+`faults` validates parts, `file` reads them.
 """
 
 from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import cache, cached_property
 from itertools import accumulate
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from urmpipe_models.elementwise import ZERO, Element, Vector, cross, minus, plus, times
-from urmpipe_models.errors import Finding, OptionError, closest_name, format_unknown_name, format_value
+from urmpipe_models.errors import Finding, OptionError, format_unknown_name, format_value
 from urmpipe_models.math3d import Transform
 from urmpipe_models.measure_units import DEGREE, NAMES, WRITTEN, quantity_to_si
-
-MAX_LETTERS = 1000
-"""Letters of an expression: more are no formula that a person wrote."""
-
-MAX_DEPTH = 50
-"""Brackets and operators within each other."""
-
-ALLOWED_ARITHMETIC = (
-    "numbers, names of controls, pi, + - * / ** and brackets, sin, cos, tan, atan2, sqrt, exp"
-)
-
-Gradient: TypeAlias = dict[str, Element]
-"""The partial derivative by each name that there is one of, in the expression's unit a unit of the name."""
-
-Valued: TypeAlias = tuple[Element, Gradient]
-
-
-@dataclass(frozen=True)
-class Expression:
-    """A formula of names.
-
-    Attributes:
-        text: As it is written; what is no arithmetic raises a `ValueError` that says what is allowed.
-
-    """
-
-    text: str
-
-    def __post_init__(self) -> None:
-        _ = self._tree
-
-    @cached_property
-    def names(self) -> frozenset[str]:
-        """The names in it but for pi."""
-        found = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
-        return frozenset(found - {"pi", *_FUNCTIONS})
-
-    def value(self, values: Mapping[str, Element]) -> Element:
-        """Return its value at values of its names, any elements."""
-        return self.value_and_gradient(values)[0]
-
-    def value_and_gradient(self, values: Mapping[str, Element]) -> Valued:
-        """Return its value and its partial derivatives at values of its names, any elements.
-
-        By the rules of differentiation along its tree, so that they are exact to rounding.
-        """
-        with np.errstate(all="ignore"):  # what is no number is found by who uses it
-            return _valued(self._tree, values)
-
-    @cached_property
-    def _tree(self) -> ast.expr:
-        return _parsed(self.text)
-
-
-@cache
-def _parsed(text: str) -> ast.expr:
-    """Return the tree of an expression whose parts are all arithmetic; raise a `ValueError` of any other."""
-    if len(text) > MAX_LETTERS:
-        raise ValueError(f"found {format_value(text)} of {len(text)} letters, allowed: {MAX_LETTERS} at most")
-    if (nested := _nested(text)) > MAX_DEPTH:
-        raise ValueError(f"found {format_value(text)}, nested {nested} deep; allowed: {MAX_DEPTH}")
-    try:
-        if "#" in text:  # the rest would be a remark
-            raise SyntaxError("a remark")
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(
-            f"found {format_value(text)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}"
-        ) from error
-    _refuse(tree, text, 0)
-    return tree
-
-
-def _nested(text: str) -> int:
-    """Return how many brackets of a text are open at most."""
-    open_ones = accumulate((sign == "(") - (sign == ")") for sign in text)
-    return max(open_ones, default=0)
-
-
-def _refuse(node: ast.expr, text: str, depth: int) -> None:
-    """Raise a `ValueError` if a tree holds anything but arithmetic, or is nested too deep."""
-    if depth > MAX_DEPTH:
-        raise ValueError(f"found {format_value(text)}, nested {depth} deep; allowed: {MAX_DEPTH}")
-    match node:
-        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool) and _finite(value):
-            parts: list[ast.expr] = []
-        case ast.Name(id=name) if name not in _FUNCTIONS:
-            parts = []
-        case ast.BinOp(left, ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow(), right):
-            parts = [left, right]
-        case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
-            parts = [operand]
-        case ast.Call(ast.Name(id=name), args, []):
-            if name not in _FUNCTIONS:
-                raise ValueError(f"function {format_unknown_name(name, _FUNCTIONS)}")
-            if len(args) != _arguments(name):
-                allowed = f"{_arguments(name)}"
-                raise ValueError(f"found {len(args)} arguments of {name}, allowed: {allowed}")
-            parts = args
-        case _:
-            found = ast.get_source_segment(text.strip(), node) or text
-            hint = (
-                "; a power is **" if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor) else ""
-            )
-            raise ValueError(
-                f"found {format_value(found)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}{hint}"
-            )
-    for part in parts:
-        _refuse(part, text, depth + 1)
-
-
-def _finite(value: float) -> bool:
-    """Return whether a constant is a number that a float holds."""
-    try:
-        return math.isfinite(float(value))
-    except OverflowError:
-        return False
-
-
-def _arguments(name: str) -> int:
-    return 2 if name == "atan2" else 1
-
-
-def _valued(node: ast.expr, values: Mapping[str, Element]) -> Valued:
-    """Return the value of a part of a tree, and its derivatives."""
-    match node:
-        case ast.Constant(value=value):
-            return float(value), {}  # type: ignore[arg-type]
-        case ast.Name(id="pi"):
-            return math.pi, {}
-        case ast.Name(id=name):
-            return values[name], {name: 1.0}
-        case ast.UnaryOp(op, operand):
-            value, slopes = _valued(operand, values)
-            return (value, slopes) if isinstance(op, ast.UAdd) else (minus(0.0, value), _by(slopes, -1.0))
-        case ast.BinOp(left, op, right):
-            return _OPERATORS[type(op)](_valued(left, values), _valued(right, values))
-        case ast.Call(ast.Name(id=name), args):
-            return _FUNCTIONS[name](*(_valued(one, values) for one in args))
-    raise TypeError(f"{ast.dump(node)} was let through")
-
-
-def _by(slopes: Gradient, factor: Element) -> Gradient:
-    """Return derivatives times a factor."""
-    return {name: times(factor, slope) for name, slope in slopes.items()}
-
-
-def _sum(first: Gradient, second: Gradient) -> Gradient:
-    """Return the sums of derivatives."""
-    return {name: plus(first.get(name, 0.0), second.get(name, 0.0)) for name in {**first, **second}}
-
-
-def _add(a: Valued, b: Valued) -> Valued:
-    return plus(a[0], b[0]), _sum(a[1], b[1])
-
-
-def _subtract(a: Valued, b: Valued) -> Valued:
-    return minus(a[0], b[0]), _sum(a[1], _by(b[1], -1.0))
-
-
-def _multiply(a: Valued, b: Valued) -> Valued:
-    return times(a[0], b[0]), _sum(_by(a[1], b[0]), _by(b[1], a[0]))
-
-
-def _divide(a: Valued, b: Valued) -> Valued:
-    """(a / b)' = a' / b - a b' / b^2."""
-    inverse = np.divide(1.0, b[0])
-    value = a[0] * inverse
-    return value, _sum(_by(a[1], inverse), _by(b[1], -value * inverse))
-
-
-def _power(a: Valued, b: Valued) -> Valued:
-    """(a^b)' = b a^(b - 1) a' + a^b ln(a) b', the last only where b varies: a may be negative else."""
-    value = np.power(a[0], b[0])
-    slopes = _by(a[1], times(b[0], np.power(a[0], minus(b[0], 1.0)))) if a[1] else {}
-    return value, _sum(slopes, _by(b[1], value * np.log(a[0]))) if b[1] else slopes
-
-
-_OPERATORS: dict[type[ast.operator], Callable[[Valued, Valued], Valued]] = {
-    ast.Add: _add,
-    ast.Sub: _subtract,
-    ast.Mult: _multiply,
-    ast.Div: _divide,
-    ast.Pow: _power,
-}
-
-
-def _sin(a: Valued) -> Valued:
-    return np.sin(a[0]), _by(a[1], np.cos(a[0]))
-
-
-def _cos(a: Valued) -> Valued:
-    return np.cos(a[0]), _by(a[1], -np.sin(a[0]))
-
-
-def _tan(a: Valued) -> Valued:
-    value = np.tan(a[0])
-    return value, _by(a[1], 1.0 + value * value)
-
-
-def _sqrt(a: Valued) -> Valued:
-    value = np.sqrt(a[0])
-    return value, _by(a[1], np.divide(0.5, value)) if a[1] else {}
-
-
-def _exp(a: Valued) -> Valued:
-    value = np.exp(a[0])
-    return value, _by(a[1], value)
-
-
-def _atan2(y: Valued, x: Valued) -> Valued:
-    """atan2(y, x)' = (x y' - y x') / (x^2 + y^2)."""
-    square = np.divide(1.0, y[0] * y[0] + x[0] * x[0])
-    return np.arctan2(y[0], x[0]), _sum(_by(y[1], x[0] * square), _by(x[1], -y[0] * square))
-
-
-_FUNCTIONS: dict[str, Callable[..., Valued]] = {
-    "sin": _sin,
-    "cos": _cos,
-    "tan": _tan,
-    "atan2": _atan2,
-    "sqrt": _sqrt,
-    "exp": _exp,
-}
-
-
-DEFAULT_GROUND = "ground"
-"""What the body that stands still is called by default."""
 
 JointKind = Literal["revolute", "prismatic", "cylindrical", "helical", "global", "user"]
 ElementKind = Literal["gg", "eg", "crc", "gc", "gear", "rack", "cam"]
 
+# the unit of each variable of a joint: theta, s, theta and s, theta, the rotation vector q
 JOINT_UNITS: dict[JointKind, tuple[str, ...]] = {
     "revolute": ("rad",),
     "prismatic": ("m",),
@@ -262,24 +40,36 @@ JOINT_UNITS: dict[JointKind, tuple[str, ...]] = {
     "global": ("rad", "rad", "rad"),
     "user": (),
 }
-"""The unit of each variable of a joint of a kind: theta, s, theta and s, theta, the rotation vector q."""
+POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")  # a body without a joint: x, y, z, rotation vector
 
-POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
-"""Those of a body that no joint ties to the ground: x, y, z and a rotation vector."""
+_ROTARY: tuple[JointKind, ...] = ("revolute", "cylindrical", "helical")
 
-_ANGLES: tuple[JointKind, ...] = ("revolute", "cylindrical", "helical")
-
+# the kinds of the first joint of a pair, whose angle counts, and of its second: a rack moves s of it
 PAIR_JOINTS: dict[ElementKind, tuple[tuple[JointKind, ...], tuple[JointKind, ...]]] = {
-    "gear": (_ANGLES, _ANGLES),
-    "rack": (_ANGLES, ("prismatic", "cylindrical")),
-    "cam": (_ANGLES, ("prismatic", "revolute")),
-}  # of a pair, the kinds of its first joint, whose angle counts, and of its second: a rack moves s of it
+    "gear": (_ROTARY, _ROTARY),
+    "rack": (_ROTARY, ("prismatic", "cylindrical")),
+    "cam": (_ROTARY, ("prismatic", "revolute")),
+}
 
-AXES_TOLERANCE = 1e-9  # of lengths and products of unit vectors: rounding, not a forgotten normalisation
-
+DEFAULT_GROUND = "ground"
+AXES_TOLERANCE = 1e-9  # |m| - 1, |n| - 1, m . n [-]: rounding, not a forgotten normalisation
 LIMIT_TOLERANCE = 1e-6  # [m], [rad]: assemblies that differ by less are the same
 
-_NUMBERS = tuple[float, float, float]
+MAX_LETTERS = 1000  # of an expression; nobody writes longer formulas
+MAX_DEPTH = 50  # of brackets and operators within each other
+ALLOWED_ARITHMETIC = (
+    "numbers, names of controls, pi, + - * / ** and brackets, sin, cos, tan, atan2, sqrt, exp"
+)
+
+MIN_POINTS, MAX_POINTS = 4, 1000  # of a profile: a third of a degree apart; each costs a comparison
+
+_Numbers: TypeAlias = tuple[float, float, float]
+Profile: TypeAlias = tuple[tuple[float, float], ...]  # points of a cam
+Gradient: TypeAlias = dict[str, Element]  # derivatives by the names on which a value depends
+ValueAndGradient: TypeAlias = tuple[Element, Gradient]
+
+
+# --- parts
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,8 +78,8 @@ class Body:
 
     Attributes:
         name: Its name.
-        start: Of a body that no joint ties to the ground: x, y, z in [m] and its rotation vector in [rad],
-            from where assembly starts; empty where that is not given.
+        start: Of a body that no joint connects to the ground: x, y, z in [m] and its rotation vector in
+            [rad], from where assembly starts; empty if it is not given.
     """
 
     name: str
@@ -298,17 +88,17 @@ class Body:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint between two bodies: R = A_1 T(q) A_2^-1 is the second body seen from the first.
+    """A joint between two bodies: R = A_1 T(q) A_2^-1 is the second body in the first.
 
     Attributes:
         name: Its name.
-        kind: revolute: T turns by theta about n; prismatic: it slides by s along n; cylindrical: both;
-            helical: it turns by theta and slides by pitch theta; global: it turns by the rotation vector q;
-            user: T is any function of controls.
+        kind: revolute: T rotates by theta about n; prismatic: it translates by s along n; cylindrical: both;
+            helical: it rotates by theta and translates by pitch theta; global: it rotates by the rotation
+            vector q; user: T is any function of controls.
         bodies: The first and the second body.
         frames: A_1 and A_2: the columns of their rotations are m, n and m x n, their translations are a.
         start: The variables from where assembly starts, in [rad] and [m] by `JOINT_UNITS`.
-        values: What drives each variable, in [rad] and [m]; None where it is free; empty: all are.
+        values: The function that drives each variable, in [rad] and [m]; None if it is free; empty: all are.
         pitch: Of a helical joint in [m/rad].
         motion: Of a user joint: m, n (unit vectors) and a in [m], each three functions of controls.
         limits: The least and the largest value of each variable, in [rad] and [m]; empty: no limits.
@@ -333,7 +123,7 @@ class Joint:
 
     @property
     def drives(self) -> tuple[Expression | None, ...]:
-        """What drives each of its variables; None where it is free."""
+        """The function that drives each of its variables; None if it is free."""
         return self.values or (None,) * len(self.units)
 
 
@@ -346,11 +136,11 @@ class ConstraintElement:
         kind: gg: the two points are at a distance d; eg: the second point is in a plane of the first body
             with normal n, at h from its origin; crc: two lines, through the points along n, are at a distance
             d; gc: the second point is at a distance d from a line of the first body; gear, rack, cam: the
-            variable of the second joint is a function of the angle of the first, see `higher_pairs`.
+            variable of the second joint is a function of the first's angle, see `joint_motion.transmission`.
         bodies: The first and the second body; of a pair `pair_bodies` of its joints.
         length: d or h in [m]; of a pair the offset of its second variable in [m] or [rad].
-        points: a of each in [m]; of eg that of the first means nothing; of a pair both mean nothing.
-        normals: n of each, unit vectors [-]; of gg and of a pair both, of eg and gc the second mean nothing.
+        points: a of each in [m]; unused: of eg that of the first, of a pair both.
+        normals: n of each, unit vectors [-]; unused: of gg and of a pair both, of eg and gc the second.
         joints: Of a pair the names of the first and the second joint; else empty.
         teeth: Of a gear those of both wheels, negative of an internal one.
         radius: Of a rack that of its pinion in [m], with a sign.
@@ -364,15 +154,15 @@ class ConstraintElement:
     bodies: tuple[str, str]
     length: Expression
     points: tuple[Vector, Vector] = field(
-        default=(ZERO, ZERO), metadata={"stored": tuple[_NUMBERS, _NUMBERS]}
+        default=(ZERO, ZERO), metadata={"stored": tuple[_Numbers, _Numbers]}
     )
     normals: tuple[Vector, Vector] = field(
-        default=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0)), metadata={"stored": tuple[_NUMBERS, _NUMBERS]}
+        default=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0)), metadata={"stored": tuple[_Numbers, _Numbers]}
     )
     joints: tuple[str, ...] = ()
     teeth: tuple[float, ...] = ()
     radius: float = 0.0
-    profile: tuple[tuple[float, float], ...] = ()
+    profile: Profile = ()
 
     @property
     def is_pair(self) -> bool:
@@ -396,7 +186,7 @@ class Control:
 
     Attributes:
         name: Its name in expressions.
-        start: Its value where none is set, in the units that the expressions mean.
+        start: Its value if none is set, in the units that the expressions mean.
         lower: Its least value.
         upper: Its largest value.
         value: Its function of other controls; None if it can be set.
@@ -411,21 +201,20 @@ class Control:
     value: Expression | None = None
 
 
-PlacedExpression: TypeAlias = tuple[str, Expression]
-"""A function of controls with its place in a file, such as joints.A.value."""
+PlacedExpression: TypeAlias = tuple[str, "Expression"]  # with its place in a file, such as joints.A.value
 
 
 @dataclass(frozen=True, repr=False)
 class Parts:
-    """Bodies, and what ties them, right or wrong.
+    """Bodies, and the joints, elements and controls that constrain them, valid or not.
 
     Attributes:
-        name: What they make is called.
-        bodies: The bodies but for the ground.
+        name: The name of the network.
+        bodies: The bodies except the ground.
         joints: The joints.
         elements: The constraint elements.
         controls: The controls.
-        ground: The name of the body that stands still.
+        ground: The name of the body that is fixed.
     """
 
     name: str
@@ -436,36 +225,48 @@ class Parts:
     ground: str = DEFAULT_GROUND
 
     def as_parts(self) -> Parts:
-        """Return the parts of a network alone: others may take their places, right or wrong."""
+        """Return the parts of a network alone: their replacements need not be valid."""
         return Parts(self.name, self.bodies, self.joints, self.elements, self.controls, self.ground)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
         """The names of all bodies, the ground first."""
-        return (self.ground, *(one.name for one in self.bodies))
+        return (self.ground, *(body.name for body in self.bodies))
 
     @cached_property
     def constraints(self) -> tuple[tuple[str, Joint | ConstraintElement], ...]:
         """The joints and elements, each with its place, such as joints.A."""
-        joints = ((f"joints.{one.name}", one) for one in self.joints)
-        return (*joints, *((f"elements.{one.name}", one) for one in self.elements))
+        joints = ((f"joints.{joint.name}", joint) for joint in self.joints)
+        return (*joints, *((f"elements.{element.name}", element) for element in self.elements))
 
     @cached_property
     def joint_functions(self) -> tuple[PlacedExpression, ...]:
         """The functions of joints."""
-        found: list[PlacedExpression] = []
+        functions: list[PlacedExpression] = []
         for joint in self.joints:
-            found += [(f"joints.{joint.name}.value", one) for one in joint.values if one is not None]
-            found += [(f"joints.{joint.name}.{'mna'[k // 3]}", one) for k, one in enumerate(joint.motion[:9])]
-        return tuple(found)
+            place = f"joints.{joint.name}"
+            functions += [(f"{place}.value", drive) for drive in joint.values if drive is not None]
+            functions += [(f"{place}.{'mna'[k // 3]}", entry) for k, entry in enumerate(joint.motion[:9])]
+        return tuple(functions)
 
     @cached_property
     def length_functions(self) -> tuple[PlacedExpression, ...]:
         """The lengths of elements: h of eg, the offset of a pair, d of the others."""
-        return tuple((f"elements.{one.name}.{one.length_key}", one.length) for one in self.elements)
+        return tuple(
+            (f"elements.{element.name}.{element.length_key}", element.length) for element in self.elements
+        )
+
+    @cached_property
+    def control_functions(self) -> tuple[PlacedExpression, ...]:
+        """The controls that are functions of others."""
+        return tuple(
+            (f"controls.{control.name}.value", control.value)
+            for control in self.controls
+            if control.value is not None
+        )
 
     def pair_variables(self, element: ConstraintElement) -> tuple[tuple[Joint, int], ...]:
-        """Return the joints of a pair that there are, each with the number of its variable."""
+        """Return the known joints of a pair, each with the index of its variable."""
         joints = {joint.name: joint for joint in self.joints}
         known = [joints[name] for name in element.joints if name in joints]
         return tuple(
@@ -476,24 +277,25 @@ class Parts:
     @cached_property
     def coupled_joints(self) -> frozenset[str]:
         """The names of joints in pairs: a full turn of these is another configuration."""
-        return frozenset(name for one in self.elements for name in one.joints)
+        return frozenset(name for element in self.elements for name in element.joints)
 
     @cached_property
     def element_units(self) -> tuple[str, ...]:
-        """The unit of each element's length: m, or rad of a pair whose second joint turns."""
-        seconds = (self.pair_variables(one)[1:] for one in self.elements)
-        return tuple(some[0][0].units[some[0][1]] if some else "m" for some in seconds)
+        """The unit of each element's length: m, or rad of a pair whose second joint rotates."""
+        seconds = (self.pair_variables(element)[1:] for element in self.elements)
+        return tuple(second[0][0].units[second[0][1]] if second else "m" for second in seconds)
 
     def control_unit(self, control: str) -> tuple[str, Decimal] | None:
-        """Return what a control is, m or rad, and how many of these one of it is.
+        """Return the unit of a control, m or rad, and the value in it of a control of 1.
 
-        None where it drives neither a joint nor a length by itself, or both, or in several units.
+        None if the control alone drives neither a joint nor a length, or both, or in several units.
         """
-        driven = [pair for one in self.joints for pair in zip(one.units, one.drives, strict=True)]
-        driven += zip(self.element_units, (one.length for one in self.elements), strict=True)
-        alone = spellings(control)
-        found = {(unit, alone[one.text]) for unit, one in driven if one is not None and one.text in alone}
-        return found.pop() if len(found) == 1 else None
+        drives = [pair for joint in self.joints for pair in zip(joint.units, joint.drives, strict=True)]
+        drives += zip(self.element_units, (element.length for element in self.elements), strict=True)
+        factors = spellings(control)
+        texts = ((unit, drive.text) for unit, drive in drives if drive is not None)
+        units = {(unit, factors[text]) for unit, text in texts if text in factors}
+        return units.pop() if len(units) == 1 else None
 
     def sole_control(self, text: str) -> str | None:
         """Return the control that a function consists of, whatever the units of its file; None of others."""
@@ -501,14 +303,14 @@ class Parts:
         return next((name for name in names if text in spellings(name)), None)
 
     def control_value(self, control: str, value: float | str) -> float:
-        """Return the value of a control as it is given, of a number or a text with a unit.
+        """Return the value of a control from a number or a text with a unit.
 
         Args:
             control: Its name.
             value: A number in the units of the network, or a text such as "40deg".
 
         Raises:
-            OptionError: If a text is no number, or its unit is not that of what the control drives by itself.
+            OptionError: If a text is no number, or its unit is not that of what the control alone drives.
         """
         if not isinstance(value, str):
             return value
@@ -517,24 +319,13 @@ class Parts:
         number = quantity_to_si(value, units)
         if not math.isfinite(number):
             allowed = f"a number, or {NAMES[si].partition(' in ')[0]} with its unit" if si else "a number"
-            raise OptionError(Finding(parameter="controls", found=f"{control} = {value}", allowed=allowed))
+            raise OptionError(
+                Finding(parameter="controls", found=f"{control} = {value}", allowed=allowed)
+            )  # plain: ok
         return number
 
-    @cached_property
-    def control_functions(self) -> tuple[PlacedExpression, ...]:
-        """The controls that are functions of others."""
-        return tuple(
-            (f"controls.{one.name}.value", one.value) for one in self.controls if one.value is not None
-        )
 
-
-def spellings(control: str) -> dict[str, Decimal]:
-    """Return the functions that are a control alone, in files in m and rad, mm, deg, each with its factor."""
-    return {
-        control: Decimal(1),
-        f"({control}) * 0.001": Decimal("0.001"),
-        f"({control}) * pi / 180": DEGREE,
-    }
+# --- functions of parts
 
 
 def frame_from_axes(m: Vector, n: Vector, a: Vector) -> Transform:
@@ -545,32 +336,13 @@ def frame_from_axes(m: Vector, n: Vector, a: Vector) -> Transform:
     return Transform(Transform((m, n, cross(m, n))).columns, a)
 
 
-def sort_controls(controls: Sequence[Control]) -> list[Control]:
-    """Return controls, each after those that it is a function of; those of a cycle are left out."""
-    ordered: list[Control] = []
-    known: set[str] = set()
-    left = list(controls)
-    while ready := [one for one in left if one.value is None or one.value.names <= known]:
-        ordered += ready
-        known |= {one.name for one in ready}
-        left = [one for one in left if one.name not in known]
-    return ordered
-
-
-def sample_range(control: Control) -> tuple[float, float]:
-    """Return where a control is looked at: its range, where that is open at most 1 from its start."""
-    if math.isfinite(control.upper - control.lower):
-        return control.lower, control.upper
-    return max(control.lower, control.start - 1.0), min(control.upper, control.start + 1.0)
-
-
 def pair_bodies(first: Joint, second: Joint) -> tuple[str, str]:
     """Return the bodies that a pair of two joints connects in the graph: the second of each, if they differ.
 
     Else the first of each; if these are the same, too, both bodies of the first joint.
     """
-    ends = [*zip(first.bodies[::-1], second.bodies[::-1], strict=True), first.bodies]
-    return next((one for one in ends if one[0] != one[1]), first.bodies)
+    candidates = [*zip(first.bodies[::-1], second.bodies[::-1], strict=True), first.bodies]
+    return next((ends for ends in candidates if ends[0] != ends[1]), first.bodies)
 
 
 def exceeded_limits(
@@ -596,39 +368,72 @@ def exceeded_limits(
             yield unit, value, end, limit
 
 
-def control_faults(parts: Parts) -> Iterator[Finding]:
-    """Yield what is wrong with controls, and names in functions of them that none of them has."""
-    for one in parts.controls:
-        yield from _own_faults(f"controls.{one.name}", one)
-    names = sorted({one.name for one in parts.controls})
-    driving = (*parts.joint_functions, *parts.length_functions)
-    unknown: set[str] = set()
-    for where, function in (*parts.control_functions, *driving):
-        for name in sorted(function.names.difference(names)):
-            unknown.add(name)
-            yield Finding(f"control {format_unknown_name(name, names)}", about=where)
-    for cycle in _cycles(parts.controls):
-        way = " -> ".join((*cycle, cycle[0]))
-        message = f"is a function of itself: {way}; allowed: functions of other controls"
-        yield Finding(message, about=f"controls.{cycle[0]}.value")
-    yield from _idle(parts.controls, driving, unknown)
+def sort_controls(controls: Sequence[Control]) -> list[Control]:
+    """Return controls, each after those that it is a function of; those of a cycle are omitted."""
+    ordered: list[Control] = []
+    known: set[str] = set()
+    rest = list(controls)
+    while ready := [control for control in rest if control.value is None or control.value.names <= known]:
+        ordered += ready
+        known |= {control.name for control in ready}
+        rest = [control for control in rest if control.name not in known]
+    return ordered
 
 
-def _own_faults(where: str, control: Control) -> Iterator[Finding]:
-    """Yield what is wrong with the name, the limits and the start of a control."""
-    if not is_control_name(control.name):
-        allowed = "a letter, then letters, digits, _; not pi, a function or a word of Python"
-        yield Finding(f"found {format_value(control.name)} as a name, allowed: {allowed}", about=where)
-    if control.value is not None:
-        return
-    lower, start, upper = control.lower, control.start, control.upper
-    if not lower <= upper:
-        message = f"found {lower:g}, above upper, {upper:g}; allowed: at most upper"
-        yield Finding(message, about=f"{where}.lower")
-    elif not math.isfinite(start):
-        yield Finding(f"found {start:g}, allowed: a finite number", about=f"{where}.start")
-    elif not lower <= start <= upper:
-        yield Finding(f"found {start:g}, allowed: {lower:g} to {upper:g}", about=f"{where}.start")
+def sample_range(control: Control) -> tuple[float, float]:
+    """Return the range in which a control is sampled: its limits; if open, at most 1 from its start."""
+    if math.isfinite(control.upper - control.lower):
+        return control.lower, control.upper
+    return max(control.lower, control.start - 1.0), min(control.upper, control.start + 1.0)
+
+
+def spellings(control: str) -> dict[str, Decimal]:
+    """Return the functions that are a control alone, in files in m and rad, mm, deg, each with its factor."""
+    return {
+        control: Decimal(1),
+        f"({control}) * 0.001": Decimal("0.001"),
+        f"({control}) * pi / 180": DEGREE,
+    }
+
+
+# --- expressions
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula of names.
+
+    Attributes:
+        text: As it is written; a `ValueError` lists what is allowed if it is not arithmetic.
+
+    """
+
+    text: str
+
+    def __post_init__(self) -> None:
+        _ = self._tree
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """The names in it except pi."""
+        names = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
+        return frozenset(names - {"pi", *_ARGUMENTS})
+
+    def value(self, values: Mapping[str, Element]) -> Element:
+        """Return its value at values of its names, any elements."""
+        return self.value_and_gradient(values)[0]
+
+    def value_and_gradient(self, values: Mapping[str, Element]) -> ValueAndGradient:
+        """Return its value and its partial derivatives at values of its names, any elements.
+
+        By the rules of differentiation along its tree, so that they are exact to rounding.
+        """
+        with np.errstate(all="ignore"):  # the caller checks for values that are not finite
+            return _evaluate(self._tree, values)
+
+    @cached_property
+    def _tree(self) -> ast.expr:
+        return _parse(self.text)
 
 
 def is_control_name(text: str) -> bool:
@@ -639,36 +444,133 @@ def is_control_name(text: str) -> bool:
         return False
 
 
-def _cycles(controls: tuple[Control, ...]) -> Iterator[list[str]]:
-    """Yield the names of controls that are functions of each other, in a ring."""
-    names = {one.name for one in controls}
-    needs = {one.name: one.value.names & names if one.value else frozenset() for one in controls}
-    while needs:
-        while ready := [name for name, needed in needs.items() if not needed & needs.keys()]:
-            for name in ready:
-                del needs[name]
-        if needs:  # each of these needs another of these
-            way = [next(iter(needs))]
-            while (following := min(needs[way[-1]] & needs.keys())) not in way:
-                way.append(following)
-            yield way[way.index(following) :]
-            for name in way[way.index(following) :]:
-                del needs[name]
+_ARGUMENTS = {"sin": 1, "cos": 1, "tan": 1, "atan2": 2, "sqrt": 1, "exp": 1}  # of each function
 
 
-def _idle(
-    controls: tuple[Control, ...], driving: Sequence[PlacedExpression], unknown: set[str]
-) -> Iterator[Finding]:
-    """Yield controls that drive nothing, but for those that a name which is none may have meant."""
-    names = [one.name for one in controls]
-    found = {name for _, function in driving for name in function.names}
-    found |= {closest_name(name, names) or "" for name in unknown}
-    functions = {one.name: one.value.names for one in controls if one.value is not None}
-    used: set[str] = set()
-    while found:
-        used |= found
-        found = {name for one in found for name in functions.get(one, ())} - used
-    for name in names:
-        if name not in used:
-            message = "drives nothing; allowed: controls that drive a joint or an element"
-            yield Finding(message, about=f"controls.{name}", kind="idle")
+@cache
+def _parse(text: str) -> ast.expr:
+    """Return the tree of an expression, of arithmetic alone; raise a `ValueError` otherwise."""
+    if len(text) > MAX_LETTERS:
+        raise ValueError(f"found {format_value(text)} of {len(text)} letters, allowed: {MAX_LETTERS} at most")
+    depth = max(accumulate((letter == "(") - (letter == ")") for letter in text), default=0)
+    if depth > MAX_DEPTH:
+        raise ValueError(f"found {format_value(text)}, nested {depth} deep; allowed: {MAX_DEPTH}")
+    try:
+        if "#" in text:  # the rest would be a comment
+            raise SyntaxError("a remark")
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ValueError(
+            f"found {format_value(text)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}"
+        ) from error
+    _check_arithmetic(tree, text, 0)
+    return tree
+
+
+def _check_arithmetic(node: ast.expr, text: str, depth: int) -> None:
+    if depth > MAX_DEPTH:
+        raise ValueError(f"found {format_value(text)}, nested {depth} deep; allowed: {MAX_DEPTH}")
+    operands: list[ast.expr] = []
+    match node:
+        case ast.Constant(value=value) if _is_finite(value):
+            pass
+        case ast.Name(id=name) if name not in _ARGUMENTS:
+            pass
+        case ast.BinOp(left, ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow(), right):
+            operands = [left, right]
+        case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
+            operands = [operand]
+        case ast.Call(ast.Name(id=name), operands, []):
+            if name not in _ARGUMENTS:
+                raise ValueError(f"function {format_unknown_name(name, _ARGUMENTS)}")
+            if len(operands) != _ARGUMENTS[name]:
+                raise ValueError(f"found {len(operands)} arguments of {name}, allowed: {_ARGUMENTS[name]}")
+        case _:
+            part = ast.get_source_segment(text.strip(), node) or text
+            is_xor = isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor)
+            hint = "; a power is **" if is_xor else ""
+            raise ValueError(
+                f"found {format_value(part)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}{hint}"
+            )
+    for operand in operands:
+        _check_arithmetic(operand, text, depth + 1)
+
+
+def _is_finite(constant: Any) -> bool:
+    try:
+        is_number = isinstance(constant, (int, float)) and not isinstance(constant, bool)
+        return is_number and math.isfinite(float(constant))
+    except OverflowError:  # an integer beyond the floats
+        return False
+
+
+def _evaluate(node: ast.expr, values: Mapping[str, Element]) -> ValueAndGradient:
+    match node:
+        case ast.Constant(value=value):
+            return float(value), {}  # type: ignore[arg-type]
+        case ast.Name(id="pi"):
+            return math.pi, {}
+        case ast.Name(id=name):
+            return values[name], {name: 1.0}
+        case ast.UnaryOp(operator, operand):
+            value, gradient = _evaluate(operand, values)
+            is_plus = isinstance(operator, ast.UAdd)
+            return (value, gradient) if is_plus else (minus(0.0, value), _scale(gradient, -1.0))
+        case ast.BinOp(left, operator, right):
+            return _apply_operator(operator, _evaluate(left, values), _evaluate(right, values))
+        case ast.Call(ast.Name(id=name), arguments):
+            return _apply_function(name, *(_evaluate(argument, values) for argument in arguments))
+    raise TypeError(f"{ast.dump(node)} was let through")
+
+
+def _apply_operator(operator: ast.operator, a: ValueAndGradient, b: ValueAndGradient) -> ValueAndGradient:
+    """Return a + b, a - b, a b, a / b or a^b.
+
+    (a / b)' = a' / b - a b' / b^2. (a^b)' = b a^(b - 1) a' + a^b ln(a) b', the last only if b varies: else a
+    may be negative.
+    """
+    (u, du), (v, dv) = a, b
+    match operator:
+        case ast.Add():
+            return plus(u, v), _add(du, dv)
+        case ast.Sub():
+            return minus(u, v), _add(du, _scale(dv, -1.0))
+        case ast.Mult():
+            return times(u, v), _add(_scale(du, v), _scale(dv, u))
+        case ast.Div():
+            inverse = np.divide(1.0, v)
+            value = u * inverse
+            return value, _add(_scale(du, inverse), _scale(dv, -value * inverse))
+    value = np.power(u, v)
+    gradient = _scale(du, times(v, np.power(u, minus(v, 1.0)))) if du else {}
+    return value, _add(gradient, _scale(dv, value * np.log(u))) if dv else gradient
+
+
+def _apply_function(name: str, *arguments: ValueAndGradient) -> ValueAndGradient:
+    """Return a function of one argument u, or atan2(y, x)' = (x y' - y x') / (x^2 + y^2)."""
+    u, du = arguments[0]
+    match name:
+        case "sin":
+            return np.sin(u), _scale(du, np.cos(u))
+        case "cos":
+            return np.cos(u), _scale(du, -np.sin(u))
+        case "tan":
+            value = np.tan(u)
+            return value, _scale(du, 1.0 + value * value)
+        case "sqrt":
+            value = np.sqrt(u)
+            return value, _scale(du, np.divide(0.5, value)) if du else {}
+        case "atan2":
+            (y, dy), (x, dx) = arguments
+            inverse = np.divide(1.0, y * y + x * x)
+            return np.arctan2(y, x), _add(_scale(dy, x * inverse), _scale(dx, -y * inverse))
+    value = np.exp(u)
+    return value, _scale(du, value)
+
+
+def _scale(gradient: Gradient, factor: Element) -> Gradient:
+    return {name: times(factor, slope) for name, slope in gradient.items()}
+
+
+def _add(first: Gradient, second: Gradient) -> Gradient:
+    return {name: plus(first.get(name, 0.0), second.get(name, 0.0)) for name in {**first, **second}}

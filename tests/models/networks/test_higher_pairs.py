@@ -19,8 +19,8 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import evaluate_closure, iter_release_columns
-from urmpipe_models.networks.elements import transmission
 from urmpipe_models.networks.forces import Wrench, compute_forces
+from urmpipe_models.networks.joint_motion import transmission
 from urmpipe_models.networks.mechanism import build_mechanism
 
 ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps
