@@ -85,8 +85,8 @@ class Variable:
     def start_rejection_reason(self, value: Any) -> str:
         """Return why a value of a system file cannot be its start value; empty if it can."""
         if not self.is_settable:
-            found = f"{self.name}, {self.variability} {self.causality}"  # plain: ok
-            return f"found {found}, allowed: a parameter, input or state"
+            kind = f"{self.variability} {self.causality}"
+            return f"found {self.name}, {kind}, allowed: a parameter, input or state"
         types: dict[str, tuple[type | tuple[type, ...], str]] = {
             "String": (str, "a text"),
             "Boolean": (bool, "true, false"),

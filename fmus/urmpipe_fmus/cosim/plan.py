@@ -279,9 +279,9 @@ def _order(
                 for port in loop_outputs
                 if port.variable in interfaces[port.block].missing_dependencies
             )
-            reason = (
-                assumed and f" ({assumed}: on all inputs, as the FMU does not tell on which)"
-            )  # plain: ok
+            reason = ""
+            if assumed:
+                reason = f" ({assumed}: on all inputs, as the FMU does not tell on which)"  # plain: ok
             message = f"{loop.ring}: each depends on the one before at the same instant{reason}"
             faults.append(
                 Finding(f"{message}; allowed: none, or [loops] iterate = true", about="algebraic loop")

@@ -165,8 +165,8 @@ def system_text(name: str) -> str:
         CosimulationError: If there is no such system.
     """
     if system_name(name) not in system_names():
-        found = f"found {format_value(name)}{format_suggestion(name, system_names())}"  # plain: ok
-        raise CosimulationError(f"system: {found}, allowed: one of {', '.join(system_names())}")
+        unknown = f"{format_value(name)}{format_suggestion(name, system_names())}"
+        raise CosimulationError(f"system: found {unknown}, allowed: one of {', '.join(system_names())}")
     return _system_path(name).read_text(encoding="utf-8")
 
 
@@ -302,7 +302,7 @@ _WITH_UNIT = [{unit: factor for unit, factor in units.items() if unit} for units
 
 
 def _parse_like(default: Any, text: str) -> Any:
-    """Return a text as a value of a default's type; ValueError if it is none."""
+    """Return a text as a value of a default's type; ValueError if it has another."""
     if isinstance(default, bool):
         if text not in ("true", "false"):
             raise ValueError(text)
@@ -373,8 +373,8 @@ class _SystemReader:
             self.table.add_error(where, f"found {format_value(name)} as a name, allowed: {allowed}")
         kinds = [key for key in BLOCK_KINDS if key in values]
         if len(kinds) != 1:
-            found = " and ".join(kinds) or "none of them"  # plain: ok
-            self.table.add_error(where, f"found {found}, allowed: one of {', '.join(BLOCK_KINDS)}")
+            stated = " and ".join(kinds) or "none of them"
+            self.table.add_error(where, f"found {stated}, allowed: one of {', '.join(BLOCK_KINDS)}")
         texts = {key: table.text(key) for key in kinds}
         for key in ("file", "fmu"):
             if texts.get(key) and not is_existing_file(Path(texts[key])):

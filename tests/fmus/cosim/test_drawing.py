@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from foreign_fmus import COUNTER, INTEGRATOR, Foreign, Scalar, gain, planned
 from urmpipe_fmus.cosim import LogColumn, LogInput, Plan, Port, system_svg
-from urmpipe_fmus.cosim.drawing import Box, Diagram, Layout, Pin, Wire, diagram
+from urmpipe_fmus.cosim.drawing import Box, Diagram, Layout, Pin, Wire, build_diagram
 from urmpipe_models.elementwise import FloatArray
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -60,7 +60,7 @@ def test_boxes_stand_apart_and_wires_go_from_port_to_port_around_them(shown: Dia
     corners = [(box.x, box.y) for box in boxes] + [(box.x + box.width, box.y + box.height) for box in boxes]
     for wire in shown.wires:
         source, target = shown.boxes[wire.source], shown.boxes[wire.target]
-        way = sampled(layout.way(wire))
+        way = sampled(layout.route(wire))
         start = (source.x + source.width, source.y + source.offset(source.right, wire.output))
         assert np.allclose(
             way[[0, -1]], [start, (target.x, target.y + target.offset(target.left, wire.input))]
@@ -78,7 +78,7 @@ def test_wires_lead_to_the_right_but_for_those_that_close_a_ring() -> None:
     ahead = [Wire(a, "y", b, "u") for a, b in pairwise(names)]
     layout = Layout(Diagram(boxes, (*ahead, Wire("load", "y", "control", "v"))))
     assert [boxes[name].layer for name in names] == [0, 1, 2, 3]
-    assert [layout.back(wire) for wire in layout.wires] == [False, False, False, True]
+    assert [layout.is_feedback(wire) for wire in layout.wires] == [False, False, False, True]
 
 
 def arm_plan() -> Plan:
@@ -105,11 +105,11 @@ def arm_plan() -> Plan:
 
 @pytest.mark.slow
 def test_arrays_are_one_port_and_one_wire_and_idle_outputs_are_counted() -> None:
-    shown = diagram(arm_plan())
+    shown = build_diagram(arm_plan())
     assert shown.wires == (
         Wire("source", "q", "arm", "phi", 2),
         Wire("g", "y", "i", "u"),
-        Wire("a<b>&.csv", "u", "g", "u", held=True),
+        Wire("a<b>&.csv", "u", "g", "u", is_stepwise=True),
     )
     arm = shown.boxes["arm"]
     assert arm.left == [Pin("phi", 2, "rad")]
@@ -122,7 +122,7 @@ def test_a_log_is_called_by_its_file_whole_paths_tell_two_of_one_name_apart() ->
     blocks = {f"b{i}": gain() for i in range(4)}
     asks = [LogInput(destination=Port(f"b{i}", "u"), log=log, column="u") for i, log in enumerate(names)]
     column = LogColumn(np.array([0, 10**9]), np.zeros(2))
-    shown = diagram(planned(blocks, None, None, asks, column=lambda one: column))
+    shown = build_diagram(planned(blocks, None, None, asks, column=lambda one: column))
     assert [name for name in shown.boxes if name not in blocks] == [
         "u.csv",
         "one/v.csv",
@@ -177,9 +177,12 @@ def held_plan(**period: float) -> Plan:
 
 
 def test_what_is_held_is_dashed_and_what_never_changes_has_its_value() -> None:
-    shown = diagram(held_plan())
-    assert [(wire.source, wire.target) for wire in shown.wires if wire.held] == [("s", "t"), ("x.csv", "g")]
-    assert [(wire.source, wire.target) for wire in shown.wires if not wire.held] == [
+    shown = build_diagram(held_plan())
+    assert [(wire.source, wire.target) for wire in shown.wires if wire.is_stepwise] == [
+        ("s", "t"),
+        ("x.csv", "g"),
+    ]
+    assert [(wire.source, wire.target) for wire in shown.wires if not wire.is_stepwise] == [
         ("g", "s"),
         ("t", "h"),
         ("x.csv", "i"),
@@ -202,7 +205,7 @@ def test_whole_numbers_and_truths_that_never_change_are_spelled_as_in_a_system_f
         (2_000_000, True, ["by = 2000000", "on = true"]),
         (-1, False, ["by = -1", "on = false"]),
     ):
-        shown = diagram(planned({"n": COUNTER}, {}, {"n": {"by": by, "on": on}}))
+        shown = build_diagram(planned({"n": COUNTER}, {}, {"n": {"by": by, "on": on}}))
         assert [pin.label for pin in shown.boxes["n"].left] == said
 
 
@@ -214,9 +217,9 @@ def test_the_log_of_a_source_is_named_with_how_it_is_read() -> None:
     ):
         first, source = plan.system.blocks
         played = replace(plan.system, blocks=(first, replace(source, options=options)))
-        shown = diagram(replace(plan, system=played))
+        shown = build_diagram(replace(plan, system=played))
         assert shown.boxes["b"].kind == said
-        assert [wire.held for wire in shown.wires] == [said.count("held") == 1]
+        assert [wire.is_stepwise for wire in shown.wires] == [said.count("held") == 1]
 
 
 def test_a_long_name_is_broken_into_lines_that_the_drawing_has_room_for() -> None:
