@@ -2,8 +2,8 @@
 
 1. `rows_to_path`: rows that are corners define the lines, into which the arcs are cut
    (`_segments_at_corners`). Rows that are first points of their arcs define lines one after the other, from
-   the end of each arc to the next row (`_segments_from_first_points`). Source: [Iso9283]_ section 2, section 4
-   steps 3 to 10.
+   the end of each arc to the next row (`_segments_from_first_points`). Source: [Iso9283]_ section 2,
+   section 4 steps 3 to 10.
 2. `validate_rows`, `validate_ends`: every row without a path, with its reason.
 """
 
@@ -30,8 +30,8 @@ from urmpipe_models.planning.path import (
 )
 
 # Lengths up to this are rounding: in [m], or for coordinates beyond 1 m as a share of the largest. A
-# coordinate is rounded by 1e-16 of itself. That rotates an arc, by more the shorter the line before it is, and
-# each arc passes it on to the next: the margin for that is 1e4.
+# coordinate is rounded by 1e-16 of itself. That rotates an arc, by more the shorter the line before it is,
+# and each arc passes it on to the next: the margin for that is 1e4.
 ROUNDING_LENGTH = 1e-12
 
 
