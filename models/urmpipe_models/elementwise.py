@@ -1,22 +1,19 @@
-"""Vector algebra on one element per coordinate.
+"""Elementwise arithmetic: vectors, sine and cosine of one element per coordinate, and long arrays in blocks.
 
-An *element* is a float, an array over samples, or a CasADi symbol. Products and sums with a
-constant 0.0 or 1.0 are folded away, so that a chain pays only for the entries that its geometry
-really has: an axis along z or a tilt about y costs no multiplication by zero.
+1. An *element* is a float, an array over samples, or a CasADi symbol. A float is a constant: its products
+   and sums with 0 and 1 are folded, so that a chain costs only the entries that its geometry has (an axis
+   along z or a tilt about y costs no multiplication by zero). An `np.float64` is a value, as an entry of an
+   array: nothing is folded, so that a scalar, a column and C give the same bits.
+2. `cosine_sine`: the same bits on every platform, for a float and for each element of an array. np.sin and
+   np.cos differ in the last bit between processors and versions of NumPy. Here only +, - and * of IEEE 754
+   are used: x = k h + r with h = 2 pi / 4096 and |r| <= h / 2, sine and cosine of k h from a table, and
 
-The types of arrays, under one name each.
+       sin(x) = s + (s (cos r - 1) + c sin r),    cos(x) = c + (c (cos r - 1) - s sin r)
 
-Sine and cosine, the same to the last bit on every platform, of a float as of each element of an array.
-
-np.sin and np.cos differ in the last bit between processors and versions of NumPy. Here only +, - and * of
-IEEE 754 are used: x = k h + r with h = 2 pi / 4096 and |r| <= h / 2, sine and cosine of k h from a table, and
-
-    sin(x) = s + (s (cos r - 1) + c sin r),    cos(x) = c + (c (cos r - 1) - s sin r)
-
-with the series of sin r up to r^3 and of cos r - 1 up to r^4, which leave out at most r^5 / 120 = 2.3e-18.
-Rounding: 0.5 ulp of the table and 0.5 ulp of the last sum, so 1.1e-16 together, and some 1e-19 of the rest.
-
-Long arrays, worked on in blocks of rows, several blocks side by side.
+   with the series of sin r up to r^3 and of cos r - 1 up to r^4, which omit at most r^5 / 120 = 2.3e-18.
+   Rounding: 0.5 ulp of the table and 0.5 ulp of the last sum, so 1.1e-16 together, and some 1e-19 of the
+   rest.
+3. Blocks of rows that stay in the cache, several of them in parallel.
 """
 
 from __future__ import annotations
@@ -29,11 +26,14 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Element: TypeAlias = Any
-"""A float, an array of shape (n,), or a symbol: whatever `+ - *` and NumPy's ufuncs take."""
+Element: TypeAlias = Any  # a float, an array of shape (n,), or a symbol: operand of `+ - *` and of ufuncs
+Vector: TypeAlias = tuple[Element, Element, Element]  # x, y, z
 
-Vector: TypeAlias = tuple[Element, Element, Element]
-"""x, y, z."""
+FloatArray: TypeAlias = NDArray[np.float64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+IntArray: TypeAlias = NDArray[np.int64]  # counts, and times in [ns]
+IndexArray: TypeAlias = NDArray[np.intp]  # rows of another array
+TextArray: TypeAlias = NDArray[np.object_]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 
@@ -99,25 +99,11 @@ def cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-FloatArray: TypeAlias = NDArray[np.float64]
-BoolArray: TypeAlias = NDArray[np.bool_]
-IntArray: TypeAlias = NDArray[np.int64]
-"""Counts, and times in [ns]."""
-IndexArray: TypeAlias = NDArray[np.intp]
-"""Rows of another array."""
-TextArray: TypeAlias = NDArray[np.object_]
-
-
-_STEPS = 4096
+_STEPS = 4096  # of the table, in a turn
 _BITS = 128
-_PI = 0x3243F6A8885A308D313198A2E03707344
-"""pi in units of 2^-128: Python divides whole numbers with a single rounding."""
-
-_COARSE = 90
-"""Bits that the first part of a step lacks: it has 29, so that up to 2^24 steps are exact."""
-
-_MOST = 2.5e4
-"""Largest angle in [rad] within 2^24 steps: 3979 turns."""
+_PI = 0x3243F6A8885A308D313198A2E03707344  # pi in units of 2^-128: Python divides integers with one rounding
+_COARSE = 90  # bits omitted from the first part of a step: it has 29, so that up to 2^24 steps are exact
+_MAX_ANGLE = 2.5e4  # [rad], within 2^24 steps: 3979 turns
 
 _STEP = 2 * _PI // _STEPS
 _STEP_1 = (_STEP >> _COARSE) / (1 << _BITS - _COARSE)
@@ -125,18 +111,17 @@ _STEP_2 = (_STEP & (1 << _COARSE) - 1) / (1 << _BITS)
 _PER_STEP = (1 << _BITS) / _STEP
 _TURN = 2 * _PI / (1 << _BITS)
 _TURN_REST = (2 * _PI - int(_TURN * 2**51) * (1 << _BITS - 51)) / (1 << _BITS)
-WORK = 4
-"""Arrays that `cosine_sine_into` needs in between."""
-_SHIFT = 1.5 * 2.0**52
-"""A number added to it is rounded to a whole one, half to even, which stands in the low bits."""
+_SHIFT = 1.5 * 2.0**52  # a number added to it is rounded to an integer, half to even, in the low bits
+
+WORK = 4  # arrays of intermediate results in `cosine_sine_into`
 
 
 def cosine_sine(angle: Element) -> tuple[Element, Element]:
     """Return cos and sin of an angle in [rad]: within 1.2e-16 up to 2.5e4 rad, within 6e-16 up to 1e15 rad.
 
-    Beyond, doubles are 0.1 rad apart and more: the results are those of some angle, alike on every platform.
-    An angle that is not finite gives NaN. What is neither a float nor an array of float64, such as a symbol,
-    goes to np.cos and np.sin.
+    Beyond, doubles are 0.1 rad apart and more: the results are those of some angle, equal on every platform.
+    An angle that is not finite gives NaN. An angle that is neither a float nor an array of float64, such as a
+    symbol, is passed to np.cos and np.sin.
 
     Args:
         angle: Any element; an array may have any shape and strides.
@@ -148,34 +133,37 @@ def cosine_sine(angle: Element) -> tuple[Element, Element]:
         return np.float64(cosine), np.float64(sine)
     if type(angle) is not float:
         return np.cos(angle), np.sin(angle)
-    if not abs(angle) <= _MOST:
+    if not abs(angle) <= _MAX_ANGLE:
         cosine, sine = _of_array(np.array([angle]))
         return cosine.item(), sine.item()
     steps = round(angle * _PER_STEP)
     cosines, sines = cosine_sine_table()
     at = steps % _STEPS
-    return _turned(cosines.item(at), sines.item(at), float(angle - steps * _STEP_1) - steps * _STEP_2)
+    c, s, rest = cosines.item(at), sines.item(at), angle - steps * _STEP_1 - steps * _STEP_2
+    z = rest * rest
+    sine = z * (-1.0 / 6.0) * rest + rest
+    versine = (z * (1.0 / 24.0) - 0.5) * z
+    return c + (c * versine - s * sine), s + (s * versine + c * sine)
 
 
 def _of_array(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return cos and sin of each element."""
     cosine, sine, *work = (np.empty(x.shape) for _ in range(2 + WORK))
     cosine_sine_into(x, cosine, sine, *work)
     return cosine, sine
 
 
 def cosine_sine_into(x: FloatArray, c: FloatArray, s: FloatArray, *work: FloatArray) -> None:
-    """Write cos and sin of each angle x [rad] into c and s, without an array of its own: those cost more.
+    """Write cos and sin of each angle x [rad] into c and s, without allocating arrays, which would cost more.
 
     Args:
         x: Any shape and strides.
-        c: An array of the same shape, apart from x.
+        c: An array of the same shape, without common memory.
         s: Another one, of the same shape.
         work: `WORK` more.
     """
     steps, r, sine, other = work
-    if not np.abs(x, steps).max(initial=0.0) <= _MOST:
-        x = _less_turns(x)
+    if not np.abs(x, steps).max(initial=0.0) <= _MAX_ANGLE:
+        x = _remove_turns(x)
     np.multiply(x, _PER_STEP, steps)
     steps += _SHIFT
     at = np.bitwise_and(steps.view(np.int64), _STEPS - 1, r.view(np.int64))
@@ -203,20 +191,12 @@ def cosine_sine_into(x: FloatArray, c: FloatArray, s: FloatArray, *work: FloatAr
     c += versine
 
 
-def _turned(c: float, s: float, r: float) -> tuple[float, float]:
-    """Return cos and sin of an angle from those of the nearest step and the rest in [rad], as the array's."""
-    z = r * r
-    sine = z * (-1.0 / 6.0) * r + r
-    versine = (z * (1.0 / 24.0) - 0.5) * z
-    return c + (c * versine - s * sine), s + (s * versine + c * sine)
+def _remove_turns(x: FloatArray) -> FloatArray:
+    """Return the angles, without whole turns beyond the limit; NaN if an angle is not finite.
 
-
-def _less_turns(x: FloatArray) -> FloatArray:
-    """Return the angles with those beyond the limit less whole turns; what is not finite is NaN.
-
-    The remainder by 2 pi as a double is exact; what 2 pi lacks counts as often as there were turns.
+    The remainder by 2 pi as a double is exact; the rounding error of 2 pi is subtracted once per turn.
     """
-    while (far := np.abs(x) > _MOST).any():
+    while (far := np.abs(x) > _MAX_ANGLE).any():
         rest = np.fmod(x, _TURN)
         x = np.where(far, rest - np.rint((x - rest) / _TURN) * _TURN_REST, x)
     return x
@@ -226,47 +206,44 @@ def _less_turns(x: FloatArray) -> FloatArray:
 def cosine_sine_table() -> tuple[FloatArray, FloatArray]:
     """Return cos and sin [-] of k 2 pi / 4096, shape (4096,), each the nearest double.
 
-    One step after the other is added in whole numbers of 2^-128, up to an eighth of a turn; the rest is
-    symmetry. The errors of 512 steps reach 1e-35, and no value is that close to the middle of two doubles.
+    Steps are added in integers of 2^-128 up to an eighth of a turn; the rest is symmetry. The errors of 512
+    steps reach 1e-35, and no value is that close to the middle of two doubles.
     """
-    one = 1 << _BITS
-    term, powers = one, [one, 0]
+    unit = 1 << _BITS  # 1.0
+    term, powers = unit, [unit, 0]
     for k in range(1, 16):
         term = (term * _STEP >> _BITS) // k
         powers[k % 2] += -term if k % 4 > 1 else term
-    cosine, sine = [one], [0]
+    cosine, sine = [unit], [0]
     for _ in range(_STEPS // 8):
         c, s = cosine[-1], sine[-1]
         cosine.append(c * powers[0] - s * powers[1] >> _BITS)
         sine.append(s * powers[0] + c * powers[1] >> _BITS)
-    quarter = np.array([value / one for value in [*sine, *cosine[-2::-1]]])
+    quarter = np.array([value / unit for value in [*sine, *cosine[-2::-1]]])
     half = np.concatenate((quarter[:-1], quarter[:0:-1]))
     sines = np.concatenate((half, -half))
     return np.roll(sines, -_STEPS // 4), sines
 
 
-BLOCK = 16384
-"""Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
+BLOCK = 16384  # rows: so many that NumPy outweighs Python, few enough for the cache of a core
+THREADS = min(4, os.cpu_count() or 1)  # with more, Python's work, which holds the lock, sets the pace
 
-THREADS = min(4, os.cpu_count() or 1)
-"""Blocks worked on side by side: beyond some, Python's own work, which runs alone, sets the pace."""
-
-Block = TypeVar("Block")
-Result = TypeVar("Result")
+_Block = TypeVar("_Block")
+_Result = TypeVar("_Result")
 
 
 def row_blocks(count: int, size: int = BLOCK) -> list[slice]:
-    """Return the slices that part `count` rows into blocks of `size`, the last one shorter."""
+    """Return the slices of `count` rows in blocks of `size`, the last one shorter."""
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
 def spread_rows(count: int, most: int) -> IntArray:
-    """Return at most so many indices of `count` rows, spread evenly from first to last, shape (k,)."""
+    """Return at most `most` indices of `count` rows, evenly from first to last, shape (k,)."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
 def row_norms(vectors: FloatArray) -> FloatArray:
-    """Return the lengths of vectors, in their unit, shape (n,), with memory for a block of rows beside them.
+    """Return the lengths of vectors, in their unit, shape (n,), with temporary arrays of a block of rows.
 
     Args:
         vectors: In any unit, shape (n, k).
@@ -279,17 +256,17 @@ def row_norms(vectors: FloatArray) -> FloatArray:
 
 
 def map_blocks(
-    work: Callable[[Block], Result], blocks: Sequence[Block], threads: int = THREADS
-) -> list[Result]:
-    """Return what work makes of each block, several at a time: NumPy computes without Python's lock.
+    work: Callable[[_Block], _Result], blocks: Sequence[_Block], threads: int = THREADS
+) -> list[_Result]:
+    """Return the results of a function for all blocks, in parallel: NumPy computes without Python's lock.
 
     Args:
-        work: Called once a block.
-        blocks: Slices, indices of rows, or rows themselves.
-        threads: Blocks worked on at a time.
+        work: Called once per block.
+        blocks: Slices, indices of rows, or rows.
+        threads: Blocks computed at the same time.
 
     Raises:
-        Exception: What work raised first, in the order of the blocks.
+        Exception: The error of the first block that failed, in the order of the blocks.
     """
     if len(blocks) < 2 or threads < 2:
         return [work(block) for block in blocks]

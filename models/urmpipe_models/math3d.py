@@ -1,6 +1,8 @@
-"""Rigid transforms, elementwise: the constant frames of a chain and its poses over a log alike.
+"""Rotations and rigid transforms: frames, Euler angles, and the forms of orientations in logs.
 
-Orientations in the forms in which logs record them, as unit quaternions and rotation matrices.
+1. `Transform` and the elementary motions, elementwise: constant frames of a chain and poses over a log.
+2. Euler angles of a rotation, with their singular poses.
+3. Orientations in the forms in which logs record them, as unit quaternions and rotation matrices of arrays.
 """
 
 from __future__ import annotations
@@ -29,17 +31,11 @@ from urmpipe_models.elementwise import (
     times,
 )
 
-SINGULAR_COSINE = 1e-9
-"""Below this cosine of ry, rz and rx are not separately defined (double precision leaves no digits)."""
+SINGULAR_COSINE = 1e-9  # of ry: below it, rz and rx are not separately defined (no digits are left)
+SINGULAR_SINE = 1e-9  # of x: below it, z1 and z2 of Z-X-Z are not separately defined
 
-SINGULAR_SINE = 1e-9
-"""Below this sine of x, z1 and z2 of Z-X-Z are not separately defined."""
-
-_QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
-"""cos and sin of 0, 1, 2 and 3 quarter turns."""
-
-_Numbers: TypeAlias = tuple[float, float, float]
-"""What the elements are of a frame that is stored."""
+_QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))  # cos, sin of 0 to 3 quarter turns
+_Numbers: TypeAlias = tuple[float, float, float]  # the elements of a stored frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +45,8 @@ class Transform:
     Attributes:
         rotation: The rows of R, each three elements [-].
         translation: p, three elements in [m].
-        made_of: The constants and elementary motions whose product it is; None where only its numbers are
-            known. It counts for nothing in a comparison, and a product of frames has none.
+        made_of: The constants and elementary motions whose product it is, or None if only the numbers are
+            known. Comparisons ignore it, and a product of frames has none.
     """
 
     rotation: tuple[Vector, Vector, Vector] = field(
@@ -62,49 +58,37 @@ class Transform:
 
     def __matmul__(self, other: Transform) -> Transform:
         """Return the frame C in A from B in A (self) and C in B (other)."""
-        columns = other.columns
+        (x, y, z), columns = self.rotation, other.columns
         return Transform(
             (
-                (
-                    dot(self.rotation[0], columns[0]),
-                    dot(self.rotation[0], columns[1]),
-                    dot(self.rotation[0], columns[2]),
-                ),
-                (
-                    dot(self.rotation[1], columns[0]),
-                    dot(self.rotation[1], columns[1]),
-                    dot(self.rotation[1], columns[2]),
-                ),
-                (
-                    dot(self.rotation[2], columns[0]),
-                    dot(self.rotation[2], columns[1]),
-                    dot(self.rotation[2], columns[2]),
-                ),
+                (dot(x, columns[0]), dot(x, columns[1]), dot(x, columns[2])),
+                (dot(y, columns[0]), dot(y, columns[1]), dot(y, columns[2])),
+                (dot(z, columns[0]), dot(z, columns[1]), dot(z, columns[2])),
             ),
             self.point(other.translation),
         )
 
     @property
     def columns(self) -> tuple[Vector, Vector, Vector]:
-        """The axes x, y, z of B seen from A: the columns of R [-]."""
+        """The axes x, y, z of B in A: the columns of R [-]."""
         x, y, z = self.rotation
         return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
 
     def rotate(self, vector: Vector) -> Vector:
-        """Return R v, a direction given in B seen from A, in whatever unit v has."""
+        """Return R v, a direction v of B in A, in the unit of v."""
         return dot(self.rotation[0], vector), dot(self.rotation[1], vector), dot(self.rotation[2], vector)
 
     def point(self, position: Vector) -> Vector:
-        """Return R x + p, a point given in B [m] seen from A [m]."""
+        """Return R x + p, a point x [m] of B in A [m]."""
         return add(self.rotate(position), self.translation)
 
     def inverse(self) -> Transform:
         """Return the frame A in B: R^T, -R^T p."""
-        turned = Transform(self.columns)
-        return Transform(self.columns, scale(-1.0, turned.rotate(self.translation)))
+        inverse = Transform(self.columns)
+        return Transform(self.columns, scale(-1.0, inverse.rotate(self.translation)))
 
-    def turned(self, axis: Sequence[float], angle: Element) -> Transform:
-        """Return the frame after a rotation about an axis of its own: R rotation_about(axis, angle), p.
+    def rotated(self, axis: Sequence[float], angle: Element) -> Transform:
+        """Return the frame after a rotation about an axis of B: R rotation_about(axis, angle), p.
 
         About x, y or z the other two axes y, z (z, x; x, y) become c y + s z, c z - s y: 12 products
         instead of 27.
@@ -126,7 +110,7 @@ class Transform:
 
 
 def rotate_vectors(vectors: Sequence[Vector], axis: Sequence[float], angle: Element) -> list[Vector]:
-    """Return vectors after a rotation about an axis, each in its own unit.
+    """Return vectors after a rotation about an axis, each in its unit.
 
     About x, y or z the other two coordinates a, b become c a - s b, c b + s a: 4 products instead of 9.
 
@@ -140,14 +124,14 @@ def rotate_vectors(vectors: Sequence[Vector], axis: Sequence[float], angle: Elem
         return [*map(rotation_about(axis, angle).rotate, vectors)]
     c, s = _cosine_sine(angle)
     s = times(axis[along], s)
-    turned = []
+    rotated = []
     for vector in vectors:
         first, second = vector[along - 2], vector[along - 1]
-        new = list(vector)
-        new[along - 2] = minus(times(c, first), times(s, second))
-        new[along - 1] = plus(times(c, second), times(s, first))
-        turned.append((new[0], new[1], new[2]))
-    return turned
+        entries = list(vector)
+        entries[along - 2] = minus(times(c, first), times(s, second))
+        entries[along - 1] = plus(times(c, second), times(s, first))
+        rotated.append((entries[0], entries[1], entries[2]))
+    return rotated
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,8 +142,8 @@ class Step:
         kind: along or about.
         axis: x, y or z.
         value: In [m] along, in [rad] about the axis, any element.
-        name: Its name in the arm; where it is empty, that of its frame and axis.
-        source: What described it, in a few words.
+        name: Its name in the arm; if empty, that of its frame and axis.
+        source: The description that it is from, such as "6R length".
     """
 
     kind: Literal["along", "about"]
@@ -178,13 +162,13 @@ class Step:
 
 
 def compose(parts: Iterable[Transform | Step]) -> Transform:
-    """Return the product of constants and elementary motions from the left, the identity of none."""
+    """Return the product of constants and elementary motions from left to right; of none, the identity."""
     frames = [part.frame if isinstance(part, Step) else part for part in parts]
     return reduce(matmul, frames) if frames else Transform()
 
 
 def compose_steps(*parts: Transform | Step) -> Transform:
-    """Return the product of constants and elementary motions, which knows them."""
+    """Return the product of constants and elementary motions, with these as `made_of`."""
     frame = compose(parts)
     return Transform(frame.rotation, frame.translation, parts)
 
@@ -244,7 +228,7 @@ def from_xyz_rpy(xyz: Vector, rpy: Vector, source: str = "") -> Transform:
     Args:
         xyz: Any elements in [m].
         rpy: Any elements in [rad].
-        source: What described it.
+        source: The description that it is from.
     """
     (x, y, z), (rx, ry, rz) = xyz, rpy
     return compose_steps(
@@ -321,9 +305,9 @@ def euler_zxz(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element
 def matrix_to_rpy(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float]:
     """Return rx, ry, rz in [rad] such that `from_rpy` gives the constant R back to 1e-15.
 
-    Unlike `euler_zyx` it needs no singular case: rx is taken from what rz leaves, so that the
-    product is R for whatever rz the rounding of a11 and a21 suggests. At a zero of either sign half
-    a turn is pi, not -pi.
+    Unlike `euler_zyx` it needs no singular case: rx is that of Rz(rz)^T R, so that the
+    product is R for any rz that results from the rounding of a11 and a21. Half a turn is pi, not -pi, also at
+    a zero of either sign.
     """
     (a11, a12, a13), (a21, a22, a23), (a31, _, _) = rotation
     rz = float(np.arctan2(a21 + 0.0, a11))  # + 0.0: see `euler_zyx`
@@ -334,14 +318,15 @@ def matrix_to_rpy(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float
 
 
 def _along(axis: Sequence[float]) -> int | None:
-    """Return which of x, y and z an axis lies along, either way; None for any other axis."""
+    """Return the index of the coordinate axis that an axis is parallel to, or None."""
     return [*map(abs, axis)].index(1.0) if sorted(map(abs, axis)) == [0.0, 0.0, 1.0] else None
 
 
 def _cosine_sine(angle: Element) -> tuple[Element, Element]:
-    """Return cos and sin; of the constants 0, +-pi/2, +-pi, ... +-2 pi exactly, as 0 and +-1 fold away.
+    """Return cos and sin; of the constants 0, +-pi/2, +-pi, ... +-2 pi exactly, as 0 and +-1 are folded.
 
-    A right angle in a robot's description is meant as one: cos(pi/2) in double precision is 6e-17.
+    A right angle in the description of a robot is exact, but cos(pi/2) in double precision is 6e-17. The
+    value of a joint is no constant, so it is not a float (see `elementwise`).
     """
     if type(angle) is float:
         quarters, rest = divmod(angle, math.pi / 2)
@@ -351,7 +336,7 @@ def _cosine_sine(angle: Element) -> tuple[Element, Element]:
 
 
 def _cosine_entry(c: Element, v: Element, u: float) -> Element:
-    """Return c + u^2 (1 - c), which is the constant 1 on the axis itself."""
+    """Return c + u^2 (1 - c), the constant 1 on the axis."""
     return 1.0 if abs(u) == 1.0 else plus(c, times(u * u, v))
 
 
@@ -359,23 +344,23 @@ RotationForm = Literal["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw",
 """vector     x, y, z of the axis times the angle (UR's RX, RY, RZ)
 rpy        roll, pitch, yaw about the fixed x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll)
 zyx        the same three angles, that about z first (KUKA's A, B, C)
-xyz, ...   angles about the moving axes named, in turn: R = Rx(a) Ry(b) Rz(c)
+xyz, ...   angles about the named moving axes, in this order: R = Rx(a) Ry(b) Rz(c)
 quat_...   a quaternion, its letters in the order of the columns
 matrix     the nine entries of R, row by row
 """
 
 FORMS: tuple[RotationForm, ...] = get_args(RotationForm)
-
-EULER: dict[RotationForm, str] = {"zyx": "zyx", "xyz": "xyz", "zyz": "zyz", "zxz": "zxz"}
-"""The forms that are three angles about moving axes, and these axes."""
+EULER: dict[RotationForm, str] = {"zyx": "zyx", "xyz": "xyz", "zyz": "zyz", "zxz": "zxz"}  # moving axes
 
 
 def column_count(form: RotationForm) -> int:
-    """Return how many columns a form has."""
+    """Return the number of columns of a form."""
     return 9 if form == "matrix" else 4 if form.startswith("quat") else 3
 
 
-COLUMN_NAMES: dict[RotationForm, tuple[str, ...]] = {
+COLUMN_NAMES: dict[
+    RotationForm, tuple[str, ...]
+] = {  # z1, y2, x3: first, second and third angle about these axes
     "vector": ("rx", "ry", "rz"),
     "rpy": ("roll", "pitch", "yaw"),
     **{form: tuple(f"{axis}{k + 1}" for k, axis in enumerate(axes)) for form, axes in EULER.items()},
@@ -383,7 +368,6 @@ COLUMN_NAMES: dict[RotationForm, tuple[str, ...]] = {
     "quat_wxyz": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"r{i}{j}" for i in "123" for j in "123"),
 }
-"""What the columns of a form are called: z1, y2, x3 are the first, second and third angle and their axes."""
 
 
 def is_angular(form: RotationForm) -> bool:
@@ -400,27 +384,54 @@ def to_quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
 
     Args:
         rotation: As recorded, in [rad] or [-], shape (n, width).
-        form: What its columns are.
+        form: Its form.
 
     Returns:
-        Shape (n, 4) [-]; NaN where a sample is missing. Their sign is open: q and -q are one orientation.
+        Shape (n, 4) [-]; NaN where a sample is missing. The sign is arbitrary: q and -q are one orientation.
     """
     if form == "vector":
         angle = np.linalg.norm(rotation, axis=1)
         imaginary = rotation * (0.5 * np.sinc(angle / (2 * np.pi)))[:, np.newaxis]
         return np.column_stack((imaginary, np.cos(0.5 * angle)))
     if form == "matrix":
-        return _of_matrix(rotation.reshape(-1, 3, 3))
+        return _matrices_to_quaternions(rotation.reshape(-1, 3, 3))
     if form in {"quat_xyzw", "quat_wxyz"}:
         ordered = rotation if form == "quat_xyzw" else rotation[:, [1, 2, 3, 0]]
         with np.errstate(invalid="ignore", divide="ignore"):
             unit: FloatArray = ordered / np.linalg.norm(ordered, axis=1, keepdims=True)
         return unit
     axes, turns = (EULER[form], rotation) if form in EULER else ("zyx", rotation[:, ::-1])
-    result = _about(axes[0], turns[:, 0])
+    result = _axis_quaternions(axes[0], turns[:, 0])
     for axis, turn in zip(axes[1:], turns.T[1:], strict=True):
-        result = quaternion_product(result, _about(axis, turn))
+        result = quaternion_product(result, _axis_quaternions(axis, turn))
     return result
+
+
+def _axis_quaternions(axis: str, angle: FloatArray) -> FloatArray:
+    result = np.zeros((len(angle), 4))
+    result[:, "xyz".index(axis)] = np.sin(0.5 * angle)
+    result[:, 3] = np.cos(0.5 * angle)
+    result[np.isnan(angle)] = np.nan
+    return result
+
+
+def _matrices_to_quaternions(r: FloatArray) -> FloatArray:
+    """Return the unit quaternions x, y, z, w of rotation matrices, shape (n, 3, 3) [-]."""
+    trace = np.trace(r, axis1=1, axis2=2)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = r.transpose(1, 2, 0)
+    candidates = np.array(
+        [
+            [1 + 2 * xx - trace, xy + yx, zx + xz, zy - yz],
+            [xy + yx, 1 + 2 * yy - trace, yz + zy, xz - zx],
+            [zx + xz, yz + zy, 1 + 2 * zz - trace, yx - xy],
+            [zy - yz, xz - zx, yx - xy, 1 + trace],
+        ]
+    )  # four times a component times the quaternion, one row per component
+    sizes = np.array([candidates[k, k] for k in range(4)])
+    best = np.where(np.isnan(sizes).any(axis=0), 0, np.argmax(sizes, axis=0))
+    chosen: FloatArray = candidates[best, :, np.arange(len(r))]
+    unit: FloatArray = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+    return unit
 
 
 def to_matrices(quat_xyzw: FloatArray) -> FloatArray:
@@ -463,11 +474,11 @@ def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def slerp(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
-    """Return orientations on the great arc from one to another, the shorter way.
+    """Return orientations on the shorter great arc from one to another.
 
-    (sin((1 - s) a) q1 + sin(s a) q2) / sin(a), with the angle a = 2 atan2(|q2 - q1|, |q2 + q1|) of the two as
-    vectors, of which q2 or -q2 is the nearer to q1. At an end of the way stands that end, though the other
-    is missing.
+    (sin((1 - s) a) q1 + sin(s a) q2) / sin(a), with the angle a = 2 atan2(|q2 - q1|, |q2 + q1|) between the
+    two as vectors, and the sign of q2 with which it is nearer to q1. At s = 0 and s = 1 the end is returned
+    even if the other end is missing.
 
     Args:
         first: Unit quaternions x, y, z, w [-], shape (n, 4).
@@ -475,7 +486,7 @@ def slerp(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArra
         share: s, 0 to 1 [-], shape (n,).
 
     Returns:
-        Shape (n, 4) [-]; NaN between two of which one is missing.
+        Shape (n, 4) [-]; NaN between two if one is missing.
 
     Source: Shoemake 1985, Animating rotation with quaternion curves.
     """
@@ -483,25 +494,16 @@ def slerp(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArra
     near = second * np.where(cosine < 0.0, -1.0, 1.0)[:, np.newaxis]
     angle = 2 * np.arctan2(np.linalg.norm(near - first, axis=1), np.linalg.norm(near + first, axis=1))
     # sin(a s) / sin(a), which is s where a is 0
-    own, other = (
+    weight, near_weight = (
         part * np.sinc(angle * part / np.pi) / np.sinc(angle / np.pi) for part in (1 - share, share)
     )
-    between = own[:, np.newaxis] * first + other[:, np.newaxis] * near
+    between = weight[:, np.newaxis] * first + near_weight[:, np.newaxis] * near
     at_first, at_second = (share == 0.0)[:, np.newaxis], (share == 1.0)[:, np.newaxis]
     return np.where(at_first, first, np.where(at_second, second, between))
 
 
-def _about(axis: str, angle: FloatArray) -> FloatArray:
-    """Return the quaternions of rotations about a coordinate axis."""
-    result = np.zeros((len(angle), 4))
-    result[:, "xyz".index(axis)] = np.sin(0.5 * angle)
-    result[:, 3] = np.cos(0.5 * angle)
-    result[np.isnan(angle)] = np.nan
-    return result
-
-
 def quaternion_product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the product of quaternions x, y, z, w, shape (n, 4) [-]: the second rotation, then the first.
+    """Return the product of quaternions x, y, z, w, shape (n, 4) [-]: second rotation first.
 
     Args:
         first: Shape (n, 4) [-].
@@ -520,7 +522,7 @@ def quaternion_product(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def to_rotation_vectors(quat_xyzw: FloatArray) -> FloatArray:
-    """Return u a, 0 <= a <= pi, of orientations, in [rad], shape (n, 3); NaN of one with NaN.
+    """Return rotation vectors u a, 0 <= a <= pi, in [rad], shape (n, 3); NaN where a quaternion is NaN.
 
     With v = u sin(a / 2), w = cos(a / 2) of either sign: a = 2 atan2(|v|, |w|).
 
@@ -534,17 +536,16 @@ def to_rotation_vectors(quat_xyzw: FloatArray) -> FloatArray:
 
 
 def fit_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the rotation R with the largest sum of products a . R b, which brings points b nearest to a.
+    """Return the rotation R with the maximum sum of a . R b, which brings points b closest to a.
 
-    With U S V^T of H: R = U diag(1, 1, det(U V^T)) V^T. It is the only one if the last two of the sizes that
-    are returned beside it add up to more than 0.
+    With U S V^T of H: R = U diag(1, 1, det(U V^T)) V^T. It is unique if the sum of the last two of the
+    returned singular values is above 0.
 
     Args:
-        crossed: H = sum(a b^T), in the units of both, shape (..., 3, 3).
+        crossed: H = sum(a b^T), in the product of their units, shape (..., 3, 3).
 
     Returns:
-        R [-], shape (..., 3, 3), and s1, s2, det(U V^T) s3, which add up to that of the products,
-        shape (..., 3).
+        R [-], shape (..., 3, 3), and s1, s2, det(U V^T) s3, whose sum is the maximum, shape (..., 3).
 
     Source: Kabsch 1976; Umeyama 1991, eq. 39-43, without scale.
     """
@@ -552,22 +553,3 @@ def fit_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
     signs = np.ones_like(sizes)
     signs[..., 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
     return np.asarray(u * signs[..., np.newaxis, :] @ vt), np.asarray(sizes * signs)
-
-
-def _of_matrix(r: FloatArray) -> FloatArray:
-    """Return the unit quaternions x, y, z, w of rotation matrices, shape (n, 3, 3) [-]."""
-    trace = np.trace(r, axis1=1, axis2=2)
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = r.transpose(1, 2, 0)
-    candidates = np.array(
-        [
-            [1 + 2 * xx - trace, xy + yx, zx + xz, zy - yz],
-            [xy + yx, 1 + 2 * yy - trace, yz + zy, xz - zx],
-            [zx + xz, yz + zy, 1 + 2 * zz - trace, yx - xy],
-            [zy - yz, xz - zx, yx - xy, 1 + trace],
-        ]
-    )  # four times a component times the quaternion, one row a component
-    sizes = np.array([candidates[k, k] for k in range(4)])
-    best = np.where(np.isnan(sizes).any(axis=0), 0, np.argmax(sizes, axis=0))
-    chosen: FloatArray = candidates[best, :, np.arange(len(r))]
-    unit: FloatArray = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
-    return unit

@@ -78,7 +78,7 @@ def test_turned_is_the_product_with_rotation_about(
     axis: tuple[float, float, float], seed: int, angle: float
 ) -> None:
     frame = from_offset(np.random.default_rng(seed).uniform(-1.0, 1.0, 6).tolist())
-    turned, product = frame.turned(axis, angle), frame @ rotation_about(axis, angle)
+    turned, product = frame.rotated(axis, angle), frame @ rotation_about(axis, angle)
     np.testing.assert_allclose(matrix(turned.rotation), matrix(product.rotation), atol=ROUNDING)
     assert turned.translation == frame.translation
 

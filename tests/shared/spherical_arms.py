@@ -81,7 +81,7 @@ def described_anew(chain: Chain, base: Transform, tool: Transform, zeros: FloatA
     left = Transform()
     for k, (joint, zero) in enumerate(zip(chain.moving, zeros.tolist(), strict=True)):
         joints.append(Joint(f"other{k}", joint.kind, left @ joint.origin, joint.axis))
-        left = Transform().turned(joint.axis, zero)
+        left = Transform().rotated(joint.axis, zero)
     return Chain("other", tuple(joints), tip=left @ chain.tip, base=base, tool=tool)
 
 

@@ -82,7 +82,7 @@ def iter_frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
 def apply_joint(at_joint: Transform, joint: Joint, value: Element) -> Transform:
     """Return the joint's moving frame from its fixed one and its value in [rad] or [m]."""
     if joint.kind == "revolute":
-        return at_joint.turned(joint.axis, value)
+        return at_joint.rotated(joint.axis, value)
     if joint.kind == "prismatic":
         return Transform(at_joint.rotation, at_joint.point(scale(value, joint.axis)))
     return at_joint
