@@ -187,9 +187,7 @@ def single_assembly(mechanism: Mechanism, x: FloatArray, reason: str) -> Assembl
 
 
 def start_configuration(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArray:
-    """Return where assembly starts with some controls set, in [m], [rad] and as controls are given.
-
-    Of shape (variables,).
+    """Return where assembly starts with some controls set, in [m], [rad] and as given, shape (variables,).
 
     Raises:
         NetworkError: With every control that is not of the network or cannot be set, every value out of the
@@ -393,12 +391,7 @@ def build_assembly(mechanism: Mechanism, x: FloatArray) -> Assembly:
 
 
 def body_poses(mechanism: Mechanism, x: FloatArray) -> FloatArray:
-    """Return the poses of the bodies, the ground first, as matrices [-] and [m], shape (bodies, 4, 4).
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
-    """
+    """Return the poses of the bodies, the ground first, as matrices [-] and [m], shape (bodies, 4, 4)."""
     frames = mechanism.poses([float(value) for value in x])
     poses = np.tile(np.eye(4), (len(frames), 1, 1))
     for pose, name in zip(poses, mechanism.network.body_names, strict=True):
@@ -407,12 +400,7 @@ def body_poses(mechanism: Mechanism, x: FloatArray) -> FloatArray:
 
 
 def find_gaps(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
-    """Return what does not close at a configuration, the largest first.
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
-    """
+    """Return what does not close at variables x, shape (variables,), in [m] and [rad], the largest first."""
     residual = evaluate_closure(mechanism, x[:, np.newaxis]).residual[:, 0]
     network, graph = mechanism.network, mechanism.graph
     gaps = []

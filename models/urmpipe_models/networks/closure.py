@@ -105,12 +105,7 @@ class _Equation(NamedTuple):
 
 
 def evaluate_closure(mechanism: Mechanism, x: FloatArray) -> Closure:
-    """Return residual and Jacobian of the closure.
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
-    """
+    """Return residual and Jacobian at configurations x, shape (variables, n), in [m] and [rad]."""
     n = x.shape[1]
     posed, controls = mechanism.placements(x), mechanism.control_values(x)
     twists = _mover_twists(mechanism, x, posed, controls)
@@ -129,12 +124,7 @@ def evaluate_closure(mechanism: Mechanism, x: FloatArray) -> Closure:
 
 
 def evaluate_scaled_closure(mechanism: Mechanism, x: FloatArray) -> Closure:
-    """Return `evaluate_closure` in lengths of the mechanism and [rad], so that m and rad compare.
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
-    """
+    """Return `evaluate_closure`, alike in shape, in lengths of the mechanism and [rad]; m and rad compare."""
     closure, rows = evaluate_closure(mechanism, x), mechanism.row_scales[:, np.newaxis]
     scales = (rows * mechanism.column_scales)[:, :, np.newaxis]
     return Closure(closure.residual * rows, closure.jacobian * scales)
@@ -170,12 +160,7 @@ def _equations(
 
 
 def pose_error(error: Transform, n: int) -> FloatArray:
-    """Return translation in [m] and rotation vector in [rad] of n frames, shape (6, n).
-
-    Args:
-        error: The frames, each entry a number or of shape (n,); where they should be, in [m].
-        n: Their count.
-    """
+    """Return translation in [m] and rotation vector in [rad] of n frames, shape (6, n)."""
     rows = stack_elements([entry for row in error.rotation for entry in row], n)
     vector = to_rotation_vectors(to_quaternions(rows.T, "matrix"))
     return np.concatenate((stack_elements(error.translation, n), vector.T))
@@ -256,11 +241,8 @@ def stack_elements(elements: Sequence[Element], n: int) -> FloatArray:
 def iter_release_columns(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, FloatArray]]:
     """Yield each constraint: its joint or element, its name, and the column that its release adds to J.
 
-    The column [-] is scaled by `row_scales` and `column_scales`, shape (rows,).
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
+    The column [-] is scaled by `row_scales` and `column_scales`, shape (rows,). The variables x have the
+    shape (variables,), in [m], [rad] and as controls are given.
     """
     at = x[:, np.newaxis]
     posed, controls = mechanism.placements(at), mechanism.control_values(at)
@@ -285,11 +267,8 @@ def iter_release_columns(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[
 def body_twists(mechanism: Mechanism, x: FloatArray) -> dict[str, FloatArray]:
     """Return the twist of each body in the ground per unit of each variable, shape (6, variables, n).
 
-    Angular velocity in [rad], then the velocity in [m] of the point at the origin of the ground.
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    Angular velocity in [rad], then the velocity in [m] of the point at the origin of the ground. The
+    variables x have the shape (variables, n), in [m], [rad] and as controls are given.
     """
     posed, controls = mechanism.placements(x), mechanism.control_values(x)
     mover_twists = _mover_twists(mechanism, x, posed, controls)
@@ -308,11 +287,7 @@ def iter_twist_maps(
     """Yield of each cut joint and element its rows, and the matrix from twists in the ground to their rates.
 
     The transpose turns multipliers of the rows, in [N] and [N.m], into the moment and force, about the
-    origin of the ground, on the second body. Shape (rows, 6, n).
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    origin of the ground, on the second body. Shape (rows, 6, n), of variables x of the shape (variables, n).
     """
     cuts = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
     constraints: list[Joint | ConstraintElement] = [*cuts, *mechanism.network.elements]
@@ -405,14 +380,13 @@ def close_by_newton(
 ) -> FloatArray:
     """Return configurations that close next to others, by Newton's method with some variables free.
 
+    All have the shape (variables, n), in [m], [rad] and as controls are given.
+
     Args:
         mechanism: The network.
-        x: Configurations near, shape (variables, n), in [m], [rad] and as controls are given.
+        x: Configurations nearby.
         free: The numbers of the variables that may change, shape (free,) [-].
         wrap: Whether rotation vectors are wrapped to pi at most.
-
-    Returns:
-        The variables, shape (variables, n), in [m], [rad] and as controls are given.
     """
     x, scales = np.array(x), mechanism.column_scales[free, np.newaxis]
     for _ in range(10):

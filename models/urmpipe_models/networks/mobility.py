@@ -109,12 +109,7 @@ class Mobility:
 
 
 def analyse_mobility(mechanism: Mechanism, x: FloatArray) -> Mobility:
-    """Return how an assembled network moves; controls are variables.
-
-    Args:
-        mechanism: The network.
-        x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
-    """
+    """Return how a network moves, controls included, at an assembly x, shape (variables,), in [m], [rad]."""
     variables = len(mechanism.variables)
     jacobian = evaluate_scaled_closure(mechanism, x[:, np.newaxis]).jacobian[:, :, 0]
     rank = _rank(jacobian)
@@ -129,13 +124,7 @@ def analyse_mobility(mechanism: Mechanism, x: FloatArray) -> Mobility:
 
 
 def mobility_by_rank(mechanism: Mechanism, x: FloatArray, columns: IndexArray) -> int:
-    """Return the number of variables less the rank of their Jacobian.
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
-        columns: The numbers of those that may change, shape (k,) [-].
-    """
+    """Return the number of some variables [-], shape (k,), less the rank of their Jacobian at x."""
     return len(columns) - _rank(evaluate_scaled_closure(mechanism, x[:, np.newaxis]).jacobian[:, columns, 0])
 
 
@@ -166,9 +155,7 @@ def nearby_mobility(mechanism: Mechanism, x: FloatArray, columns: IndexArray) ->
 def find_blocked_controls(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
     """Return the controls that cannot be moved at an assembly, each with those before it fixed.
 
-    Args:
-        mechanism: The network.
-        x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
+    The variables x have the shape (variables,), in [m], [rad] and as controls are given.
     """
     null = _null_space(evaluate_scaled_closure(mechanism, x[:, np.newaxis]).jacobian[:, :, 0])
     motions = null[mechanism.controls]
@@ -246,11 +233,8 @@ def find_idle_spins(mechanism: Mechanism) -> tuple[IdleSpin, ...]:
 def find_spinning_bodies(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
     """Return the names of the bodies that spin together, joined, of each idle spin at a configuration.
 
-    Bodies of a part spin separately where the joint between them lets them rotate about the line.
-
-    Args:
-        mechanism: The network.
-        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
+    Bodies of a part spin separately where the joint between them lets them rotate about the line. The
+    variables x have the shape (variables,), in [m], [rad] and as controls are given.
     """
     frames = mechanism.poses([float(value) for value in x])
     network, names = mechanism.network, []
@@ -280,7 +264,7 @@ def _turns_about(joint: Joint, frames: dict[str, Transform], ends: Sequence[Vect
 def reset_idle_spins(
     mechanism: Mechanism, spins: Sequence[IdleSpin], x: FloatArray, start: FloatArray
 ) -> FloatArray:
-    """Return the same configurations with their idle spins as at the start.
+    """Return configurations, shape (variables, n), in [m] and [rad], with their idle spins as at the start.
 
     The part rotates about the line u until the twist of its first joint about u is that of the start; both
     joints take that up: T' = T exp(phi [u]x), u in the frame a of the part.
@@ -289,10 +273,7 @@ def reset_idle_spins(
         mechanism: The network.
         spins: Its idle spins.
         x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
-        start: Those of the start, shape (variables,), likewise.
-
-    Returns:
-        The variables in [m], [rad] and as controls are given, shape (variables, n).
+        start: Those of the start, shape (variables,).
     """
     x = np.array(x)
     n = x.shape[1]
@@ -320,12 +301,7 @@ def spin_angles(mechanism: Mechanism, spins: Sequence[IdleSpin], x: Configuratio
     """Return the angles of idle spins in [rad]: twists of first joints about the lines.
 
     phi = 2 atan2(q . u sin(a / 2) / a, cos(a / 2)), a = |q|: q is the rotation vector of the joint, u the
-    line. `reset_idle_spins` keeps them.
-
-    Args:
-        mechanism: The network.
-        spins: Its idle spins.
-        x: The variables, one element each.
+    line. `reset_idle_spins` keeps them. The variables x are one element each.
     """
     angles: list[Element] = []
     frames = mechanism.poses(x)

@@ -87,9 +87,9 @@ class LimitStop:
 
 
 class Node(NamedTuple):
-    """A solution z = (y, s) with its unit tangent and the matrix [dF/dz; W^T; t^T], W the idle spins.
+    """A solution z = (y, s) with its unit tangent t and the matrix [dF/dz; W^T; t^T], W the idle spins.
 
-    `distance` is the smallest singular value of dF/dy without idle spins: how far a singular pose is.
+    `distance` from a singular pose: the smallest singular value of dF/dy without idle spins.
     """
 
     z: FloatArray
@@ -195,9 +195,8 @@ class Drive:
     def node(self, z: FloatArray, before: FloatArray | None = None) -> Node:
         """Return the node at a solution z; its tangent has the direction of `before`, else that of s.
 
-        Both have the shape (free + 1,) [-].
-
-        Of the null space of dF/dz the tangent is the part at right angles to the idle spins: these leave s.
+        Both have the shape (free + 1,) [-]. Of the null space of dF/dz the tangent is the part at right angles
+        to the idle spins: these do not change s.
         """
         jacobian = self.closure(z)[1]
         columns = len(z)
@@ -230,6 +229,10 @@ def _orientation(before: Node, after: Node, spins: int) -> tuple[float, float]:
     with np.errstate(under="ignore", invalid="ignore"):
         cosine, share = np.exp(size - 0.5 * (local[0] + local[1])), np.exp(size - local[0])
     return float(np.nan_to_num(sign * cosine)), float(np.nan_to_num(sign * share))
+
+
+def _angle_between(before: Node, after: Node) -> float:
+    return float(np.arccos(np.clip(before.tangent @ after.tangent, -1.0, 1.0)))
 
 
 # ---------------------------------------------------------------------------------------- continuation
@@ -305,12 +308,7 @@ class _Tracer:
         here = self.here
         while self.step > MIN_STEP:
             there = self._try(here, self.step)
-            turn = (
-                np.inf
-                if there is None
-                else float(np.arccos(np.clip(here.tangent @ there.tangent, -1.0, 1.0)))
-            )
-            if there is not None and turn < MAX_TURN:
+            if there is not None and (turn := _angle_between(here, there)) < MAX_TURN:
                 cosine, _ = _orientation(here, there, self.drive.spins)
                 crossing = self._crossing(here, there) if cosine < 0.0 else None
                 if crossing is not None:

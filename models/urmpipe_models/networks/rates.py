@@ -90,10 +90,7 @@ def closure_residual(mechanism: Mechanism, x: Sequence[Element]) -> Column:
 
     Rows: of each cut joint its gap along x, y, z of the ground and the skew part of its rotation about them,
     which is sin(a) u of a rotation by a about u; then of each element its error, of a pair in its own unit.
-
-    Args:
-        mechanism: The network.
-        x: The variables in [m], [rad] and as controls are given, one element each.
+    The variables x are in [m], [rad] and as controls are given, one element each.
     """
     return _residual(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
 
@@ -105,12 +102,7 @@ def largest_residual(mechanism: Mechanism, x: Sequence[Element]) -> Element:
 
 
 def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]:
-    """Return the derivatives of `closure_residual` by each free variable, exact where the network is closed.
-
-    Args:
-        mechanism: The network.
-        x: The variables in [m], [rad] and as controls are given, one element each.
-    """
+    """Return the derivatives of `closure_residual` by free variables, exact where the network is closed."""
     return _jacobian(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
 
 

@@ -78,25 +78,24 @@ def follow_rows(
     return _Follower(mechanism, x, driven, rows, free, limits).run(progress)
 
 
+@dataclass(eq=False)
 class _Follower:
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        x: FloatArray,
-        driven: IndexArray,
-        rows: FloatArray,
-        free: IndexArray,
-        limits: FloatArray,
-    ) -> None:
-        self.mechanism, self.driven, self.rows, self.free, self.limits = mechanism, driven, rows, free, limits
-        self.start, self.spins = x, find_idle_spins(mechanism)
-        self.motion = RowMotion(np.repeat(x[:, np.newaxis], len(rows), axis=1))
-        self.motion.x[driven] = rows.T
-        self.scaled = rows / mechanism.column_scales[driven]
+    mechanism: Mechanism
+    start: FloatArray
+    driven: IndexArray
+    rows: FloatArray
+    free: IndexArray
+    limits: FloatArray
+
+    def __post_init__(self) -> None:
+        self.spins = find_idle_spins(self.mechanism)
+        self.motion = RowMotion(np.repeat(self.start[:, np.newaxis], len(self.rows), axis=1))
+        self.motion.x[self.driven] = self.rows.T
+        self.scaled = self.rows / self.mechanism.column_scales[self.driven]
         steps = np.linalg.norm(np.diff(self.scaled, axis=0), axis=1)
         self.length = np.append(0.0, np.cumsum(steps))
         marks = np.searchsorted(self.length, np.arange(0.0, self.length[-1], COARSE_LENGTH))
-        self.coarse = np.unique(np.append(marks, len(rows) - 1))
+        self.coarse = np.unique(np.append(marks, len(self.rows) - 1))
 
     def run(self, progress: Callable[[float], None]) -> RowMotion:
         """Solve the coarse rows piece by piece and verify them, then fill in the others, and verify all."""
