@@ -195,7 +195,7 @@ class Drive:
     def node(self, z: FloatArray, before: FloatArray | None = None) -> Node:
         """Return the node at a solution z; its tangent has the direction of `before`, else that of s.
 
-        Both have the shape (free + 1,) [-]. Of the null space of dF/dz the tangent is the part at right angles
+        Both have the shape (free + 1,) [-]. Of the null space of dF/dz the tangent is the part orthogonal
         to the idle spins: these do not change s.
         """
         jacobian = self.closure(z)[1]
