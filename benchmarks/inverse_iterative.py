@@ -24,7 +24,8 @@ from pairs import Bound, machine, write_results
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.restarts import refine, solve_iteratively
+from urmpipe_models.ik.numeric import refine
+from urmpipe_models.ik.restarts import solve_iteratively
 from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -16,8 +16,7 @@ from differences import assert_jacobian, assert_slope
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import RAMP, STEP, TRAPEZOID, evaluate_setpoint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik import loop_equations as polishing
-from urmpipe_models.ik import trigonometric
+from urmpipe_models.ik import loop_equations, trigonometric
 from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.ik.task import Task, build_task
 from urmpipe_models.kinematics.forward import Screws, jacobian_over_log, screws_to_chain
@@ -33,10 +32,10 @@ def columns(chain: Chain, count: int, seed: int) -> FloatArray:
 
 def assert_gradients(task: Task, q: FloatArray) -> None:
     """Hold grad(|e|^2 / 2) = -J^T e of every joint, at any miss."""
-    miss = task.miss(q)
-    slope = -np.einsum("ijn,in->jn", miss.jacobian, miss.error)
+    error = task.error(q)
+    slope = -np.einsum("ijn,in->jn", error.jacobian, error.vector)
     # m2: entries of e of up to 10 m, three derivatives of their products; 1 / sin(angle) near half a turn
-    assert_jacobian(lambda at: 0.5 * task.miss(at).square, slope, q, third=1e4, size=100.0)
+    assert_jacobian(lambda at: 0.5 * task.error(at).square, slope, q, third=1e4, size=100.0)
 
 
 @pytest.mark.parametrize("robot", robot_names())
@@ -56,8 +55,8 @@ def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObjec
     targets = forward_targets(chain, columns(chain, 3, 1).T)
     task = build_task(chain, targets if pose else Targets(targets.position))
     q = columns(chain, 3, 2)
-    miss = task.miss(q)
-    if np.sqrt(miss.turn2).max() < 3.0 * miss.length:  # at half a turn the axis leaps
+    error = task.error(q)
+    if np.sqrt(error.angle2).max() < 3.0 * error.length:  # at half a turn the axis leaps
         assert_gradients(task, q)
 
 
@@ -66,13 +65,14 @@ def test_the_miss_changes_by_the_jacobian_and_its_turn_by_that_of_the_logarithm(
     """-de = A J dq with A of `log_jacobian` for the turn, and A = 1 for the position."""
     chain = load_robot(robot)
     task, q = build_task(chain, forward_targets(chain, columns(chain, 40, 1).T)), columns(chain, 40, 2)
-    miss = task.miss(q)
-    regular = np.sqrt(miss.turn2) < 3.0 * miss.length
-    task, q, miss = task.kept(np.flatnonzero(regular)), q[:, regular], miss.kept(np.flatnonzero(regular))
-    changes = miss.jacobian.copy()
-    changes[3:] = np.einsum("ijn,jkn->ikn", log_jacobian(miss.error[3:] / miss.length), changes[3:])
+    error = task.error(q)
+    regular = np.sqrt(error.angle2) < 3.0 * error.length
+    rows = np.flatnonzero(regular)
+    task, q, error = task.rows(rows), q[:, regular], error.rows(rows)
+    changes = error.jacobian.copy()
+    changes[3:] = np.einsum("ijn,jkn->ikn", log_jacobian(error.vector[3:] / error.length), changes[3:])
     # m: three derivatives of an arm of up to 10 m, and 1 / (pi - 3)^3 of the logarithm
-    assert_jacobian(lambda at: task.miss(at).error, -changes.transpose(1, 0, 2), q, third=1e4, size=100.0)
+    assert_jacobian(lambda at: task.error(at).vector, -changes.transpose(1, 0, 2), q, third=1e4, size=100.0)
 
 
 def log_jacobian(vector: FloatArray) -> FloatArray:
@@ -124,8 +124,14 @@ def test_the_columns_that_newton_s_rule_polishes_with_are_the_miss_s_derivatives
     kinds: tuple[bool, ...],
 ) -> None:
     arm, wrist, q, target = random_screws(kinds, 4)
-    _, found = polishing._miss(arm, wrist, q, target)
-    assert_jacobian(lambda at: polishing._miss(arm, wrist, at, target)[0], -found, q, third=10.0, size=10.0)
+    _, found = loop_equations._error_and_columns(arm, wrist, q, target)
+    assert_jacobian(
+        lambda at: loop_equations._error_and_columns(arm, wrist, at, target)[0],
+        -found,
+        q,
+        third=10.0,
+        size=10.0,
+    )
 
 
 @pytest.mark.parametrize("kinds", KINDS, ids=str)
@@ -133,7 +139,9 @@ def test_their_determinant_is_that_of_the_wrist_s_jacobian(kinds: tuple[bool, ..
     arm, wrist, q, _ = random_screws(kinds, 5)
     J = jacobian_over_log(screws_to_chain(arm, ("a", "b", "c")), q.T)[:, :3]
     # products of three levers of up to 10 m
-    np.testing.assert_allclose(polishing.jacobian_determinant(arm, wrist, q), np.linalg.det(J), atol=1e-11)
+    np.testing.assert_allclose(
+        loop_equations.jacobian_determinant(arm, wrist, q), np.linalg.det(J), atol=1e-11
+    )
 
 
 # --- set points ----------------------------------------------------------------------------------------

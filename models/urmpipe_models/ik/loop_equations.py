@@ -1,8 +1,17 @@
-"""The first three joints of an arm, as two equations between the first and the third one.
+"""The first three joints of an arm as two equations between joints 1 and 3 [Pieper1968]_.
 
-Why the first three joints of an arm do not reach a wrist centre, in words and figures.
+1. `LoopEquations`: with p0 the wrist centre at q = 0 and w its target,
 
-Newton's rule on the first three joints of an arm, elementwise over targets.
+       exp(xi1 q1) exp(xi2 q2) exp(xi3 q3) p0 = w
+
+   is separated at joint 2: x = exp(-xi1 q1) w must result from y = exp(xi3 q3) p0 by joint 2 alone. A
+   revolute joint 2 keeps k2 . (y - o2) and |y - o2|^2 (the invariants of Pieper), a prismatic one both
+   coordinates across it. Either way these are two equations A1 u1 + b1(w) = A3 u3 + b3 in points u1, u3 of
+   a circle or a parabola, with constant matrices. `position_arm` solves them.
+2. `refine_joints`: Newton's rule on joints 1 to 3, for arms that fulfil them only approximately.
+3. `ReachReasons`: why the joints do not reach a wrist centre, as text with figures.
+
+Lengths are in units of the arm's size.
 """
 
 from __future__ import annotations
@@ -18,12 +27,18 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray
 from urmpipe_models.kinematics.forward import Screws
 from urmpipe_models.math3d import rotation_about
 
+NEWTON_STEPS = 4  # two reach the rounding from an error of 1e-6 of a loop equation; near a fold four do
+PURE = 1e-6  # a combination of the equations is one of them alone if the share of the other is smaller
+MILLIMETRE = 1e-3  # [m]; an excess above this is written to the millimetre
+NOT_FINITE = "the target is not finite, allowed: finite numbers"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Where an outer joint (1 or 3) of the three moves the wrist: X = X0 + U u.
+    """The path X = X0 + U u on which an outer joint (1 or 3) of the three moves the wrist.
 
-    Of a revolute joint u lies on a circle, (rho cos, rho sin), of a prismatic one on a parabola, (s, s^2).
+    The point u of a revolute joint is on a circle, (rho cos, rho sin), of a prismatic one on a parabola,
+    (s, s^2).
 
     Attributes:
         axis: Its unit vector k [-], shape (3,).
@@ -41,15 +56,15 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WristView:
-    """A wrist centre w as joint 1 sees it, one column a target; lengths are in units of the arm's size.
+    """A wrist centre w seen from joint 1, one column per target; lengths in units of the arm's size.
 
     Attributes:
         start: X0, relative to o2, in that unit, shape (3, n).
         constant: b1, in that unit or its square, shape (2, n).
         radius: Distance from axis 1 in that unit; 0 if joint 1 is prismatic, shape (n,).
-        zero: What q1 is at the angle or the way 0 of u1: q1 = zero - angle, or zero + s, in [rad] or
-            that unit, shape (n,).
-        height: Way along axis 1 from the point nearest to axis 2, in that unit, shape (n,).
+        zero: q1 at angle or length 0 of u1: q1 = zero - angle, or zero + s, in [rad] or that unit,
+            shape (n,).
+        height: Length along axis 1 from the point nearest to axis 2, in that unit, shape (n,).
     """
 
     start: FloatArray
@@ -61,14 +76,9 @@ class WristView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopEquations:
-    """What joints 1 and 3 must fulfil so that some joint 2 closes the loop to the wrist centre w.
+    """The conditions on joints 1 and 3 under which a joint 2 closes the loop to the wrist centre w.
 
-    exp(xi1 q1) exp(xi2 q2) exp(xi3 q3) p0 = w, taken apart at joint 2: x = exp(-xi1 q1) w must come out of
-    y = exp(xi3 q3) p0 by joint 2 alone. A revolute joint 2 keeps k2 . (y - o2) and |y - o2|^2 (the
-    invariants of Pieper), a prismatic one both coordinates across it. Either way these are two equations
-    A1 u1 + b1(w) = A3 u3 + b3 in points u1, u3 of a circle or a parabola, with constant matrices.
-
-    Lengths are in units of the arm's size.
+    A1 u1 + b1(w) = A3 u3 + b3, see the head of this module. Lengths are in units of the arm's size.
 
     Attributes:
         axis: Of joint 2 [-], shape (3,).
@@ -82,7 +92,7 @@ class LoopEquations:
         start: Y0 of joint 3, relative to o2, in that unit, shape (3,).
         constant: b3, in that unit or its square, shape (2,).
         radius: Of the circle of the wrist about axis 3; 0 of a prismatic joint.
-        shift: What is added to s of a prismatic joint 3 to make it q3.
+        shift: Is added to s of a prismatic joint 3 to give q3.
 
     Source: [Pieper1968]_.
     """
@@ -110,8 +120,8 @@ class LoopEquations:
             return np.stack((self.axis @ start, (start * start).sum(axis=0) + np.square(radius)))
         return np.asarray(self.across @ start)
 
-    def seen(self, wrist: FloatArray) -> WristView:
-        """Return wrist centres w, shape (3, n), in units of the arm's size, as joint 1 sees them."""
+    def view_from_joint1(self, wrist: FloatArray) -> WristView:
+        """Return wrist centres w, shape (3, n), in units of the arm's size, as seen from joint 1."""
         away = wrist - self.base[:, None]
         height = self.first.axis @ away
         if self.first.revolute:
@@ -132,7 +142,7 @@ def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
         wrist: The wrist centre, shape (3,), in the same unit.
     """
     (k1, k2, k3), (o1, o2, o3) = screws.direction[:3], screws.point[:3]
-    r1, r2, r3 = (bool(one) for one in screws.revolute[:3])
+    r1, r2, r3 = (bool(revolute) for revolute in screws.revolute[:3])
     origin = nearest_point(o2, k2, o1, k1) if r1 and r2 else _foot(wrist, o2, k2)
     across = np.stack(_across(k2, k1, k3))
     if r3:
@@ -150,21 +160,15 @@ def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
     base = _foot(origin, o1, k1) if r1 else origin
     first = Track(k1, r1, directions1, _coefficients(directions1, base - origin, r1, k2, r2, across))
     third = Track(k3, r3, directions3, _coefficients(directions3, start, r3, k2, r2, across))
-    bare = LoopEquations(k2, r2, across, origin, base, first, third, start, np.zeros(2), radius, shift)
-    constant = bare.invariants(start[:, None], radius)[:, 0]
+    without_constant = LoopEquations(
+        k2, r2, across, origin, base, first, third, start, np.zeros(2), radius, shift
+    )
+    constant = without_constant.invariants(start[:, None], radius)[:, 0]
     return LoopEquations(k2, r2, across, origin, base, first, third, start, constant, radius, shift)
 
 
-def perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two unit vectors [-], shape (3,) each, of the right-handed frame whose third one is `axis`."""
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(helper, axis)
-    first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)
-
-
 def _across(axis: FloatArray, first: FloatArray, third: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two unit vectors across axis 2 that turn with the arm: seen from axis 1 or else axis 3."""
+    """Return two unit vectors across axis 2 that turn with the arm: by its angle to axis 1 or else axis 3."""
     for other in (first, third):
         normal = np.cross(other, axis)
         length = float(np.linalg.norm(normal))
@@ -188,15 +192,18 @@ def _coefficients(
     return np.stack((axis @ directions, squares))
 
 
-def _foot(point: FloatArray, origin: FloatArray, axis: FloatArray) -> FloatArray:
-    """Return the point of a line that is nearest to a point."""
-    return np.asarray(origin + axis * (axis @ (point - origin)))
+def perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return two unit vectors [-], shape (3,) each, of the right-handed frame whose third one is `axis`."""
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
 
 
 def nearest_point(origin: FloatArray, axis: FloatArray, other: FloatArray, along: FloatArray) -> FloatArray:
     """Return the point of a line that is nearest to another line, in their unit, shape (3,).
 
-    Where they are parallel it is the one nearest to the other's point.
+    Of parallel lines it is the one nearest to the other's point.
 
     Args:
         origin: A point of the line, in any unit, shape (3,).
@@ -211,18 +218,97 @@ def nearest_point(origin: FloatArray, axis: FloatArray, other: FloatArray, along
     return np.asarray(origin + axis * (np.cross(other - origin, along) @ normal / square))
 
 
-PURE = 1e-6
-"""A combination of the equations holds one of them alone if the other's share is smaller than this."""
+def _foot(point: FloatArray, origin: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return the point of a line that is nearest to a point."""
+    return np.asarray(origin + axis * (axis @ (point - origin)))
 
-MILLIMETRE = 1e-3
-"""What is outside by more than this, in [m], is told to the millimetre."""
 
-NOT_FINITE = "the target is not finite, allowed: finite numbers"
+def refine_joints(
+    screws: Screws, wrist: FloatArray, q: FloatArray, target: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return joints 1 to 3 nearer to a target of the wrist centre, and the remaining distance.
+
+    Args:
+        screws: Of the arm.
+        wrist: The wrist centre at q = 0, shape (3,), in the unit of the screws.
+        q: Joints 1 to 3 in [rad] or, of a prismatic one, in the unit of the screws, shape (3, ...).
+        target: Of the wrist centre, in the unit of the screws, shape (3, ...).
+
+    Returns:
+        q, shape (3, ...), and the remaining distance, shape (...), in the unit of the screws.
+    """
+    error, columns = _error_and_columns(screws, wrist, q, target)
+    left = np.sqrt((error * error).sum(axis=0))
+    for _ in range(NEWTON_STEPS):
+        further = q + _solve_columns(columns, error)
+        next_error, next_columns = _error_and_columns(screws, wrist, further, target)
+        next_left = np.sqrt((next_error * next_error).sum(axis=0))
+        better = next_left < left
+        q, left = np.where(better, further, q), np.where(better, next_left, left)
+        error, columns = np.where(better, next_error, error), np.where(better, next_columns, columns)
+    return q, left
+
+
+def jacobian_determinant(screws: Screws, wrist: FloatArray, q: FloatArray) -> FloatArray:
+    """Return det of d(wrist centre)/d(q1, q2, q3) at q, shape (3, ...), in the unit of the screws."""
+    reached = np.broadcast_to(_spread(wrist, q), q.shape)
+    for joint in (2, 1, 0):
+        reached = _moved(screws, joint, q[joint], reached)
+    _, columns = _error_and_columns(screws, wrist, q, reached)
+    return np.asarray((columns[0] * np.cross(columns[1], columns[2], axis=0)).sum(axis=0))
+
+
+def _error_and_columns(
+    screws: Screws, wrist: FloatArray, q: FloatArray, target: FloatArray
+) -> tuple[FloatArray, NDArray[np.float64]]:
+    """Return the difference of target and wrist seen from joint 1, and how the joints change it.
+
+    exp(-xi1 q1) target - exp(xi2 q2) exp(xi3 q3) wrist, shape (3, ...), and columns of shape (3, 3, ...).
+    """
+    goal = _moved(screws, 0, -q[0], target)
+    inner = _moved(screws, 2, q[2], np.broadcast_to(_spread(wrist, q), q.shape))
+    reached = _moved(screws, 1, q[1], inner)
+    third = _velocity(screws, 2, inner)
+    if screws.revolute[1]:
+        third = np.stack(rotation_about(screws.direction[1], q[1]).rotate(tuple(third)))
+    return goal - reached, np.stack((_velocity(screws, 0, goal), _velocity(screws, 1, reached), third))
+
+
+def _moved(screws: Screws, joint: int, value: FloatArray, point: FloatArray) -> FloatArray:
+    """Return exp(xi q) applied to points, shape (3, ...)."""
+    axis, origin = screws.direction[joint], _spread(screws.point[joint], point)
+    if not screws.revolute[joint]:
+        return np.asarray(point + _spread(axis, point) * value)
+    return np.stack(rotation_about(axis, value).rotate(tuple(point - origin))) + origin
+
+
+def _velocity(screws: Screws, joint: int, point: FloatArray) -> FloatArray:
+    """Return the derivatives of points, shape (3, ...), by a joint's value."""
+    axis = np.broadcast_to(_spread(screws.direction[joint], point), point.shape)
+    if not screws.revolute[joint]:
+        return np.asarray(axis)
+    return np.cross(axis, point - _spread(screws.point[joint], point), axis=0)
+
+
+def _solve_columns(columns: NDArray[np.float64], error: FloatArray) -> FloatArray:
+    """Return dq with columns dq = error by Cramer's rule; 0 where the columns are dependent."""
+    first, second, third = columns
+    crossed = np.stack(
+        (np.cross(second, third, axis=0), np.cross(third, first, axis=0), np.cross(first, second, axis=0))
+    )
+    determinant = (first * crossed[0]).sum(axis=0)
+    dependent = np.abs(determinant) < 1e-300
+    return np.where(dependent, 0.0, (crossed * error).sum(axis=1) / np.where(dependent, 1.0, determinant))
+
+
+def _spread(vector: FloatArray, like: FloatArray) -> FloatArray:
+    """Return a vector, shape (3,), reshaped to (3, 1, ...) to broadcast over arrays."""
+    return vector.reshape(3, *(1,) * (like.ndim - 1))
 
 
 @dataclass(frozen=True, eq=False)
 class ReachReasons:
-    """What the loop equations allow.
+    """Reasons why joints 1 to 3 do not reach a wrist centre; writes them into arrays of texts.
 
     Attributes:
         equations: In units of the arm's size.
@@ -232,52 +318,45 @@ class ReachReasons:
     equations: LoopEquations
     size: float
 
-    def tell_side(
-        self, reasons: TextArray, missed: BoolArray, seen: WristView, alpha: FloatArray, needed: FloatArray
+    def write_side(
+        self, reasons: TextArray, missed: BoolArray, view: WristView, alpha: FloatArray, needed: FloatArray
     ) -> None:
-        """Tell where joint 1 has no root of alpha . u1 = needed: the wrist centre is too near to axis 1.
+        """Write why joint 1 has no root of alpha . u1 = needed: the wrist centre is too near to axis 1.
 
-        Args:
-            reasons: Shape (..., n); written where `missed`.
-            missed: Of the shape of reasons.
-            seen: The wrist centres.
-            alpha: Of the equations, in units of the arm's size, shape (2,).
-            needed: In the same unit as alpha . u1, of the shape of reasons.
+        `reasons` are written where `missed`, both of shape (..., n); alpha, shape (2,), and needed, shape
+        (..., n), are in units of the arm's size.
         """
         if not self.equations.first.revolute:
-            self.tell_place(reasons, missed, seen)
+            self.write_position(reasons, missed, view)
             return
-        radius = np.broadcast_to(seen.radius, missed.shape)[missed] * self.size
+        radius = np.broadcast_to(view.radius, missed.shape)[missed] * self.size
         least = np.abs(needed[missed]) / np.hypot(*alpha) * self.size
         reasons[missed] = [
-            _outside(found, limit, math.inf, "from axis 1")
-            for found, limit in zip(radius.tolist(), least.tolist(), strict=True)
+            _outside(distance, limit, math.inf, "from axis 1")
+            for distance, limit in zip(radius.tolist(), least.tolist(), strict=True)
         ]
 
-    def tell_elbow(self, reasons: TextArray, missed: BoolArray, share: FloatArray, value: FloatArray) -> None:
-        """Tell where joint 3 has no root: the wrist centre is too near or too far.
+    def write_elbow(
+        self, reasons: TextArray, missed: BoolArray, share: FloatArray, value: FloatArray
+    ) -> None:
+        """Write why joint 3 has no root: the wrist centre is too near or too far.
 
-        Args:
-            reasons: Shape (..., n); written where `missed`.
-            missed: Of the shape of reasons.
-            share: The combination of the equations that joint 3 is solved from [-], shape (2,).
-            value: What it must give, less its constant, in units of the arm's size, of the shape of reasons.
+        `reasons` are written where `missed`, both of shape (..., n); joint 3 is solved from the combination
+        `share` of the equations [-], shape (2,), which has to give `value` plus its constant, in units of the
+        arm's size, shape (..., n).
         """
-        found, what = self._measured(share, value[missed])
+        distances, what = self._measured(share, value[missed])
         (least, most), _ = self._measured(share, np.array(self._range(share)))
-        figures, which = np.unique(found, return_inverse=True)  # both elbows have one
-        reasons[missed] = _outside_range(figures, float(least), float(most), what)[which]
+        figures, index = np.unique(distances, return_inverse=True)  # both elbows share a figure
+        reasons[missed] = _outside_range(figures, float(least), float(most), what)[index]
 
-    def tell_place(self, reasons: TextArray, missed: BoolArray, seen: WristView) -> None:
-        """Tell where a wrist centre is that no further posture reaches, by its cylinder coordinates.
+    def write_position(self, reasons: TextArray, missed: BoolArray, view: WristView) -> None:
+        """Write where a wrist centre is that no further posture reaches, in cylinder coordinates.
 
-        Args:
-            reasons: Shape (..., n); written where `missed`.
-            missed: Of the shape of reasons.
-            seen: The wrist centres.
+        `reasons` are written where `missed`, both of shape (..., n).
         """
-        radius = np.broadcast_to(seen.radius, missed.shape)[missed] * self.size
-        height = np.broadcast_to(seen.height, missed.shape)[missed] * self.size
+        radius = np.broadcast_to(view.radius, missed.shape)[missed] * self.size
+        height = np.broadcast_to(view.height, missed.shape)[missed] * self.size
         reasons[missed] = [
             f"the wrist centre is {r:.3f} m from axis 1 and {h:.3f} m along it,"
             " allowed: where joints 1 to 3 bring it in one posture more"
@@ -298,7 +377,7 @@ class ReachReasons:
         return (vertex, math.inf) if alpha[1] > 0.0 else (-math.inf, vertex)
 
     def _measured(self, share: FloatArray, value: FloatArray) -> tuple[FloatArray, str]:
-        """Return what a combination of the equations says of the wrist centre, in [m], and in words."""
+        """Return the distance of the wrist centre in a combination of the equations, in [m], and its name."""
         total = float(share @ self.equations.constant) + value
         if not self.equations.revolute or min(np.abs(share)) > PURE:
             return total * self.size, "off in what joint 3 must make good"
@@ -310,118 +389,30 @@ class ReachReasons:
 
     @cached_property
     def _parallel(self) -> bool:
-        """Whether axes 2 and 3 are parallel: joint 3 does not change the wrist's way along axis 2."""
+        """Whether axes 2 and 3 are parallel: joint 3 does not move the wrist along axis 2."""
         return bool(np.linalg.norm(np.cross(self.equations.axis, self.equations.third.axis)) <= PURE)
 
 
-def _outside_range(found: FloatArray, least: float, most: float, what: str) -> TextArray:
-    """Return `_outside` of many figures and one range; what they share is written once."""
-    clear = np.isfinite(found) & (np.maximum(least - found, found - most) > MILLIMETRE)
+def _outside_range(distances: FloatArray, least: float, most: float, what: str) -> TextArray:
+    """Return `_outside` of many distances and one range; their common text is written once."""
+    clear = np.isfinite(distances) & (np.maximum(least - distances, distances - most) > MILLIMETRE)
     ending = f" m {what}, {_allowed(least, most, 3)}"
-    texts: TextArray = np.empty(len(found), dtype=np.object_)
-    texts[clear] = [f"the wrist centre is {one:.3f}{ending}" for one in found[clear].tolist()]
-    texts[~clear] = [_outside(one, least, most, what) for one in found[~clear].tolist()]
+    texts: TextArray = np.empty(len(distances), dtype=np.object_)
+    texts[clear] = [f"the wrist centre is {distance:.3f}{ending}" for distance in distances[clear].tolist()]
+    texts[~clear] = [_outside(distance, least, most, what) for distance in distances[~clear].tolist()]
     return texts
 
 
-def _outside(found: float, least: float, most: float, what: str) -> str:
-    """Return what was found and what is allowed, with as many digits as tell found and limit apart."""
-    if not math.isfinite(found):
+def _outside(distance: float, least: float, most: float, what: str) -> str:
+    """Return a distance and the allowed range, with enough digits to distinguish distance and limit."""
+    if not math.isfinite(distance):
         return NOT_FINITE
-    away = max(least - found, found - most)
-    digits = 3 if away > MILLIMETRE else min(13, 1 - math.floor(math.log10(max(away, 1e-12))))
-    return f"the wrist centre is {found:.{digits}f} m {what}, {_allowed(least, most, digits)}"
+    excess = max(least - distance, distance - most)
+    digits = 3 if excess > MILLIMETRE else min(13, 1 - math.floor(math.log10(max(excess, 1e-12))))
+    return f"the wrist centre is {distance:.{digits}f} m {what}, {_allowed(least, most, digits)}"
 
 
 def _allowed(least: float, most: float, digits: int) -> str:
-    """Return a range in words."""
     if math.isinf(most):
         return f"allowed: {least:.{digits}f} m or more"
     return f"allowed: {least:.{digits}f} to {most:.{digits}f} m"
-
-
-NEWTON_STEPS = 4
-"""From 1e-6, the worst that a loop equation may be off, two steps reach the rounding; near a fold four."""
-
-
-def refine_joints(
-    screws: Screws, wrist: FloatArray, q: FloatArray, target: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return joints 1 to 3 that are nearer to a target of the wrist centre, and how far they still are.
-
-    Args:
-        screws: Of the arm.
-        wrist: The wrist centre at q = 0, shape (3,), in the unit of the screws.
-        q: Joints 1 to 3 in [rad] or, of a prismatic one, in the unit of the screws, shape (3, ...).
-        target: Where the wrist centre shall be, in the unit of the screws, shape (3, ...).
-
-    Returns:
-        q, shape (3, ...), and the distance that is left, shape (...), in the unit of the screws.
-    """
-    miss, columns = _miss(screws, wrist, q, target)
-    left = np.sqrt((miss * miss).sum(axis=0))
-    for _ in range(NEWTON_STEPS):
-        further = q + _solved(columns, miss)
-        next_miss, next_columns = _miss(screws, wrist, further, target)
-        next_left = np.sqrt((next_miss * next_miss).sum(axis=0))
-        better = next_left < left
-        q, left = np.where(better, further, q), np.where(better, next_left, left)
-        miss, columns = np.where(better, next_miss, miss), np.where(better, next_columns, columns)
-    return q, left
-
-
-def jacobian_determinant(screws: Screws, wrist: FloatArray, q: FloatArray) -> FloatArray:
-    """Return det of d(wrist centre)/d(q1, q2, q3) at q, shape (3, ...), in the unit of the screws."""
-    reached = np.broadcast_to(_as(wrist, q), q.shape)
-    for joint in (2, 1, 0):
-        reached = _moved(screws, joint, q[joint], reached)
-    _, columns = _miss(screws, wrist, q, reached)
-    return np.asarray((columns[0] * np.cross(columns[1], columns[2], axis=0)).sum(axis=0))
-
-
-def _miss(
-    screws: Screws, wrist: FloatArray, q: FloatArray, target: FloatArray
-) -> tuple[FloatArray, NDArray[np.float64]]:
-    """Return how far the target is from the wrist as joint 1 sees both, and by which columns joints mend it.
-
-    exp(-xi1 q1) target - exp(xi2 q2) exp(xi3 q3) wrist, shape (3, ...), and columns of shape (3, 3, ...).
-    """
-    seen = _moved(screws, 0, -q[0], target)
-    inner = _moved(screws, 2, q[2], np.broadcast_to(_as(wrist, q), q.shape))
-    brought = _moved(screws, 1, q[1], inner)
-    third = _velocity(screws, 2, inner)
-    if screws.revolute[1]:
-        third = np.stack(rotation_about(screws.direction[1], q[1]).rotate(tuple(third)))
-    return seen - brought, np.stack((_velocity(screws, 0, seen), _velocity(screws, 1, brought), third))
-
-
-def _moved(screws: Screws, joint: int, value: FloatArray, point: FloatArray) -> FloatArray:
-    """Return exp(xi q) applied to points, shape (3, ...)."""
-    axis, origin = screws.direction[joint], _as(screws.point[joint], point)
-    if not screws.revolute[joint]:
-        return np.asarray(point + _as(axis, point) * value)
-    return np.stack(rotation_about(axis, value).rotate(tuple(point - origin))) + origin
-
-
-def _velocity(screws: Screws, joint: int, point: FloatArray) -> FloatArray:
-    """Return how points, shape (3, ...), move with a joint."""
-    axis = np.broadcast_to(_as(screws.direction[joint], point), point.shape)
-    if not screws.revolute[joint]:
-        return np.asarray(axis)
-    return np.cross(axis, point - _as(screws.point[joint], point), axis=0)
-
-
-def _solved(columns: NDArray[np.float64], miss: FloatArray) -> FloatArray:
-    """Return dq with columns dq = miss by Cramer's rule; 0 where the columns are dependent."""
-    first, second, third = columns
-    crossed = np.stack(
-        (np.cross(second, third, axis=0), np.cross(third, first, axis=0), np.cross(first, second, axis=0))
-    )
-    determinant = (first * crossed[0]).sum(axis=0)
-    flat = np.abs(determinant) < 1e-300
-    return np.where(flat, 0.0, (crossed * miss).sum(axis=1) / np.where(flat, 1.0, determinant))
-
-
-def _as(vector: FloatArray, like: FloatArray) -> FloatArray:
-    """Return a vector, shape (3,), as one of shape (3, 1, ...) that spreads over arrays like another."""
-    return vector.reshape(3, *(1,) * (like.ndim - 1))

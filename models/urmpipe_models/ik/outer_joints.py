@@ -1,19 +1,23 @@
-"""The geometry of an arm whose axes 2, 3 and 4 are parallel, in a frame of its own.
+"""Joints 1 and 5 of an arm whose axes 2, 3 and 4 are parallel: the ones that place axis 6.
 
-Joints 1 and 5 of an arm whose axes 2, 3 and 4 are parallel: what brings axis 6 into its place.
+1. `parallel_geometry` recognises such an arm by its screws and describes it in a frame on axis 2 whose z axis
+   is along axis 2.
+2. Joints 2, 3 and 4 move nothing along z and turn nothing out of it. So for the motion G that takes the arm
+   from q = 0 to its target, a point p6 of axis 6 and its direction k6
 
-Joints 2, 3 and 4 move nothing along their own direction z, and turn nothing out of it. So for the motion G
-that takes the arm from q = 0 to its target, a point p6 of axis 6 and its direction k6
+       z . R1^T (G p6 - p1) + p1z = z . R5 (p6 - p5) + p5z        (place)
+       z . R1^T R_G k6            = z . R5 k6                     (direction)
 
-    z . R1^T (G p6 - p1) + p1z = z . R5 (p6 - p5) + p5z        (place)
-    z . R1^T R_G k6            = z . R5 k6                     (direction)
+   hold, both linear in the cosine and sine of q1 and of q5. `outer_joints` solves them by the position of
+   axes 5 and 6: they meet, are parallel, or pass each other.
 
-hold, both linear in the cosine and sine of q1 and of q5. All vectors are in the frame of `ParallelGeometry`.
+`parallel` solves joints 2, 3, 4 and 6.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,21 +27,19 @@ from urmpipe_models.ik.trigonometric import linear_roots, quadric_roots, wrap_an
 from urmpipe_models.kinematics.forward import Screws
 from urmpipe_models.math3d import Transform, rotation_about
 
-PARALLEL = 1e-10
-"""Axes that are this near to parallel, in [rad], are; a solution is off by no more than that."""
-
-MEETING = 1e-11
-"""Axes that pass each other by this share of the arm's size meet."""
-
-TILT = 1e-3
-"""The least sine of the angle of axes 1 and 5 to axes 2 to 4, and of axis 6 to axis 5 where these meet."""
-
-PASSING = 1e-3
-"""How far axes 5 and 6 must pass each other where they do not meet, t45 and t56 their angles to axes 4 and 5:
-the distance, of the arm's size, times sin(t56) sin(t45)^2. With 1e-5 a solution may miss by 1e-7 m."""
-
-ROUNDING = 1e-14
-"""Less than this, of 1 or of the arm's size, is the rounding of a right angle or of an offset of 0."""
+PARALLEL = 1e-10  # [rad]; axes this near to parallel are; a solution is off by no more
+MEETING = 1e-11  # of the arm's size; axes that pass each other by this meet
+MIN_TILT_SINE = 1e-3  # between axes 1 and 5 and axes 2 to 4, and between axes 5 and 6 where these meet
+# Least distance of axes 5 and 6 where they do not meet, of the arm's size, times sin(t56) sin(t45)^2 of their
+# angles to axes 5 and 4. With 1e-5 a solution may miss by 1e-7 m.
+MIN_PASSING = 1e-3
+ROUNDING = 1e-14  # of 1 or of the arm's size: the rounding of a right angle or of an offset of 0
+REACH = 1e-11  # of the arm's size or in [rad]; a target is out of reach by this from rounding of its pose
+# Branches nearer than this, of the arm's size or in [rad], to where two of them meet are taken as one.
+# Rounding of the pose would separate them by its root, 1e-8, and with them the positions for the other
+# joints.
+EDGE = 1e-14
+NEAR_ROOTS = 1e-6  # [rad]; nearer values of q1 are one; also the longest last step of Newton's rule
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +49,14 @@ class ParallelGeometry:
     Attributes:
         to_frame: The world in the frame.
         from_tip: The frame in the tip's frame, at q = 0.
-        k1: Direction of axis 1 [-]; k5 and k6 likewise.
-        p1: A point of axis 1 in [m]; p5 and p6, which are the feet of the common normal of axes 5 and 6 and
-            the same point where these meet, likewise.
-        p3: A point of axis 3 in [m]; p4 likewise.
+        k1: Direction of axis 1 [-].
+        k5: Direction of axis 5 [-].
+        k6: Direction of axis 6 [-].
+        p1: A point of axis 1 in [m].
+        p3: A point of axis 3 in [m].
+        p4: A point of axis 4 in [m].
+        p5: Foot on axis 5 of the common normal of axes 5 and 6 in [m].
+        p6: Foot on axis 6 of the same normal in [m]; equal to p5 where both axes meet.
         signs: Of joints 2, 3, 4: -1 where its axis points against z.
         size: A length of the arm in [m].
     """
@@ -72,14 +78,14 @@ class ParallelGeometry:
 def parallel_geometry(screws: Screws) -> ParallelGeometry | None:
     """Return the geometry of an arm of six revolute joints with axes 2, 3, 4 parallel; None of any other.
 
-    None too where axis 1 or 5 is parallel to these, or two of them are one line: such an arm has a joint too
-    many in the plane and one too few out of it. None where axes 5 and 6 all but meet (`PASSING`).
+    None also where axis 1 or 5 is parallel to these, or two of them are one line: such an arm has a joint too
+    many in the plane and one too few out of it. None where axes 5 and 6 almost meet (`MIN_PASSING`).
     """
     if len(screws.direction) != 6 or not screws.revolute.all():
         return None
     k, p, size = screws.direction, screws.point, screws.size
     z = k[1]
-    if max(_sine(z, k[2]), _sine(z, k[3])) > PARALLEL or min(_sine(z, k[0]), _sine(z, k[4])) < TILT:
+    if max(_sine(z, k[2]), _sine(z, k[3])) > PARALLEL or min(_sine(z, k[0]), _sine(z, k[4])) < MIN_TILT_SINE:
         return None
     if min(_distance(z, p[2] - p[1]), _distance(z, p[3] - p[2])) < MEETING * size:
         return None
@@ -100,29 +106,28 @@ def parallel_geometry(screws: Screws) -> ParallelGeometry | None:
 
 
 def _is_wrist(z: FloatArray, k5: FloatArray, k6: FloatArray, passing: float) -> bool:
-    """Return whether joints 5 and 6 turn axis 6 enough, whose distance is `passing` of the arm's size."""
+    """Return whether joints 5 and 6 turn axis 6 enough; `passing` is the distance of both axes."""
     t56 = _sine(k5, k6)
     if passing == 0.0:
-        return t56 >= TILT
+        return t56 >= MIN_TILT_SINE
     if t56 < PARALLEL:
         return passing > MEETING
-    return passing * t56 * _sine(z, k5) ** 2 >= PASSING
+    return passing * t56 * _sine(z, k5) ** 2 >= MIN_PASSING
 
 
-def _sine(one: FloatArray, other: FloatArray) -> float:
-    """Return the sine of the angle between two unit vectors."""
-    return float(np.linalg.norm(np.cross(one, other)))
+def _sine(u: FloatArray, v: FloatArray) -> float:
+    return float(np.linalg.norm(np.cross(u, v)))
 
 
 def _distance(direction: FloatArray, between: FloatArray) -> float:
-    """Return the distance in [m] of two parallel lines from a vector between them."""
+    """Return the distance of two parallel lines from a vector between them."""
     return float(np.linalg.norm(np.cross(direction, between)))
 
 
 def _common_normal(
     k5: FloatArray, p5: FloatArray, k6: FloatArray, p6: FloatArray, meeting: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the feet of the common normal of two lines, the point between them twice where they meet."""
+    """Return the feet of the common normal of two lines, its middle twice where they meet."""
     normal = np.cross(k5, k6)
     square = float(normal @ normal)
     if square < PARALLEL**2:
@@ -137,41 +142,26 @@ def _common_normal(
 
 
 def _rows(matrix: FloatArray, rounding: float = 0.0) -> tuple[Vector, Vector, Vector]:
-    """Return the rows of a 3 x 3 matrix."""
     x, y, z = (_vector(row, rounding) for row in matrix)
     return x, y, z
 
 
 def _vector(values: FloatArray, rounding: float = 0.0) -> Vector:
-    """Return three floats, those that differ by rounding from 0, 1 and -1 as these: they fold away."""
+    """Return three floats, rounded to 0, 1 or -1 where they differ by rounding only: these fold away."""
     x, y, z = (
-        float(round(one)) if abs(one - round(one)) < rounding and abs(one) < 2.0 else float(one)
-        for one in values
+        float(round(value)) if abs(value - round(value)) < rounding and abs(value) < 2.0 else float(value)
+        for value in values
     )
     return x, y, z
 
 
-REACH = 1e-11
-"""What a target may be out of reach by, of the arm's size or in [rad]: rounding of its pose."""
-
-EDGE = 1e-14
-"""Nearer than this, of the arm's size or in [rad], to where two branches meet they are taken as one.
-
-Rounding of the pose would part them by its root, 1e-8, and with them what the other joints have to reach.
-"""
-
-NEAR_ROOTS = 1e-6
-"""Two values of q1 nearer than this, in [rad], meet; a step of the last polish is no longer than this."""
-
-
-@dataclass(frozen=True, slots=True)
-class OuterJoints:
+class OuterJoints(NamedTuple):
     """All pairs of q1 and q5 of n targets: `a` values of q1, with `b` of q5 for each.
 
     Attributes:
         q1: In [rad], shape (a, 1, n); NaN where there is none.
         q5: In [rad], shape (a, b, n); NaN where there is none.
-        side: 1 where the wrist is on that side of axis 1 that k1 x z points to, -1 else [-], shape (a, 1, n).
+        side: 1 where the wrist is on the side of axis 1 that k1 x z points to, -1 else [-], shape (a, 1, n).
         flip: False of the first, true of the second wrist, shape (b,).
         reasons: Why there is none, shape (a, b, n).
         free: Where the wrist is on axis 1, which leaves q1 free, shape (n,).
@@ -188,7 +178,7 @@ class OuterJoints:
 
 
 def outer_joints(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> OuterJoints:
-    """Return the pairs of q1 and q5 that put axis 6 into its place.
+    """Return the pairs of q1 and q5 that place axis 6.
 
     Where axes 5 and 6 meet, p6 is their meeting point and `place` alone gives q1; where they are parallel,
     `direction` does. The other equation then gives q5. Else q5 is eliminated: a quadric in q1.
@@ -199,19 +189,25 @@ def outer_joints(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> 
         near: q1 in [rad] where it is free, shape (n,).
     """
     if arm.p5 == arm.p6:
-        return _meeting(arm, motion, near)
-    return _passing(arm, motion) if _pass(arm) else _parallel(arm, motion)
+        return _meeting_axes(arm, motion, near)
+    return _passing_axes(arm, motion) if _is_passing(arm) else _parallel_axes(arm, motion)
 
 
 def branch_names(arm: ParallelGeometry) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return what the values of q1, and those of q5 for each, are called; "" where there is only one."""
-    if _pass(arm):
+    """Return the names of the values of q1, and of those of q5 for each; "" where there is only one."""
+    if _is_passing(arm):
         return tuple(f"shoulder {number}" for number in range(1, 5)), ("",)
     return ("right", "left"), ("not flipped", "flipped")
 
 
-def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> OuterJoints:
-    """Axes 5 and 6 meet, as those of a UR arm: `place` gives q1, a spherical triangle q5."""
+def _is_passing(arm: ParallelGeometry) -> bool:
+    """Return whether axes 5 and 6 neither meet nor are parallel."""
+    across = cross(arm.k5, arm.k6)
+    return arm.p5 != arm.p6 and bool(dot(across, across) >= PARALLEL**2)
+
+
+def _meeting_axes(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> OuterJoints:
+    """Solve axes 5 and 6 that meet, as those of a UR arm: `place` gives q1, a spherical triangle q5."""
     a, b, c = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), arm.p5[2] - arm.p1[2])
     r, within = np.hypot(a, b), REACH * arm.size
     free = (r <= within) & (np.abs(c) <= within)
@@ -220,7 +216,7 @@ def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> Oute
     q1 = np.where(free, (near, near + np.pi), (right, left))[:, None]
     axis6 = rotation_about(arm.k1, -q1).rotate(motion.rotate(arm.k6))
     theta = np.arctan2(np.hypot(axis6[0], axis6[1]), axis6[2])
-    q5, folded, allowed = _fifth(arm, theta)
+    q5, folded, allowed = _joint5(arm, theta)
     sine = float(np.hypot(arm.k1[0], arm.k1[1]))
     reasons = format_reasons(
         np.broadcast_to(np.isnan(q1), q5.shape),
@@ -235,15 +231,15 @@ def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> Oute
         *allowed,
     )
     singular = (
-        SingularPoses("wrist beside axis 1", _everywhere(meet & ~free, q5)),
+        SingularPoses("wrist beside axis 1", np.broadcast_to(meet & ~free, q5.shape)),  # plain: ok
         SingularPoses("flips meet", folded & (np.sin(theta) > REACH)),
     )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
     return OuterJoints(q1, q5, side, np.array([False, True]), reasons, free, singular)
 
 
-def _fifth(arm: ParallelGeometry, theta: FloatArray) -> tuple[FloatArray, BoolArray, tuple[float, float]]:
-    """Return q5 that puts axis 6 at an angle theta to axis 4.
+def _joint5(arm: ParallelGeometry, theta: FloatArray) -> tuple[FloatArray, BoolArray, tuple[float, float]]:
+    """Return q5 that puts axis 6 at an angle theta to axis 4, shape (a, 1, n).
 
     The directions of axes 4, 5, 6 are the corners of a spherical triangle with the sides t45, t56 and theta:
     with delta = |t45 - t56|, sigma = t45 + t56
@@ -251,11 +247,7 @@ def _fifth(arm: ParallelGeometry, theta: FloatArray) -> tuple[FloatArray, BoolAr
         tan^2((q5 - q0)/2) = sin((theta + delta)/2) sin((theta - delta)/2)
                              / (sin((sigma + theta)/2) sin((sigma - theta)/2)),
 
-    which leaves its digits to a small angle where cos(q5) does not.
-
-    Args:
-        arm: The arm.
-        theta: In [rad], shape (a, 1, n).
+    which keeps the digits of a small angle where cos(q5) does not.
 
     Returns:
         q5 in [rad], shape (a, 2, n), where both are one, and the least and largest theta in [rad].
@@ -269,20 +261,20 @@ def _fifth(arm: ParallelGeometry, theta: FloatArray) -> tuple[FloatArray, BoolAr
     half = np.arctan2(np.sqrt(np.maximum(up, 0.0)), np.sqrt(np.maximum(down, 0.0)))
     within = (theta >= delta - REACH) & (theta <= top + REACH)
     away = 2.0 * np.where(within, half, np.nan)
-    _, cosine, sine = _turned(arm.k5, arm.k6)
+    _, cosine, sine = _rotation_terms(arm.k5, arm.k6)
     q5 = wrap_angle(float(np.arctan2(sine, cosine)) + np.concatenate((away, -away), axis=1))
     return q5, np.broadcast_to((low | high) & within, q5.shape), (delta, top)
 
 
-def _parallel(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
-    """Axes 5 and 6 are parallel: `direction` gives q1, `place` q5."""
+def _parallel_axes(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
+    """Solve axes 5 and 6 that are parallel: `direction` gives q1, `place` q5."""
     a, b, c = _shoulder(arm.k1, motion.rotate(arm.k6), arm.k6[2])
     r = np.hypot(a, b)
     c, meet = _on_edge(r, c, EDGE, REACH)
     left, right = linear_roots(a, b, c)
     q1 = np.stack((right, left))[:, None]
     there = rotation_about(arm.k1, -q1).rotate(subtract(motion.point(arm.p6), arm.p1))[2] + arm.p1[2]
-    const, cosine, sine = _turned(arm.k5, subtract(arm.p6, arm.p5))
+    const, cosine, sine = _rotation_terms(arm.k5, subtract(arm.p6, arm.p5))
     reach, height = float(np.hypot(cosine, sine)), there - arm.p5[2] - const
     height, fold = _on_edge(np.full_like(height, reach), height, EDGE * arm.size, REACH * arm.size)
     falling, rising = linear_roots(np.full_like(height, cosine), np.full_like(height, sine), height)
@@ -300,15 +292,15 @@ def _parallel(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
         np.full_like(height, reach),
     )
     singular = (
-        SingularPoses("postures meet", _everywhere(meet, q5)),
+        SingularPoses("postures meet", np.broadcast_to(meet, q5.shape)),
         SingularPoses("flips meet", np.broadcast_to(fold, q5.shape)),
     )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
     return OuterJoints(q1, q5, side, np.array([False, True]), reasons, np.zeros(len(r), dtype=bool), singular)
 
 
-def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
-    """Axes 5 and 6 pass each other: both equations give cos q5 and sin q5, whose squares sum to 1."""
+def _passing_axes(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
+    """Solve axes 5 and 6 that pass each other: both equations give cos q5 and sin q5, on the unit circle."""
     left = np.array(
         (
             _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), arm.p5[2] - arm.p1[2]),
@@ -316,7 +308,9 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
         )
     )
     left[:, 2] *= -1.0
-    right: FloatArray = np.array((_turned(arm.k5, subtract(arm.p6, arm.p5)), _turned(arm.k5, arm.k6)))
+    right: FloatArray = np.array(
+        (_rotation_terms(arm.k5, subtract(arm.p6, arm.p5)), _rotation_terms(arm.k5, arm.k6))
+    )
     left[:, 2] -= right[:, :1]
     # of cos q5 and of sin q5: the factors of cos q1, sin q1 and 1
     (a, b, c), (d, e, f) = np.einsum("ij,jkn->ikn", np.linalg.inv(right[:, 1:]), left)
@@ -335,16 +329,16 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
         q1, q5 = _newton_step(left, right[:, 1:], q1, q5)
     q1, q5 = _in_order(arm, motion, q1, q5)
     q1, q5 = wrap_angle(q1)[:, None], wrap_angle(q5)[:, None]
-    found = np.isfinite(q1).sum(axis=0)
+    count = np.isfinite(q1).sum(axis=0)
     reasons = format_reasons(
         np.isnan(q1),
         "joints 1 and 5 put axis 6 into its place in {} ways, allowed for this branch: at least {}",
-        found,
+        count,
         np.arange(1.0, 5.0)[:, None, None],
     )
     slope = left[0, 1] * np.cos(q1) - left[0, 0] * np.sin(q1)
-    others = [np.roll(q1, shift, axis=0) for shift in (1, 2, 3)]
-    meet = np.any([np.abs(wrap_angle(q1 - other)) < NEAR_ROOTS for other in others], axis=0)
+    rolled = [np.roll(q1, shift, axis=0) for shift in (1, 2, 3)]
+    meet = np.any([np.abs(wrap_angle(q1 - other)) < NEAR_ROOTS for other in rolled], axis=0)
     singular = (SingularPoses("postures meet", meet),)
     return OuterJoints(
         q1,
@@ -360,19 +354,14 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
 def _newton_step(
     left: FloatArray, right: FloatArray, q1: FloatArray, q5: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return q1 and q5 after a step of Newton's rule; as they were where the equations are singular.
+    """Return q1 and q5, shape (4, n), after a step of Newton's rule; unchanged where it is singular.
 
-    Args:
-        left: Factors of cos q1, sin q1 and 1 in both equations, shape (2, 3, n).
-        right: Factors of cos q5 and sin q5, shape (2, 2).
-        q1: In [rad], shape (4, n).
-        q5: In [rad], shape (4, n).
+    `left`, shape (2, 3, n), has the factors of cos q1, sin q1 and 1 in both equations, `right`, shape (2, 2),
+    those of cos q5 and sin q5.
     """
     (c1, s1), (c5, s5) = (np.cos(q1), np.sin(q1)), (np.cos(q5), np.sin(q5))
-    f, g = (
-        one[0] * c1 + one[1] * s1 + one[2] - r[0] * c5 - r[1] * s5 for one, r in zip(left, right, strict=True)
-    )
-    f1, g1 = (one[1] * c1 - one[0] * s1 for one in left)
+    f, g = (a[0] * c1 + a[1] * s1 + a[2] - r[0] * c5 - r[1] * s5 for a, r in zip(left, right, strict=True))
+    f1, g1 = (a[1] * c1 - a[0] * s1 for a in left)
     f5, g5 = (r[0] * s5 - r[1] * c5 for r in right)
     det = f1 * g5 - f5 * g1
     step1, step5 = (f * g5 - f5 * g) / det, (f1 * g - f * g1) / det
@@ -383,25 +372,25 @@ def _newton_step(
 def _in_order(
     arm: ParallelGeometry, motion: Transform, q1: FloatArray, q5: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return pairs of q1 and q5, shape (4, n), by how far axis 2 is turned from the wrist, both about axis 1.
+    """Return pairs of q1 and q5, shape (4, n), sorted by the angle about axis 1 from the wrist to axis 2.
 
-    Counted so, and not by q1 itself, the order is the same whatever the zero of joint 1 is, and stays while
-    the arm turns about axis 1.
+    This order, unlike that of q1, is the same for any zero of joint 1 and stays while the arm turns about
+    axis 1.
     """
     cosine, sine, _ = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), 0.0)
     order = np.argsort(wrap_angle(q1 - np.arctan2(sine, cosine)), axis=0)  # NaN last
     return np.take_along_axis(q1, order, axis=0), np.take_along_axis(q5, order, axis=0)
 
 
-def _turned(k: Vector, v: Vector) -> tuple[Element, Element, Element]:
-    """Return the parts of z . R(k, q) v: what is constant, and the factors of cos q and sin q."""
+def _rotation_terms(k: Vector, v: Vector) -> tuple[Element, Element, Element]:
+    """Return the parts of z . R(k, q) v: the constant, and the factors of cos q and sin q."""
     constant = k[2] * dot(k, v)
     return constant, v[2] - constant, cross(k, v)[2]
 
 
 def _shoulder(k1: Vector, v: Vector, value: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return a, b, c of z . R1^T v = value as a cos q1 + b sin q1 = c, each of shape (n,)."""
-    constant, cosine, sine = _turned(k1, v)
+    constant, cosine, sine = _rotation_terms(k1, v)
     a, b, c, _ = np.broadcast_arrays(cosine, -sine, value - constant, v[0])
     return a, b, c
 
@@ -412,33 +401,21 @@ def _on_edge(r: FloatArray, c: FloatArray, inside: float, outside: float) -> tup
     return np.where(meet, np.copysign(r, c), c), meet
 
 
-def _pass(arm: ParallelGeometry) -> bool:
-    """Return whether axes 5 and 6 neither meet nor are parallel."""
-    across = cross(arm.k5, arm.k6)
-    return arm.p5 != arm.p6 and bool(dot(across, across) >= PARALLEL**2)
+def _angle(u: Vector, v: Vector) -> float:
+    across = cross(u, v)
+    return float(np.arctan2(np.sqrt(dot(across, across)), dot(u, v)))
 
 
-def _angle(one: Vector, other: Vector) -> float:
-    """Return the angle between two unit vectors in [rad]."""
-    across = cross(one, other)
-    return float(np.arctan2(np.sqrt(dot(across, across)), dot(one, other)))
-
-
-def _everywhere(where: BoolArray, like: FloatArray) -> BoolArray:
-    """Return a mask of the targets for all pairs, shape (a, b, n)."""
-    return np.broadcast_to(where, like.shape)
-
-
-def format_reasons(where: BoolArray, text: str, found: FloatArray, *allowed: FloatArray | float) -> TextArray:
-    """Return a text with what was found and is allowed where it holds, empty elsewhere, shape (..., n).
+def format_reasons(where: BoolArray, text: str, value: FloatArray, *allowed: FloatArray | float) -> TextArray:
+    """Return a text with a value and its limits where a mask holds, empty elsewhere, shape (..., n).
 
     Args:
-        where: Where it holds, shape (..., n).
-        text: With a place for each figure (see `figures`).
-        found: What was found, in [m] or [rad], shape (..., n) or one that broadcasts to it.
-        allowed: What is allowed, likewise.
+        where: The mask, shape (..., n).
+        text: With a place for each number (see `format_with_limits`).
+        value: In [m] or [rad], of a shape that broadcasts to (..., n).
+        allowed: Its limits, in the same unit and shape.
     """
     texts = np.full(where.shape, "", dtype=np.object_)
-    spread = [np.broadcast_to(one, where.shape)[where].tolist() for one in (found, *allowed)]
-    texts[where] = [text.format(*format_with_limits(*each)) for each in zip(*spread, strict=True)]
+    spread = [np.broadcast_to(array, where.shape)[where].tolist() for array in (value, *allowed)]
+    texts[where] = [text.format(*format_with_limits(*row)) for row in zip(*spread, strict=True)]
     return texts

@@ -1,22 +1,30 @@
-"""The one entry: joint values that bring the tool of any arm to its targets.
+"""Inverse kinematics of targets: joint values that bring the tool of any arm to them, limits kept.
 
-How far an arm can reach at most, by the lengths of its links alone: what lies beyond needs no search.
+`solve` is the entry. It validates targets and options, takes the closed form of the arm or else the iterative
+solver, and restores the order of the targets:
+
+1. Closed form (`closed`): all branches, shifted into limits; where a pose leaves joints free and limits
+   exclude the one that was chosen, another one is searched for (`choose_free_joints`). Of all branches the
+   one nearest to `start`, if not `every` one is requested.
+2. Iterative (`restarts`): positions, arms without a closed form, and targets that a closed form misses, where
+   that is requested (a tolerance) or possible (an arm that has one nearly).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import BoolArray, FloatArray, row_norms
+from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value
 from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
-from urmpipe_models.ik.restarts import choose_free_joints
+from urmpipe_models.ik.limits import joint_periods, limit_solutions, shift_towards_limits
+from urmpipe_models.ik.numeric import refine
+from urmpipe_models.ik.restarts import solve_iteratively
 from urmpipe_models.ik.solutions import (
     DEFAULT_SEARCH,
     NEAREST_POINT,
@@ -26,15 +34,20 @@ from urmpipe_models.ik.solutions import (
     Solutions,
     Targets,
     empty_solutions,
-    joint_periods,
     validate_targets,
 )
+from urmpipe_models.ik.trigonometric import wrap_angle
 
 Method = Literal["auto", "closed", "iterative"]
 METHODS: tuple[Method, ...] = ("auto", "closed", "iterative")
 
-NEAREST = "nearest"
-"""What the one column of solutions is called that were picked of the branches of a closed form."""
+NEAREST = (
+    "nearest"  # name of the only column of solutions that were selected from the branches of a closed form
+)
+CHOSEN_BY_LIMITS = ", or what the limits of the joints allow"  # is added to `SingularPoses.chosen`
+SAME_BRANCH_TOLERANCE = (
+    1e-4  # [rad] or [m] of every joint; a solution this near to another branch is that branch
+)
 
 
 def solve(
@@ -48,24 +61,25 @@ def solve(
 ) -> Solutions:
     """Return joint values, limits kept, that bring the tool centre point to its targets.
 
-    An arm with a closed form is solved by it where poses are asked; every other arm, and positions with any
-    orientation, iteratively from `start` and from random restarts. A target that is none (not finite, no
-    rotation) or out of reach gets a reason and stops no other.
+    An arm with a closed form is solved by it if targets are poses; every other arm, and positions with any
+    orientation, iteratively from `start` and from random restarts. A target that is invalid (not finite, no
+    rotation) or out of reach gets a reason and does not affect the others.
 
     Args:
         chain: The arm.
         targets: Poses, or positions with any orientation.
-        start: Joint values in [rad] or [m], shape (joints,) or (n, joints), that solutions are to be near to;
-            of the chain by default. They may lie outside the limits of the joints; solutions do not. Where a
-            singular pose leaves a joint free it is taken from here if `start` is given or one solution asked.
-        every: Return all solutions, one column a branch, each joint in the turn nearest to `start` that its
-            limits allow: what differs from it by whole turns is not listed. Otherwise the one nearest to
-            `start`, whose branch stands in `labels`.
+        start: Joint values in [rad] or [m], shape (joints,) or (n, joints), that solutions shall be near to;
+            of the chain by default. They may lie outside the limits of the joints; solutions do not. Where
+            a singular pose leaves a joint free it is taken from here if `start` is given or one solution
+            requested.
+        every: Return all solutions, one column per branch, each joint in the turn nearest to `start` that its
+            limits allow; solutions that differ by whole turns only are not listed. Otherwise the one
+            nearest to `start`, whose branch is in `labels`.
         method: "closed" or "iterative" to allow only one of them.
-        search: How far to search for what does not follow from `start`.
+        search: Limits of the search for what does not follow from `start`.
 
     Raises:
-        OptionError: With all that is wrong with the options.
+        OptionError: With all faults of the options.
     """
     position_only = targets.rotation is None
     targets, reasons = validate_targets(targets)
@@ -77,92 +91,106 @@ def solve(
         faults.append(_no_closed_form(chain, position_only))
     if faults:
         raise OptionError(*faults)
-    begin = _starts(chain, len(targets), start)
-    good = np.array([not reason for reason in reasons], dtype=bool)
+    begin = np.atleast_2d(np.array(chain.start if start is None else start, dtype=float))
+    begin = np.broadcast_to(begin, (len(targets), begin.shape[1]))
+    valid = np.array([not reason for reason in reasons], dtype=bool)
     nearly = method == "auto" and form is not None and form != exact_closed_form(chain)
-    asked = _Asked(chain, every, search, nearly or search.tolerance is not None)
+    request = _Request(chain, every, search, nearly or search.tolerance is not None)
     if form is None:
-        found = asked.iteratively(targets.rows(good), begin[good])
+        solutions = request.solve_iteratively(targets.rows(valid), begin[valid])
     else:
-        near = begin[good] if start is not None or not every else None
-        found = asked.by_closed_form(form, targets.rows(good), begin[good], near)
-    return found if good.all() else _spread(found, good, reasons)
+        near = begin[valid] if start is not None or not every else None
+        solutions = request.solve_closed(form, targets.rows(valid), begin[valid], near)
+    return solutions if valid.all() else _insert_invalid(solutions, valid, reasons)
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """What was asked of the solvers."""
-
+class _Request(NamedTuple):
     chain: Chain
     every: bool
     search: SearchOptions
-    rest: bool
-    """Whether what a closed form does not reach is searched for: the nearest points, or what one that holds
-    nearly may have lost."""
+    search_missed: bool  # whether targets that a closed form does not reach are searched for iteratively
 
-    def by_closed_form(
+    def solve_closed(
         self, form: ClosedForm, targets: Targets, start: FloatArray, near: FloatArray | None
     ) -> Solutions:
-        """Return the branches within limits, or the nearest; what they do not reach is searched for."""
-        found = choose_free_joints(self.chain, targets, form.solve(targets, near), start)
+        """Return the branches within limits, or the nearest; those that are not reached are searched for."""
+        solutions = choose_free_joints(self.chain, targets, form.solve(targets, near), start)
         if not self.every:
-            found = found.picked(found.nearest_column(start, joint_periods(self.chain)), NEAREST)
-        out = np.asarray(~found.reached.any(axis=1))
-        if not self.rest or not out.any():
-            return found
-        return _approached(found, out, replace(self, every=False).iteratively(targets.rows(out), start[out]))
+            column = solutions.nearest_column(start, joint_periods(self.chain))
+            solutions = solutions.select(column, NEAREST)
+        missed = np.asarray(~solutions.reached.any(axis=1))
+        if not self.search_missed or not missed.any():
+            return solutions
+        nearest = self._replace(every=False).solve_iteratively(targets.rows(missed), start[missed])
+        return _insert_nearest(solutions, missed, nearest)
 
-    def iteratively(self, targets: Targets, start: FloatArray) -> Solutions:
-        """Return what the iterative solver finds."""
-        from urmpipe_models.ik.restarts import solve_iteratively
-
+    def solve_iteratively(self, targets: Targets, start: FloatArray) -> Solutions:
         if not len(targets):
             return empty_solutions([], ("1",), len(self.chain.coordinates))
         return solve_iteratively(self.chain, targets, start=start, every=self.every, search=self.search)
 
 
-def _approached(found: Solutions, out: BoolArray, nearest: Solutions) -> Solutions:
-    """Return solutions with those of other targets, one each, in the first column where there was none."""
+def choose_free_joints(chain: Chain, targets: Targets, solutions: Solutions, near: FloatArray) -> Solutions:
+    """Return solutions within limits (`limit_solutions`), with free joints chosen so that limits allow them.
+
+    Where a pose leaves joints free, a branch is a continuum of solutions, and a closed form returns one
+    of it. If limits exclude that one, another is searched for from the limits that it is beyond.
+
+    Args:
+        chain: The arm.
+        targets: n of them.
+        solutions: Of a closed form, limits not considered.
+        near: Joint values in [rad] or [m], shape (n, joints).
+    """
+    limited = limit_solutions(chain, solutions, near)
+    free = np.any([poses.where for poses in solutions.singular if poses.free], axis=0)
+    excluded = solutions.reached & ~limited.reached & free
+    if not excluded.any():
+        return limited
+    row, column = np.nonzero(excluded)
+    refined = refine(chain, targets.rows(row), shift_towards_limits(chain, solutions.q[row, column]))
+    differences = np.abs(wrap_angle(refined.q[:, None] - limited.q[row])).max(axis=2)
+    new = refined.converged & ~np.asarray((differences < SAME_BRANCH_TOLERANCE).any(axis=1))
+    row, column = row[new], column[new]
+    q = solutions.q.copy()
+    q[row, column] = refined.q[new]
+    singular = tuple(_add_limits_to_choice(poses, row, column) for poses in solutions.singular)
+    return limit_solutions(chain, replace(solutions, q=q, singular=singular), near)
+
+
+def _add_limits_to_choice(poses: SingularPoses, row: IndexArray, column: IndexArray) -> SingularPoses:
+    if not (poses.free and poses.where[row, column].any()):
+        return poses
+    return replace(poses, chosen=poses.chosen + CHOSEN_BY_LIMITS)
+
+
+def _insert_nearest(solutions: Solutions, missed: BoolArray, nearest: Solutions) -> Solutions:
+    """Return solutions with those of missed targets, one each, in the first column."""
     near = nearest.reached[:, 0]
-    met = np.flatnonzero(out)[near]
-    q, shortfall = found.q.copy(), found.shortfall.copy()
-    reasons, labels = found.reasons.copy(), found.labels.copy()
+    met = np.flatnonzero(missed)[near]
+    q, shortfall = solutions.q.copy(), solutions.shortfall.copy()
+    reasons, labels = solutions.reasons.copy(), solutions.labels.copy()
     q[met, 0], shortfall[met, 0] = nearest.q[near, 0], nearest.shortfall[near, 0]
     reasons[met, 0] = ""
     labels[met, 0] = np.where(shortfall[met, 0] > 0.0, NEAREST_POINT, NO_BRANCH)
-    return replace(found, q=q, reasons=reasons, shortfall=shortfall, labels=labels)
+    return replace(solutions, q=q, reasons=reasons, shortfall=shortfall, labels=labels)
 
 
-def _spread(found: Solutions, good: BoolArray, reasons: list[str]) -> Solutions:
-    """Return solutions of all targets from those of the good ones, the others with their reasons."""
-    every = empty_solutions(reasons, found.branches, found.q.shape[2])
-    count, columns = every.q.shape[:2]
-    every.q[good], every.reasons[good] = found.q, found.reasons
-    shortfall, labels = np.zeros((count, columns)), every.labels.copy()
-    shortfall[good], labels[good] = found.shortfall, found.labels
-    return replace(
-        every,
-        singular=tuple(_spread_family(family, good) for family in found.singular),
-        shortfall=shortfall,
-        labels=labels,
-    )
-
-
-def _spread_family(family: SingularPoses, good: BoolArray) -> SingularPoses:
-    """Return a family of all targets from one of the good ones."""
-    where = np.zeros((len(good), family.where.shape[1]), dtype=bool)
-    where[good] = family.where
-    return replace(family, where=where)
-
-
-def _starts(chain: Chain, count: int, start: FloatArray | None) -> FloatArray:
-    """Return the start of each target, shape (n, joints)."""
-    begin = np.atleast_2d(np.array(chain.start if start is None else start, dtype=float))
-    return np.broadcast_to(begin, (count, begin.shape[1]))
+def _insert_invalid(solutions: Solutions, valid: BoolArray, reasons: list[str]) -> Solutions:
+    """Return solutions of all targets from those of the valid ones, the others with their reasons."""
+    every = empty_solutions(reasons, solutions.branches, solutions.q.shape[2])
+    every.q[valid], every.reasons[valid] = solutions.q, solutions.reasons
+    shortfall, labels = np.zeros(every.q.shape[:2]), every.labels.copy()
+    shortfall[valid], labels[valid] = solutions.shortfall, solutions.labels
+    singular = []
+    for poses in solutions.singular:
+        where = np.zeros((len(valid), poses.where.shape[1]), dtype=bool)
+        where[valid] = poses.where
+        singular.append(replace(poses, where=where))
+    return replace(every, singular=tuple(singular), shortfall=shortfall, labels=labels)
 
 
 def _start_faults(chain: Chain, count: int, start: FloatArray | None) -> Iterator[Finding]:
-    """Yield what is wrong with a start."""
     if start is None:
         return
     joints, begin = len(chain.coordinates), np.asarray(start, dtype=float)
@@ -178,58 +206,16 @@ def _start_faults(chain: Chain, count: int, start: FloatArray | None) -> Iterato
 
 
 def _no_closed_form(chain: Chain, position_only: bool) -> Finding:
-    """Say what a closed form would need."""
-    searched = (Hint("method", "iterative", "searches"),)
+    hints = (Hint("method", "iterative", "searches"),)
     if position_only:
-        said = "positions with any orientation have no closed form"
-        return Finding(said, parameter="method", allowed="closed for poses", hints=searched)
+        return Finding(
+            "positions with any orientation have no closed form",
+            parameter="method",
+            allowed="closed for poses",
+            hints=hints,
+        )
     allowed = (
         "closed for six joints whose last three axes meet in a point or whose axes 2, 3 and 4 are parallel,"
         " exactly or nearly"
     )
-    said = f"robot {chain.name} has no closed form"
-    return Finding(said, parameter="method", allowed=allowed, hints=searched)
-
-
-SURE = 1e-3
-"""A target is too far if it is by more than this, in [m]: the edge of the reach is left to the search."""
-
-
-def max_reach(chain: Chain) -> float:
-    """Return what the tool centre point can be away from the first joint's frame at most, in [m].
-
-    It is the sum of the offsets from frame to frame, and of what each prismatic joint can add: no posture
-    is longer. Limits of revolute joints are not asked, so that few arms get there.
-    """
-    offsets = [joint.origin.translation for joint in chain.joints[1:]]
-    offsets += [chain.tip.translation, chain.tool.translation]
-    return sum(math.hypot(*offset) for offset in offsets) + sum(_strokes(chain))
-
-
-def find_out_of_reach(chain: Chain, targets: Targets, tolerance: float | None) -> list[str]:
-    """Return why targets are out of any posture's reach, one text each; empty where they may be in it.
-
-    Args:
-        chain: The arm.
-        targets: n of them; one that is not finite has no reason here.
-        tolerance: In [m] along each axis, of targets that the tool need only come near to.
-    """
-    most = max_reach(chain)
-    first = (chain.base @ chain.joints[0].origin).translation
-    away = row_norms(targets.position - np.array(first))
-    reasons = [""] * len(targets)
-    for row in np.flatnonzero(away > most + SURE + math.sqrt(3.0) * (tolerance or 0.0)).tolist():
-        reasons[row] = f"the target is {away[row]:.3f} m from the first joint, allowed: {most:.3f} m at most"
-    return reasons
-
-
-def _strokes(chain: Chain) -> Iterator[float]:
-    """Yield what each prismatic joint can add at most, in [m]."""
-    coordinates = {joint.name: joint for joint in chain.moving}
-    for joint in chain.joints:
-        if joint.kind == "prismatic" and joint.mimic is None:
-            yield max(abs(joint.lower), abs(joint.upper))
-        elif joint.kind == "prismatic" and joint.mimic is not None:
-            led = coordinates[joint.mimic.joint]
-            ends = (joint.mimic.multiplier * end + joint.mimic.offset for end in (led.lower, led.upper))
-            yield max(map(abs, ends))
+    return Finding(f"robot {chain.name} has no closed form", parameter="method", allowed=allowed, hints=hints)

@@ -1,23 +1,23 @@
-"""Small symmetric positive definite systems, many at once: one array an entry.
+"""Error of the tool at its target, which iterative inverses bring to zero, and its Jacobian, for many rows.
 
-`numpy.linalg.solve` calls LAPACK once a system, which costs more than the Jacobian that a system of six
-unknowns is about. Here a matrix is an array of shape (k, k, n), so that an entry's n values lie side by side
-and each elimination is a few NumPy operations on all systems. Sums run term by term (see `_sum`): their
-rounding must not depend on n, or what one row comes to would depend on which others are solved beside it.
-Entries may be in any unit.
+1. Linear algebra of small systems. `numpy.linalg.solve` calls LAPACK once per system, which costs more than
+   the Jacobian of an arm with six joints. Here a matrix is an array of shape (k, k, n), so that the n
+   values of an entry are contiguous and each elimination is a few NumPy operations on all systems. Sums run
+   term by term (`_sum`): their rounding must not depend on n, or the result of a row would depend on the
+   rows solved with it. Entries may be in any unit.
+2. `tool_motion`: pose and Jacobian of the tool. Every joint turns about the z axis of its frame, or slides
+   along it,
 
-Pose and Jacobian of the tool over many rows in few NumPy calls: a vector is one array of shape (3, n).
+       T = C_0 Z(q_1) C_1 Z(q_2) ... Z(q_n) C_n,
 
-The chain of `kinematics` has an array an entry, so that a symbol may stand there too. Here only numbers
-do, and x, y and z of a vector are worked on together: a batch of a few rows costs a tenth. Every joint
-turns about the z axis of a frame of its own, or slides along it,
+   with constant transforms C that hold the rest: base, origins, directions of the axes, frames that carry a
+   sensor, tip and tool. Products with their 0 and 1 are omitted. x, y and z of a vector are one array of
+   shape (3, n), numbers only, which costs a tenth of `kinematics` for a batch of a few rows.
+3. `Task.error`: e and J at joint values q, with
 
-    T = C_0 Z(q_1) C_1 Z(q_2) ... Z(q_n) C_n,
+       e = (x_target - x, l u a),    u a the rotation vector of R_target R^T (`rotation_error`),
 
-with constant transforms C that hold all the rest: base, origins, directions of the axes, frames that carry
-a sensor, tip and tool. Products with their 0 and 1 are left out.
-
-What an iterative inverse brings to zero: the tool's distance from its target, and the Jacobian of it.
+   and l the length that a radian counts as (`orientation_length`).
 """
 
 from __future__ import annotations
@@ -37,13 +37,21 @@ from urmpipe_models.kinematics.forward import jacobian_over_log, joint_values
 from urmpipe_models.kinematics.singularity import characteristic_length
 from urmpipe_models.math3d import Transform
 
+HALF_TURN_SINE = (
+    1e-6  # below it an angle near pi takes its axis from the symmetric part of the rotation matrix
+)
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LDLFactor:
+Terms: TypeAlias = tuple[tuple[int, float], ...]  # entries of a constant vector that are not 0: index, value
+Columns: TypeAlias = tuple[
+    FloatArray, FloatArray, FloatArray
+]  # axes of a frame, each (3, n) or, constant, (3, 1)
+
+
+class LDLFactor(NamedTuple):
     """A = L D L^T, the Cholesky factor without square roots.
 
     Attributes:
-        lower: L below its diagonal of ones [-], shape (k, k, n); what stands elsewhere is not used.
+        lower: L below its diagonal of ones [-], shape (k, k, n); other entries are not used.
         inverse: 1 / D_i in one over the unit of A, shape (k, n).
     """
 
@@ -64,8 +72,8 @@ class LDLFactor:
 def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> LDLFactor:
     """Return the factor of A + mu I.
 
-    Where A is positive semidefinite no pivot D_i is less than mu. Rounding, which can make it so where A is
-    singular, is held to that: the factor is finite for any such A if mu > 0.
+    Where A is positive semidefinite no pivot D_i is less than mu. Pivots are limited to that against
+    rounding, so the factor is finite for any such A if mu > 0.
 
     Args:
         A: Symmetric, in any unit, shape (k, k, n); positive definite where mu is 0.
@@ -111,9 +119,9 @@ def outer_sum(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def take_rows(a: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
-    """Return some of the n of an array of shape (..., n) in any unit, their values side by side.
+    """Return some of the n values of an array of shape (..., n) in any unit, contiguous.
 
-    a[..., rows] has them a matrix apart, which makes all that follows several times as slow.
+    a[..., rows] has them a matrix apart, which makes later operations several times as slow.
     """
     return np.take(a, rows, axis=-1)
 
@@ -121,33 +129,24 @@ def take_rows(a: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
 def _sum(subscripts: str, a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a sum of products whose inner loop runs over the n systems, term after term for each.
 
-    Such is `numpy.einsum` where the n values lie side by side and are more than one; of one alone it would
-    sum in another order.
+    `numpy.einsum` does that for more than one contiguous value; for a single one it sums in another order.
     """
     if a.shape[-1] == 1:
         return np.asarray(np.einsum(subscripts, a.repeat(2, -1), b.repeat(2, -1))[..., :1])
-    return np.asarray(np.einsum(subscripts, _side_by_side(a), _side_by_side(b)))
+    return np.asarray(np.einsum(subscripts, _contiguous(a), _contiguous(b)))
 
 
-def _side_by_side(a: FloatArray) -> FloatArray:
-    """Return an array whose n values lie side by side."""
+def _contiguous(a: FloatArray) -> FloatArray:
     return a if a.strides[-1] == a.itemsize else np.ascontiguousarray(a)
 
 
-Terms: TypeAlias = tuple[tuple[int, float], ...]
-"""A constant vector by its entries that are not 0: which, and how much."""
-
-Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
-"""The axes x, y, z of a frame in the world, each of shape (3, n), or (3, 1) where it does not move."""
-
-
 class ToolMotion(NamedTuple):
-    """Where the tool centre point is, and how every joint moves it, in the world.
+    """Pose of the tool centre point, and its derivatives by the joints, in the world.
 
     Attributes:
         position: In [m], shape (3, n).
-        columns: The axes x, y, z of the tool [-], shape (3, 3, n), first index: which.
-        jacobian: As `kinematics.jacobian` has it, in [m/rad] or [-], shape (6, joints, n).
+        columns: The axes x, y, z of the tool [-], shape (3, 3, n), first index: the axis.
+        jacobian: As `kinematics.jacobian`, in [m/rad] or [-], shape (6, joints, n).
     """
 
     position: FloatArray
@@ -155,8 +154,7 @@ class ToolMotion(NamedTuple):
     jacobian: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class ConstantTransform:
+class ConstantTransform(NamedTuple):
     """A constant transform C: its columns and its translation."""
 
     columns: tuple[Terms, Terms, Terms]
@@ -165,7 +163,7 @@ class ConstantTransform:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedChain:
-    """A chain made ready for `tool_motion`.
+    """A chain prepared for `tool_motion`.
 
     Attributes:
         chain: The arm.
@@ -180,7 +178,7 @@ class PreparedChain:
 
 @lru_cache(maxsize=32)
 def prepare_chain(chain: Chain) -> PreparedChain:
-    """Return a chain made ready for `tool_motion`."""
+    """Return a chain prepared for `tool_motion`."""
     between, joints, steps = chain.base, [], []
     for joint in chain.joints:
         between = between @ joint.origin
@@ -196,21 +194,19 @@ def prepare_chain(chain: Chain) -> PreparedChain:
 def _upright(axis: Vector) -> Transform:
     """Return a frame whose z is a unit vector; of a coordinate axis its entries are 0 and +-1."""
     along = max(range(3), key=lambda i: abs(axis[i]))
-    beside = [0.0, 0.0, 0.0]
-    beside[(along + 1) % 3] = 1.0
-    x = add((beside[0], beside[1], beside[2]), scale(-axis[(along + 1) % 3], axis))
+    other = [0.0, 0.0, 0.0]
+    other[(along + 1) % 3] = 1.0
+    x = add((other[0], other[1], other[2]), scale(-axis[(along + 1) % 3], axis))
     x = scale(1.0 / math.hypot(*x), x)
     return Transform(Transform((x, cross(axis, x), axis)).columns)
 
 
 def _step(frame: Transform) -> ConstantTransform:
-    """Return a constant transform by its entries that are not 0."""
     x, y, z = frame.columns
     return ConstantTransform((_terms(x), _terms(y), _terms(z)), _terms(frame.translation))
 
 
 def _terms(vector: Vector) -> Terms:
-    """Return the entries that are not 0."""
     return tuple((i, float(weight)) for i, weight in enumerate(vector) if weight != 0.0)
 
 
@@ -218,7 +214,7 @@ def tool_motion(arm: PreparedChain, q: FloatArray) -> ToolMotion:
     """Return pose and Jacobian of the tool centre point.
 
     Args:
-        arm: Of the chain, by `arm_of`.
+        arm: Of the chain, by `prepare_chain`.
         q: Joint values in [rad] or [m], shape (joints, n).
     """
     n = q.shape[1]
@@ -243,17 +239,17 @@ def tool_motion(arm: PreparedChain, q: FloatArray) -> ToolMotion:
 
 
 def _values(arm: PreparedChain, q: FloatArray) -> list[FloatArray]:
-    """Return the value of every joint that is not fixed, mimics included."""
+    """Return the values of all joints that are not fixed, mimics included."""
     if len(arm.joints) == len(q):
         return list(q)
-    every = zip(arm.chain.joints, joint_values(arm.chain, list(q)), strict=True)
-    return [value for joint, value in every if joint.kind != "fixed"]
+    values = zip(arm.chain.joints, joint_values(arm.chain, list(q)), strict=True)
+    return [value for joint, value in values if joint.kind != "fixed"]
 
 
 def _jacobian(arm: PreparedChain, J: FloatArray, levers: FloatArray) -> FloatArray:
     """Return J, whose last rows are the axes, with its first: z x (p - o) of revolute joints, z of others.
 
-    A mimic's column counts with its multiplier towards the joint that it follows.
+    A mimic's column, times its multiplier, is added to that of the joint that it follows.
     """
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -281,86 +277,81 @@ def _placed(columns: Columns, point: FloatArray, step: ConstantTransform) -> tup
 
 def _combined(columns: Columns, terms: Terms) -> FloatArray:
     """Return the sum of columns times their weights; there is at least one."""
-    (first, weight), *others = terms
+    (first, weight), *further = terms
     total = columns[first] if weight == 1.0 else weight * columns[first]
-    for which, weight in others:
+    for which, weight in further:
         total = total + weight * columns[which]
     return total
-
-
-HALF_TURN_SINE = 1e-6
-"""Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
 
 
 def orientation_length(chain: Chain) -> float:
     """Return the length l in [m] that a radian of orientation counts as: a quarter of the arm's.
 
-    A turn of the tool by a radian is then weighed as a way that the arm makes with ease; the arm's length is
-    its `characteristic_length`, which does not depend on where a description puts its frames.
+    A rotation of the tool by a radian then weighs as much as a displacement that the arm makes with ease. The
+    arm's length is its `characteristic_length`, which does not depend on the frames of a description.
     """
     return characteristic_length(chain) / 4.0
 
 
 def redundancy(chain: Chain, targets: Targets) -> int:
-    """Return how many freedoms a target leaves: joints less the rank of the Jacobian off singular poses."""
+    """Return the number of joints less the rank of the Jacobian off singular poses."""
     return len(chain.coordinates) - _rank(chain, 3 if targets.rotation is None else 6)
 
 
 @lru_cache(maxsize=32)
 def _rank(chain: Chain, rows: int) -> int:
-    """Return the rank of the Jacobian's first rows off singular poses."""
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(chain.coordinates)))
     return int(np.linalg.matrix_rank(jacobian_over_log(chain, q)[:, :rows], rtol=1e-9).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TaskError:
-    """How far the tool is from its target at joint values q, and how that changes with them.
+    """Difference between target and tool at joint values q, and its Jacobian.
 
     The gradient of |e|^2 / 2 is -J^T e at any target. e itself changes by -A J dq: A is 1 for the position,
     and for the rotation vector, of length a, the Jacobian of the logarithm,
-    1 + E/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) E^2 with E = [e]x / l, which goes to 1 with a. It is left
-    out: it leaves e where it is, so that the gradient is the same without it, and near the target steps are.
+    1 + E/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) E^2 with E = [e]x / l, which goes to 1 with a, omitted:
+    A^T e = e, so that the gradient is the same without it, and near the target steps are.
 
     Attributes:
-        error: e, shape (3, n) or, of poses, (6, n): target minus tool along x, y, z in [m], then the rotation
-            vector that turns the tool into its target, in the world, in [rad], times l in [m].
+        vector: e, shape (3, n) or, of poses, (6, n): target minus tool along x, y, z in [m], then the
+            rotation vector that turns the tool into its target, in the world, in [rad], times l in [m].
         jacobian: J of the tool's velocity and, times l, of its angular velocity, in [m/rad] or [-],
             shape (3 or 6, joints, n).
         distance2: |target - tool|^2 in [m2], shape (n,).
-        turn2: The square of l times the angle in [m2], shape (n,); 0 where any orientation will do.
+        angle2: The square of l times the angle in [m2], shape (n,); 0 where any orientation is allowed.
         length: l in [m].
     """
 
-    error: FloatArray
+    vector: FloatArray
     jacobian: FloatArray
     distance2: FloatArray
-    turn2: FloatArray
+    angle2: FloatArray
     length: float
 
     @property
     def square(self) -> FloatArray:
         """|e|^2 in [m2], shape (n,)."""
-        return np.asarray(self.distance2 + self.turn2)
+        return np.asarray(self.distance2 + self.angle2)
 
     def within(self, metres: float, radians: float) -> BoolArray:
-        """Return where position and orientation are as near as that, in [m] and [rad], shape (n,)."""
-        return np.asarray((self.distance2 <= metres**2) & (self.turn2 <= (self.length * radians) ** 2))
+        """Return where the errors are within tolerances in [m] and [rad], shape (n,)."""
+        return np.asarray((self.distance2 <= metres**2) & (self.angle2 <= (self.length * radians) ** 2))
 
-    def kept(self, rows: IndexArray) -> TaskError:
+    def rows(self, rows: IndexArray) -> TaskError:
         """Return some of the rows, indices of shape (m,)."""
-        error, jacobian = take_rows(self.error, rows), take_rows(self.jacobian, rows)
-        return TaskError(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
+        vector, jacobian = take_rows(self.vector, rows), take_rows(self.jacobian, rows)
+        return TaskError(vector, jacobian, self.distance2[rows], self.angle2[rows], self.length)
 
     def restore(self, rows: IndexArray, before: TaskError) -> None:
-        """Write another's rows, indices of shape (m,), over some of this one's."""
-        for mine, other in (
-            (self.error, before.error),
+        """Overwrite some rows, indices of shape (m,), with those of an earlier error."""
+        for values, earlier in (
+            (self.vector, before.vector),
             (self.jacobian, before.jacobian),
             (self.distance2, before.distance2),
-            (self.turn2, before.turn2),
+            (self.angle2, before.angle2),
         ):
-            mine[..., rows] = other[..., rows]
+            values[..., rows] = earlier[..., rows]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -369,10 +360,10 @@ class Task:
 
     Attributes:
         arm: The arm.
-        length: l in [m]: see `turn_length`.
+        length: l in [m]: see `orientation_length`.
         position: x, y, z in [m], shape (3, n).
-        columns: The axes that the tool shall take [-], shape (3, 3, n), first index: which; None if any
-            orientation will do.
+        columns: The axes that the tool shall take [-], shape (3, 3, n), first index: the axis; None allows
+            any orientation.
     """
 
     arm: PreparedChain
@@ -380,44 +371,44 @@ class Task:
     position: FloatArray
     columns: FloatArray | None
 
-    def kept(self, rows: IndexArray) -> Task:
+    def rows(self, rows: IndexArray) -> Task:
         """Return some of the rows, indices of shape (m,)."""
         columns = None if self.columns is None else take_rows(self.columns, rows)
         return replace(self, position=take_rows(self.position, rows), columns=columns)
 
-    def miss(self, q: FloatArray) -> TaskError:
-        """Return what is missed at joint values q in [rad] or [m], shape (joints, n)."""
+    def error(self, q: FloatArray) -> TaskError:
+        """Return the error at joint values q in [rad] or [m], shape (joints, n)."""
         tool = tool_motion(self.arm, q)
         size = 3 if self.columns is None else 6
-        error, J = np.empty((size, q.shape[1])), tool.jacobian[:size]
-        np.subtract(self.position, tool.position, out=error[:3])
+        vector, J = np.empty((size, q.shape[1])), tool.jacobian[:size]
+        np.subtract(self.position, tool.position, out=vector[:3])
         if self.columns is not None:
-            np.multiply(rotation_error(tool.columns, self.columns), self.length, out=error[3:])
+            np.multiply(rotation_error(tool.columns, self.columns), self.length, out=vector[3:])
             J[3:] *= self.length
-        turn2 = np.zeros(q.shape[1]) if size == 3 else dot_product(error[3:], error[3:])
-        return TaskError(error, J, dot_product(error[:3], error[:3]), turn2, self.length)
+        angle2 = np.zeros(q.shape[1]) if size == 3 else dot_product(vector[3:], vector[3:])
+        return TaskError(vector, J, dot_product(vector[:3], vector[:3]), angle2, self.length)
 
 
 def build_task(chain: Chain, targets: Targets) -> Task:
-    """Return the targets as one array a coordinate."""
+    """Return the targets as one array per coordinate."""
     position, columns = np.ascontiguousarray(targets.position.T), None
     if targets.rotation is not None:
         columns = np.ascontiguousarray(targets.rotation.transpose(2, 1, 0))
     return Task(prepare_chain(chain), orientation_length(chain), position, columns)
 
 
-def rotation_error(columns: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the rotation vector u a, 0 <= a <= pi, in [rad], in the world, of R_wanted R^T: shape (3, n).
+def rotation_error(columns: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the rotation vector u a, 0 <= a <= pi, in [rad], of R_target R^T, in the world, shape (3, n).
 
-    With the columns c_k of R and w_k of R_wanted: u sin(a) = sum_k c_k x w_k / 2 and
+    With the columns c_k of R and w_k of R_target: u sin(a) = sum_k c_k x w_k / 2 and
     1 + 2 cos(a) = sum_k c_k . w_k. Near half a turn the sine leaves no digits for u; there it is the largest
     column of S - cos(a) I with S the symmetric part, which is (1 - cos(a)) u u^T.
 
     Args:
-        columns: Of R [-], shape (3, 3, n), first index: which.
-        wanted: Of R_wanted [-], shape (3, 3, n), likewise.
+        columns: Of R [-], shape (3, 3, n), first index: the column.
+        target: Of R_target [-], shape (3, 3, n), first index: the column.
     """
-    turn = outer_sum(wanted, columns)
+    turn = outer_sum(target, columns)
     cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
     vector = 0.5 * np.stack([turn[k, j] - turn[j, k] for j, k in ((1, 2), (2, 0), (0, 1))])
     size = np.sqrt(dot_product(vector, vector))
@@ -430,7 +421,7 @@ def rotation_error(columns: FloatArray, wanted: FloatArray) -> FloatArray:
 
 
 def _half_turns(turn: FloatArray) -> FloatArray:
-    """Return the axes u of turns by nearly pi, shape (3, 3, n), for which `turn_between` says how: (3, n)."""
+    """Return the axes u of turns by nearly pi, shape (3, 3, n), as `rotation_error` describes: (3, n)."""
     turn = turn.transpose(2, 0, 1)
     sine = np.stack([turn[:, i - 1, i - 2] - turn[:, i - 2, i - 1] for i in range(3)], axis=1)
     cosine = 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0)

@@ -24,8 +24,9 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
+from urmpipe_models.ik.limits import LIMIT_ROUNDING, joint_limits
 from urmpipe_models.ik.path import JointPath, solve_path
-from urmpipe_models.ik.solutions import LIMIT_ROUNDING, Targets, joint_limits, pose_errors
+from urmpipe_models.ik.solutions import Targets, pose_errors
 from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
 from urmpipe_models.planning.laws import PathMotion, Phase, TimeLaw
 from urmpipe_models.planning.path import LineArcPath, segment_index

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray
-from urmpipe_models.ik.branch_walk import find_true_runs
-from urmpipe_models.ik.path import JointPath
+from urmpipe_models.ik.path import JointPath, find_true_runs
 from urmpipe_models.planning.joints import LimitUtilisation, PathJoints
 from urmpipe_models.planning.laws import TimeLaw
 from urmpipe_pipeline.text import in_words

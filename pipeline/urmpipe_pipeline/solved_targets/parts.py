@@ -10,8 +10,8 @@ from itertools import groupby
 import numpy as np
 
 from urmpipe_models.ik.closed import format_method
+from urmpipe_models.ik.limits import TURN, joint_periods
 from urmpipe_models.ik.path import JointPath, Jump, SpeedViolation
-from urmpipe_models.ik.solutions import TURN, joint_periods
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import colour_word, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of

@@ -8,15 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, IndexArray, IntArray, TextArray
+from urmpipe_models.ik.limits import joint_periods, wrap_continuous_joints
 from urmpipe_models.ik.path import JointPath, solve_path
-from urmpipe_models.ik.solutions import (
-    SingularPoses,
-    Solutions,
-    Targets,
-    concatenate_solutions,
-    joint_periods,
-    wrap_continuous_joints,
-)
+from urmpipe_models.ik.solutions import SingularPoses, Solutions, Targets, concatenate_solutions
 from urmpipe_models.ik.solve import solve
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import provenance

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.ik.path_numeric import find_out_of_reach, max_reach
 from urmpipe_models.ik.solutions import Targets, forward_targets
-from urmpipe_models.ik.solve import find_out_of_reach, max_reach
 from urmpipe_models.math3d import Transform, translation
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -9,15 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.ik.solutions import (
+from urmpipe_models.ik.limits import (
     LIMIT_ROUNDING,
-    SingularPoses,
-    Solutions,
     joint_periods,
     limit_solutions,
     shift_towards_limits,
     wrap_continuous_joints,
 )
+from urmpipe_models.ik.solutions import SingularPoses, Solutions
 from urmpipe_models.robots.catalogue import load_robot
 
 TURN = 2.0 * math.pi

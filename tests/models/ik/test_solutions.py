@@ -47,7 +47,7 @@ def test_each_target_can_have_a_start_of_its_own() -> None:
 
 
 def test_what_is_picked_keeps_branch_reason_family_and_shortfall() -> None:
-    picked = two_targets().picked(np.array([1, 0]), "nearest")
+    picked = two_targets().select(np.array([1, 0]), "nearest")
     assert picked.branches == ("nearest",)
     assert picked.labels.tolist() == [["down"], ["up"]]
     assert picked.reasons.tolist() == [[""], ["too far"]]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain, Joint
-from urmpipe_models.ik.path_numeric import unwrap_within_limits
+from urmpipe_models.ik.limits import unwrap_within_limits
 
 TURN = 2.0 * math.pi
 

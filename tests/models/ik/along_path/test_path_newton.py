@@ -45,4 +45,4 @@ def test_a_sweep_solves_the_linearised_path_exactly() -> None:
         # rad: the normal equations lose the digits of 1 / DAMPING
         np.testing.assert_allclose(swept.q[k], last, rtol=0.0, atol=1e-7)
         last = swept.q[k]
-    np.testing.assert_allclose(swept.miss, np.linalg.norm(error, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(swept.error, np.linalg.norm(error, axis=1), rtol=1e-9)

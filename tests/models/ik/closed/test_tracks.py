@@ -40,10 +40,10 @@ def test_a_parabola_that_is_missed_by_rounding_is_touched(unit: float) -> None:
     low = np.array([-0.5, 0.5, 0.9, 1.1]) * 2.0 * BOUNDARY  # of the discriminant
     roots = parabola_roots(alpha, unit * (-0.25 - low / 4.0))
     assert np.isfinite(roots.u[0, 0]).tolist() == [True, True, True, False]
-    assert roots.meet.tolist() == [True, True, True, False]
+    assert roots.coincide.tolist() == [True, True, True, False]
     np.testing.assert_allclose(roots.u[0, :, 1:3], -0.5, rtol=0, atol=1e-12)
     high = np.array([0.9, 1.1]) * 2.0 * MEETING
-    assert parabola_roots(alpha, unit * (-0.25 + high / 4.0)).meet.tolist() == [True, False]
+    assert parabola_roots(alpha, unit * (-0.25 + high / 4.0)).coincide.tolist() == [True, False]
 
 
 def test_a_parabola_along_its_axis_is_met_once() -> None:
@@ -52,7 +52,7 @@ def test_a_parabola_along_its_axis_is_met_once() -> None:
     assert not is_straight(np.array([0.0, 1e-30]))
     roots = parabola_roots(np.array([2.0, 0.0]), np.array([3.0, -1.0]))
     np.testing.assert_array_equal(roots.u, [[[1.5, -0.5]], [[2.25, 0.25]]])
-    assert roots.meet.tolist() == [False, False]
+    assert roots.coincide.tolist() == [False, False]
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-3.0, 3.0), units)
@@ -72,8 +72,8 @@ def test_a_circle_out_of_reach_has_no_root_and_a_point_is_its_centre() -> None:
     alpha = np.array([3.0, 4.0])
     roots = circle_roots(alpha, 5.0 * np.array([0.4, 0.4 * (1.0 - 3e-12), 0.41, 0.0]), 0.4)
     assert np.isfinite(roots.u).all(axis=(0, 1)).tolist() == [True, True, False, True]
-    assert roots.meet.tolist() == [True, False, False, False]
+    assert roots.coincide.tolist() == [True, False, False, False]
     centre = circle_roots(alpha, np.zeros(1), 1e-12)
     np.testing.assert_array_equal(centre.u, np.zeros((2, 2, 1)))
-    assert centre.meet.tolist() == [False]
+    assert centre.coincide.tolist() == [False]
     assert np.isnan(circle_roots(alpha, np.array([1e-10, 1.0]), 1e-12).u).all()

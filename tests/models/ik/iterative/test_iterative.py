@@ -14,9 +14,9 @@ from hypothesis.strategies import SearchStrategy
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.ik.numeric import METHODS, Method
-from urmpipe_models.ik.restarts import refine
-from urmpipe_models.ik.solutions import Targets, forward_targets, joint_limits, pose_errors
+from urmpipe_models.ik.limits import joint_limits
+from urmpipe_models.ik.numeric import METHODS, Method, refine
+from urmpipe_models.ik.solutions import Targets, forward_targets, pose_errors
 from urmpipe_models.ik.task import orientation_length, redundancy, rotation_error
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.kinematics.singularity import characteristic_length
@@ -287,7 +287,7 @@ def test_rows_are_solved_to_the_same_bits_alone_and_in_any_company(
         alone = refine(chain, targets.rows(slice(row, row + 1)), start[row])
         np.testing.assert_array_equal(alone.q[0], whole.q[row])
         assert alone.iterations[0] == whole.iterations[row]
-    monkeypatch.setattr("urmpipe_models.ik.restarts.BATCH_SIZE", 7)
+    monkeypatch.setattr("urmpipe_models.ik.numeric.BATCH_SIZE", 7)
     np.testing.assert_array_equal(refine(chain, targets, start, threads=3).q, whole.q)
 
 

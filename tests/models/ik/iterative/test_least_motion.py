@@ -10,9 +10,15 @@ import pytest
 
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.numeric import AT_LIMIT_TOLERANCE, MOTION_TOLERANCE, DescentOptions, minimise_motion
-from urmpipe_models.ik.restarts import refine
-from urmpipe_models.ik.solutions import Targets, forward_targets, joint_limits, pose_errors
+from urmpipe_models.ik.limits import joint_limits
+from urmpipe_models.ik.numeric import (
+    AT_LIMIT_TOLERANCE,
+    MOTION_TOLERANCE,
+    DescentOptions,
+    minimise_motion,
+    refine,
+)
+from urmpipe_models.ik.solutions import Targets, forward_targets, pose_errors
 from urmpipe_models.ik.task import build_task, orientation_length
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import translation

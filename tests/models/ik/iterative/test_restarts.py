@@ -11,11 +11,12 @@ import pytest
 from asserting import there
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.ik.closed import closed_form
+from urmpipe_models.ik.limits import joint_limits, limit_solutions
+from urmpipe_models.ik.numeric import refine
 from urmpipe_models.ik.restarts import (
     ATTEMPT_STATIONARY,
     DISTINCT_TOLERANCE,
     random_starts,
-    refine,
     solve_iteratively,
 )
 from urmpipe_models.ik.solutions import (
@@ -24,8 +25,6 @@ from urmpipe_models.ik.solutions import (
     Solutions,
     Targets,
     forward_targets,
-    joint_limits,
-    limit_solutions,
     pose_errors,
 )
 from urmpipe_models.math3d import translation
