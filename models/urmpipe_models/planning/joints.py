@@ -1,16 +1,13 @@
-"""The joints along a planned path: how they change with arc length, exactly.
+"""Joints along a planned path: derivatives by arc length, the time-optimal law, utilisation of joint limits.
 
-The joints of an arm along a path, by arc length: what holds whatever the law of time is.
-
-The law that runs a path in the least time within the limits of the joints, at rest at its stops.
-
-With x = s'^2 and u = s'' the joints accelerate by q'' = (dq/ds) u + (d2q/ds2) x: their limits are linear in
-both. On a grid of arc lengths, with u constant from each to the next, one pass back finds the largest x at
-each from which the rest of the path can be run, and one pass along takes the largest u that keeps to that.
-
-Source: [Iso9283]_ section 2 (approximately optimum time); [PhamPham2018]_ (both passes).
-
-The limits of joints along a path: the law that runs at them, and how much of them a law uses.
+1. `joint_path_derivatives`: q' = J+ x' and q'' by arc length, least motion, exactly; `refine_on_path`.
+2. `joints_along`: `PathJoints`, joints followed on a grid of arc lengths that is refined where they are
+   unknown between its points. They do not depend on the law of time.
+3. `time_optimal_law`: with x = s'^2 and u = s'' the joints accelerate by q'' = (dq/ds) u + (d2q/ds2) x: their
+   limits are linear in both. On a grid of arc lengths, with u constant in each interval, one pass back finds
+   the largest x at each point from which the rest of the path is feasible, and one pass forward takes the
+   largest u within these ([Iso9283]_ section 2 (approximately optimum time); [PhamPham2018]_).
+4. `joint_limited_law`, `max_limit_utilisation`: that law for an arm, and the use of its limits by any law.
 """
 
 from __future__ import annotations
@@ -31,28 +28,37 @@ from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
 from urmpipe_models.planning.laws import PathMotion, Phase, TimeLaw
 from urmpipe_models.planning.path import LineArcPath, segment_index
 
-NUDGE = 1e-6
-"""Step of the fastest joint, in [rad] or [m], for a difference of Jacobians: error 1e-12, rounding 1e-10."""
+FINITE_DIFFERENCE_STEP = (
+    1e-6  # of the fastest joint, [rad] or [m], for a Jacobian: error 1e-12, rounding 1e-10
+)
+PATH_TOLERANCE = 1e-14  # [m] and [rad]; the tool within this of its path is on it: rounding
+MAX_NEWTON_STEPS = 4  # three square an error of 1e-2 down to rounding
+REFINEMENT_CUTOFF = 1e-9  # share of the largest singular value; smaller ones are 0 in a step onto the path
+DERIVATIVE_CUTOFF = 1e-15  # the same for derivatives, which shall grow near a singular pose
+MIN_REGULAR_PIVOT = 1e-5  # share of the largest pivot; a Jacobian with larger ones is far from singular
 
-NEAR = 1e-14
-"""The tool within this of its path, in [m] and [rad], is on it: rounding."""
+# The least time along the paper's contour is with these within 0.3 % of finer grids.
+MIN_INTERVALS = 4000  # of a path
+MAX_INTERVAL = 2e-3  # [m]
+MIN_INTERVALS_PER_PART = 30  # from each row or bound of a segment to the next
 
-STEPS = 4
-"""Newton steps at most: three square an error of 1e-2 down to rounding."""
+# Both grow without end near a singular pose.
+MAX_JOINT_STEP = 0.02  # in an interval, [rad] or [m]
+MAX_DERIVATIVE_CHANGE = 0.1  # of dq/ds in an interval, as a share of the largest
 
-SINGULAR = 1e-9
-"""Singular values of a Jacobian below this share of the largest are 0 for a step onto the path: rounding."""
-
-ROUNDING = 1e-15
-"""Below this share they are 0 for slopes, which shall grow near a singular pose."""
-
-PLAIN = 1e-5
-"""A Jacobian whose pivots are all above this share of the largest is far from singular."""
+MAX_PREDICTION_ERROR = 0.05  # share of the step of an interval; a larger one is a change of branch
+MAX_DIVISION = 100  # parts of an interval in one refinement
+MAX_REFINEMENTS = 4
+MIN_DIVIDED_INTERVAL = 1e-7  # [m]
+STEP_TOLERANCE = 1e-6  # difference of derivatives, as a share of the largest; rounding of a Jacobian is less
+STATIONARY_RATE = 1e-12  # [rad/m]; a joint with a smaller dq/ds does not move: rounding
+INTERVAL_MARGIN = 1e-6  # share of an interval from its ends at which limits are checked, as s'' steps there
+PHASE_MARGIN = 1e-9  # share of the time of a boundary of phases, before and after which limits are checked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointPathDerivatives:
-    """Joint values by arc length.
+    """Joint values and their derivatives by arc length.
 
     Attributes:
         q: In [rad] or [m], shape (n, joints).
@@ -75,7 +81,7 @@ class JointPathDerivatives:
 
 
 def targets_at(path: LineArcPath, s: FloatArray) -> Targets:
-    """Return where the tool shall be at arc lengths in [m], shape (n,)."""
+    """Return the targets of the tool at arc lengths in [m], shape (n,)."""
     rotation = None if path.orientation is None else path.orientation.matrices(s)
     return Targets(path.points(s).position, rotation)
 
@@ -83,19 +89,19 @@ def targets_at(path: LineArcPath, s: FloatArray) -> Targets:
 def joint_path_derivatives(
     chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray, *, before: bool = False
 ) -> JointPathDerivatives:
-    """Return the slopes of joint values that lead the tool along a path with the least motion.
+    """Return the derivatives of joint values that lead the tool along a path with the least motion.
 
-    With x' = (t, turn rate) and x'' = (curvature, 0): q' = J+ x', and differentiated once more, with
+    With x' = (t, rate of rotation) and x'' = (curvature, 0): q' = J+ x', and differentiated once more, with
     y = J+^T q', q'' = J+ (x'' - J' q') + (1 - J+ J) J'^T y; the last term is 0 where J is square. Joints
     that do not move have no column in J.
 
     Args:
         chain: The arm.
         path: The path.
-        q: Joint values along it in [rad] or [m], shape (n, joints); a row of NaN has slopes of NaN.
+        q: Joint values along it in [rad] or [m], shape (n, joints); a row of NaN has derivatives of NaN.
         s: Arc lengths in [m], shape (n,).
         moves: Which joints move, shape (n, joints).
-        before: Whether slopes that jump, where two segments meet, are those before it; else after it.
+        before: Whether derivatives that step at a bound of segments are those before it; else after it.
     """
     points = path.points(s, before=before)
     first, second = points.tangent, points.curvature
@@ -104,9 +110,28 @@ def joint_path_derivatives(
         second = np.hstack((second, np.zeros_like(second)))
     dq, ddq = np.full(q.shape, np.nan), np.full(q.shape, np.nan)
     known = np.isfinite(q).all(axis=1)
-    for rows in _alike(moves, np.flatnonzero(known)):
-        dq[rows], ddq[rows] = _slopes(chain, q[rows], first[rows], second[rows], moves[rows[0]])
+    for rows in _iter_equal_rows(moves, np.flatnonzero(known)):
+        dq[rows], ddq[rows] = _derivatives(chain, q[rows], first[rows], second[rows], moves[rows[0]])
     return JointPathDerivatives(q, dq, ddq)
+
+
+def _derivatives(
+    chain: Chain, q: FloatArray, first: FloatArray, second: FloatArray, moves: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return dq/ds and d2q/ds2 of rows in which the same joints move, both of shape (m, joints)."""
+    rows = first.shape[1]
+    dq, ddq = np.zeros_like(q), np.zeros_like(q)
+    J = jacobian_over_log(chain, q)[:, :rows, moves]
+    inverse = _pseudo_inverses(J, DERIVATIVE_CUTOFF)
+    dq[:, moves] = _multiply(inverse, first)
+    ddq[:, moves] = _multiply(inverse, second - bias_over_log(chain, q, dq)[:, :rows])
+    if J.shape[2] > rows:
+        step = FINITE_DIFFERENCE_STEP / np.maximum(np.abs(dq).max(axis=1, keepdims=True), 1e-12)
+        change = jacobian_over_log(chain, q + step * dq) - jacobian_over_log(chain, q - step * dq)
+        J_prime = np.asarray(change / (2.0 * step)[:, :, None])[:, :rows, moves]
+        pull = _multiply(J_prime.transpose(0, 2, 1), _multiply(inverse.transpose(0, 2, 1), dq[:, moves]))
+        ddq[:, moves] += pull - _multiply(inverse, _multiply(J, pull))
+    return dq, ddq
 
 
 def refine_on_path(
@@ -114,58 +139,42 @@ def refine_on_path(
 ) -> FloatArray:
     """Return joint values with the tool on the path to the last digits, by Newton steps q + J+ (x - FK(q)).
 
-    Each step leaves the square of what it finds. What is nearer than `NEAR` stays, and so does, in a singular
-    pose, what no step removes.
+    Each step squares the error. Rows within `PATH_TOLERANCE` stay, and so does, in a singular pose, the error
+    that no step removes.
 
     Args:
         chain: The arm.
         path: The path.
-        q: Joint values near it in [rad] or [m], shape (n, joints), NaN where there are none.
+        q: Joint values near it in [rad] or [m], shape (n, joints), or NaN.
         s: Arc lengths in [m], shape (n,).
         moves: Which joints move, shape (n, joints).
 
     Returns:
         In [rad] or [m], shape (n, joints).
     """
-    better, off = q.copy(), np.flatnonzero(np.isfinite(q).all(axis=1))
-    for _ in range(STEPS):
-        miss = np.hstack(pose_errors(chain, better[off], targets_at(path, s[off])))
-        miss = miss[:, : 3 if path.orientation is None else 6]
-        far = np.abs(miss).max(axis=1) > NEAR
-        off, miss = off[far], miss[far]
-        for chosen in _alike(moves[off], np.arange(len(off))):
-            rows, pattern = off[chosen], moves[off[chosen[0]]]
-            J = jacobian_over_log(chain, better[rows])[:, : miss.shape[1], pattern]
-            better[np.ix_(rows, pattern)] += _times(_inverses(J, SINGULAR), miss[chosen])
-    return better
+    refined, remaining = q.copy(), np.flatnonzero(np.isfinite(q).all(axis=1))
+    for _ in range(MAX_NEWTON_STEPS):
+        error = np.hstack(pose_errors(chain, refined[remaining], targets_at(path, s[remaining])))
+        error = error[:, : 3 if path.orientation is None else 6]
+        far = np.abs(error).max(axis=1) > PATH_TOLERANCE
+        remaining, error = remaining[far], error[far]
+        for chosen in _iter_equal_rows(moves[remaining], np.arange(len(remaining))):
+            rows, pattern = remaining[chosen], moves[remaining[chosen[0]]]
+            J = jacobian_over_log(chain, refined[rows])[:, : error.shape[1], pattern]
+            step = _multiply(_pseudo_inverses(J, REFINEMENT_CUTOFF), error[chosen])
+            refined[np.ix_(rows, pattern)] += step
+    return refined
 
 
-def _slopes(
-    chain: Chain, q: FloatArray, first: FloatArray, second: FloatArray, moves: BoolArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return dq/ds and d2q/ds2 where the same joints move, both of shape (m, joints)."""
-    rows = first.shape[1]
-    dq, ddq = np.zeros_like(q), np.zeros_like(q)
-    J = jacobian_over_log(chain, q)[:, :rows, moves]
-    inverse = _inverses(J, ROUNDING)
-    dq[:, moves] = _times(inverse, first)
-    ddq[:, moves] = _times(inverse, second - bias_over_log(chain, q, dq)[:, :rows])
-    if J.shape[2] > rows:
-        changed = _jacobian_along(chain, q, dq)[:, :rows, moves]
-        pull = _times(changed.transpose(0, 2, 1), _times(inverse.transpose(0, 2, 1), dq[:, moves]))
-        ddq[:, moves] += pull - _times(inverse, _times(J, pull))
-    return dq, ddq
-
-
-def _alike(moves: BoolArray, rows: IndexArray) -> Iterator[IndexArray]:
-    """Yield the rows, of some, in which the same joints move."""
+def _iter_equal_rows(moves: BoolArray, rows: IndexArray) -> Iterator[IndexArray]:
+    """Yield groups of the given rows in which the same joints move."""
     while len(rows):
         same = (moves[rows] == moves[rows[0]]).all(axis=1)
         yield rows[same]
         rows = rows[~same]
 
 
-def _inverses(J: FloatArray, cutoff: float) -> FloatArray:
+def _pseudo_inverses(J: FloatArray, cutoff: float) -> FloatArray:
     """Return pseudo-inverses, shape (n, k, j), of matrices, shape (n, j, k).
 
     A tall matrix is Q R, and its pseudo-inverse R^-1 Q^T. Only those that are nearly singular, as the
@@ -178,59 +187,31 @@ def _inverses(J: FloatArray, cutoff: float) -> FloatArray:
     tall = J if J.shape[1] > J.shape[2] else J.transpose(0, 2, 1)
     Q, R = np.linalg.qr(tall)
     pivots = np.abs(np.diagonal(R, axis1=1, axis2=2))
-    regular = pivots.min(axis=1) > PLAIN * pivots.max(axis=1)
+    regular = pivots.min(axis=1) > MIN_REGULAR_PIVOT * pivots.max(axis=1)
     inverse = np.empty(tall.shape)
     inverse[regular] = Q[regular] @ np.linalg.inv(R[regular]).transpose(0, 2, 1)
     inverse[~regular] = np.linalg.pinv(tall[~regular], rcond=cutoff).transpose(0, 2, 1)
     return inverse if tall is not J else inverse.transpose(0, 2, 1)
 
 
-def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+def _multiply(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the products of matrices, shape (n, j, k), and vectors, shape (n, k)."""
     return np.asarray(np.einsum("njk,nk->nj", matrix, vector))
 
 
-def _jacobian_along(chain: Chain, q: FloatArray, dq: FloatArray) -> FloatArray:
-    """Return the derivative of the Jacobian along a motion, by a central difference, shape (n, 6, joints)."""
-    step = NUDGE / np.maximum(np.abs(dq).max(axis=1, keepdims=True), 1e-12)
-    change = jacobian_over_log(chain, q + step * dq) - jacobian_over_log(chain, q - step * dq)
-    return np.asarray(change / (2.0 * step)[:, :, None])
-
-
-GRID, STEP = 4000, 2e-3
-"""Intervals of a path at least, and their largest length in [m]: the least time along the paper's contour is
-then within 0.3 % of finer grids."""
-
-LEAST = 30
-"""Intervals from each row or end of a segment to the next at least."""
-
-FINE, BENT = 0.02, 0.1
-"""How far a joint may move in an interval, in [rad] or [m], and dq/ds change, as a share of the largest: both
-grow without end near a singular pose."""
-
-MISSED = 0.05
-"""An interval whose slopes miss its end by more, as a share of its step, follows another branch."""
-
-PARTS, ROUNDS, SHORTEST = 100, 4, 1e-7
-"""Into how many parts an interval is divided at most, how often, and down to which length in [m]."""
-
-STEPPED = 1e-6
-"""Slopes that differ by more, as a share of the largest, are two: rounding of a Jacobian is less."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PathJoints:
-    """The joints along a path: followed on a grid, exact at any place.
+    """The joints along a path: followed on a grid, exact at any arc length.
 
     Attributes:
         chain: The arm.
         path: The path.
-        s: Places of the grid in [m], rising, shape (n + 1,): among them all rows and ends of segments.
-        grid: The joints at these places, a sample a place.
+        s: Arc lengths of the grid in [m], rising, shape (n + 1,): with those of all rows and segments.
+        grid: The joints there, one sample per point of the grid.
         moves: Which joints move along each interval, shape (n, joints): not those that rest on a limit.
-        limit_contacts: Along which intervals a joint comes to a limit or leaves it, shape (n,).
-        after: Slopes where each interval begins, n rows.
-        before: Slopes where each one ends, n rows.
+        limit_contacts: Intervals in which a joint comes to a limit or leaves it, shape (n,).
+        after: Derivatives at the begin of each interval, n rows.
+        before: Derivatives at the end of each interval, n rows.
     """
 
     chain: Chain
@@ -244,71 +225,76 @@ class PathJoints:
 
     @property
     def reached(self) -> bool:
-        """Whether the arm reaches every place of the grid."""
+        """Whether the arm reaches every point of the grid."""
         return bool(self.grid.reached.all())
 
     @property
     def rate_steps(self) -> IndexArray:
-        """Places of the grid, from 0, at which a joint comes to a limit or leaves it [-], shape (k,).
+        """Points of the grid, from 0, at which a joint comes to a limit or leaves it [-], shape (k,).
 
-        There the others take over, so that dq/ds steps; not where the path stops.
+        There the other joints take over its motion, so that dq/ds steps; without those at stops.
         """
         step = np.abs(self.after.dq[1:] - self.before.dq[:-1]).max(axis=1)
-        steps = step > STEPPED * np.abs(self.after.dq[1:]).max(axis=1)
-        other = (self.moves[1:] != self.moves[:-1]).any(axis=1)
-        return np.flatnonzero(other & steps & ~np.isin(self.s[1:-1], self.path.stops)) + 1
+        is_step = step > STEP_TOLERANCE * np.abs(self.after.dq[1:]).max(axis=1)
+        changes = (self.moves[1:] != self.moves[:-1]).any(axis=1)
+        return np.flatnonzero(changes & is_step & ~np.isin(self.s[1:-1], self.path.stops)) + 1
 
     @property
     def parts(self) -> IndexArray:
-        """Into how many parts each interval has to be divided for its joints to be known [-], shape (n,).
+        """Parts into which each interval has to be divided for its joints to be known [-], shape (n,).
 
-        Few where a joint moves far or its slope changes much; as many as may be where the slopes contradict
-        the step, the determinant changes its sign, or a joint comes to a limit or leaves it.
+        Few where a joint moves far or its derivative changes much; the maximum where the derivatives
+        contradict the step, the determinant changes its sign, or a joint comes to a limit or leaves it.
         """
         step, length = self.before.q - self.after.q, np.diff(self.s)
         largest = np.maximum(np.abs(self.after.dq), np.abs(self.before.dq)).max(axis=1)
-        bend = np.abs(self.before.dq - self.after.dq).max(axis=1) / np.where(largest > 0.0, largest, 1.0)
+        change = np.abs(self.before.dq - self.after.dq).max(axis=1) / np.where(largest > 0.0, largest, 1.0)
         moved = np.abs(step).max(axis=1)
-        wanted = np.ceil(np.maximum(moved / FINE, bend / BENT))
-        missed = np.abs(step - 0.5 * length[:, None] * (self.after.dq + self.before.dq)).max(axis=1)
-        unknown = self.limit_contacts | (missed > MISSED * moved)
+        needed = np.ceil(np.maximum(moved / MAX_JOINT_STEP, change / MAX_DERIVATIVE_CHANGE))
+        error = np.abs(step - 0.5 * length[:, None] * (self.after.dq + self.before.dq)).max(axis=1)
+        unknown = self.limit_contacts | (error > MAX_PREDICTION_ERROR * moved)
         determinant = self.grid.singularity.determinant
         if determinant is not None:
             unknown |= determinant[1:] * determinant[:-1] < 0.0
-        parts = np.where(unknown, PARTS, np.clip(wanted, 1, PARTS))
-        return np.where(length > SHORTEST, parts, 1).astype(np.intp)
+        parts = np.where(unknown, MAX_DIVISION, np.clip(needed, 1, MAX_DIVISION))
+        return np.where(length > MIN_DIVIDED_INTERVAL, parts, 1).astype(np.intp)
 
     def at(self, s: FloatArray) -> JointPathDerivatives:
-        """Return joint values and their slopes, at the end of a segment those after it.
+        """Return joint values and their derivatives, at the end of a segment those after it.
 
-        With the way w = s - s_k into interval k, h long, the values are
-        q_k + w q'_k + w^2 q''_k / 2, with w / h of what these miss q_(k+1) by, and from there a Newton step
-        or two onto the path.
+        At a distance w = s - s_k into interval k, of length h, the values are q_k + w q'_k + w^2 q''_k / 2,
+        plus w / h of their difference from q_(k+1), and from there a Newton step or two onto the path.
 
         Args:
             s: In [m], shape (n,).
 
         Returns:
-            Slopes of n rows; NaN where an end of the interval is not reached.
+            Derivatives of n rows; NaN where an end of the interval is not reached.
         """
         k = segment_index(self.s, s)
-        way, length = s - self.s[k], np.diff(self.s)[k]
-        q = _ahead(self.after, k, way) + (way / length)[:, None] * self._missed()[k]
+        distance, length = s - self.s[k], np.diff(self.s)[k]
+        q = _extrapolate(self.after, k, distance) + (distance / length)[:, None] * self._gaps()[k]
         lower, upper = joint_limits(self.chain)
         q = refine_on_path(self.chain, self.path, np.clip(q, lower, upper), s, self.moves[k])
         q = np.clip(q, lower, upper)  # the last digits of a joint that comes to a limit
         return joint_path_derivatives(self.chain, self.path, q, s, self.moves[k])
 
-    def _missed(self) -> FloatArray:
-        """Return what the slopes at the begin of each interval miss its end by, shape (n, joints).
+    def _gaps(self) -> FloatArray:
+        """Return the end of each interval minus its extrapolated begin, shape (n, joints).
 
-        Least motion finds each place from the one before: the slopes of a redundant arm differ from that by
-        the step. A jump is missed by nothing: values belong to the begin of its interval.
+        Least motion finds each point from the previous one: the derivatives of a redundant arm differ from
+        that by the step. A jump has no gap: the values of its interval belong to its begin.
         """
         intervals = np.arange(len(self.s) - 1)
-        missed = self.before.q - _ahead(self.after, intervals, np.diff(self.s))
-        missed[[jump.sample - 1 for jump in self.grid.jumps]] = 0.0
-        return np.asarray(missed)
+        gaps = self.before.q - _extrapolate(self.after, intervals, np.diff(self.s))
+        gaps[[jump.sample - 1 for jump in self.grid.jumps]] = 0.0
+        return np.asarray(gaps)
+
+
+def _extrapolate(derivatives: JointPathDerivatives, k: IndexArray, distance: FloatArray) -> FloatArray:
+    """Return q + w q' + w^2 q'' / 2 of the rows k at distances w, shape (n, joints)."""
+    w = distance[:, None]
+    return np.asarray(derivatives.q[k] + w * (derivatives.dq[k] + 0.5 * w * derivatives.ddq[k]))
 
 
 def joints_along(
@@ -319,26 +305,36 @@ def joints_along(
 ) -> PathJoints:
     """Return the joints that lead the tool of an arm along a path.
 
-    Intervals are divided, and the path followed anew from where it began, until the joints are known along
-    each of them.
+    Intervals are divided, and the path is followed again from its begin, until the joints are known in each
+    of them.
 
     Args:
         chain: The arm.
         path: The path.
-        start: Joint values to be near to at its first place in [rad] or [m], shape (joints,).
-        progress: Called with the share of the grid that is done, 0..1.
+        start: Joint values near which the path starts in [rad] or [m], shape (joints,).
+        progress: Called with the completed share of the grid, 0..1.
     """
-    s = _grid(path)
-    found = _followed(chain, path, s, start, progress)
-    for _ in range(ROUNDS - 1):
-        if not found.reached or found.parts.max() == 1:
+    places = np.unique(np.concatenate((path.bounds, path.at)))
+    lengths = np.diff(places)
+    counts = np.ceil(lengths * max(MIN_INTERVALS / path.total, 1.0 / MAX_INTERVAL))
+    s = _divide(places, np.maximum(counts, MIN_INTERVALS_PER_PART).astype(np.intp))
+    joints = _follow_grid(chain, path, s, start, progress)
+    for _ in range(MAX_REFINEMENTS - 1):
+        if not joints.reached or joints.parts.max() == 1:
             break
-        s = _divided(s, found.parts)
-        found = _followed(chain, path, s, found.grid.q[0], None)
-    return found
+        s = _divide(s, joints.parts)
+        joints = _follow_grid(chain, path, s, joints.grid.q[0], None)
+    return joints
 
 
-def _followed(
+def _divide(places: FloatArray, counts: IndexArray) -> FloatArray:
+    """Return places, shape (n + 1,), with each interval divided into equal parts, counts of shape (n,)."""
+    k = np.repeat(np.arange(len(counts)), counts)
+    part = np.arange(len(k)) - (np.cumsum(counts) - counts)[k]
+    return np.append(places[k] + part * (np.diff(places) / counts)[k], places[-1])
+
+
+def _follow_grid(
     chain: Chain,
     path: LineArcPath,
     s: FloatArray,
@@ -347,67 +343,16 @@ def _followed(
 ) -> PathJoints:
     """Return the joints on a grid of arc lengths in [m], shape (n + 1,)."""
     grid = solve_path(chain, targets_at(path, s), np.arange(len(s)), start=start, progress=progress)
-    moves, limit_contacts = _moving(chain, grid.q)
+    moves, limit_contacts = _moving_joints(chain, grid.q)
     after = joint_path_derivatives(chain, path, grid.q[:-1], s[:-1], moves)
-    return PathJoints(
-        chain, path, s, grid, moves, limit_contacts, after, _before(chain, path, s, grid.q, moves, after)
-    )
+    before = _derivatives_before(chain, path, s, grid.q, moves, after)
+    return PathJoints(chain, path, s, grid, moves, limit_contacts, after, before)
 
 
-def _before(
-    chain: Chain,
-    path: LineArcPath,
-    s: FloatArray,
-    q: FloatArray,
-    moves: BoolArray,
-    after: JointPathDerivatives,
-) -> JointPathDerivatives:
-    """Return the slopes where each interval ends: those after it, unless they may step there."""
-    steps = np.append((moves[1:] != moves[:-1]).any(axis=1), True)
-    steps |= np.isin(s[1:], np.append(path.bounds, path.at))
-    own = joint_path_derivatives(chain, path, q[1:][steps], s[1:][steps], moves[steps], before=True)
-    dq, ddq = np.roll(after.dq, -1, axis=0), np.roll(after.ddq, -1, axis=0)
-    dq[steps], ddq[steps] = own.dq, own.ddq
-    return JointPathDerivatives(q[1:], dq, ddq)
+def _moving_joints(chain: Chain, q: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Return which joints move in each interval, shape (n, joints), and where one touches a limit, (n,).
 
-
-def required_stops(path: LineArcPath) -> FloatArray:
-    """Return where joints with finite accelerations have to rest in [m], shape (k,).
-
-    At stops, and where the tool's turn changes its rate.
-    """
-    return (
-        path.stops
-        if path.orientation is None
-        else np.append(path.stops, path.at[path.orientation.uneven_rows])
-    )
-
-
-def _ahead(slopes: JointPathDerivatives, k: IndexArray, way: FloatArray) -> FloatArray:
-    """Return q + w q' + w^2 q'' / 2 from the rows k on, shape (n, joints)."""
-    w = way[:, None]
-    return np.asarray(slopes.q[k] + w * (slopes.dq[k] + 0.5 * w * slopes.ddq[k]))
-
-
-def _grid(path: LineArcPath) -> FloatArray:
-    """Return arc lengths in [m] that hold the ends of all segments and all rows, shape (n + 1,)."""
-    places = np.unique(np.concatenate((path.bounds, path.at)))
-    lengths = np.diff(places)
-    counts = np.maximum(np.ceil(lengths * max(GRID / path.total, 1.0 / STEP)), LEAST)
-    return _divided(places, counts.astype(np.intp))
-
-
-def _divided(places: FloatArray, counts: IndexArray) -> FloatArray:
-    """Return places, shape (n + 1,), and between each and the next what makes as many parts, shape (n,)."""
-    k = np.repeat(np.arange(len(counts)), counts)
-    part = np.arange(len(k)) - (np.cumsum(counts) - counts)[k]
-    return np.append(places[k] + part * (np.diff(places) / counts)[k], places[-1])
-
-
-def _moving(chain: Chain, q: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Return which joints move along each interval, shape (n, joints), and where one touches a limit, (n,).
-
-    A joint that is on a limit at both ends of an interval, and the same there, rests on it.
+    A joint with the same value on a limit at both ends of an interval rests on it.
 
     Args:
         chain: The arm.
@@ -420,28 +365,26 @@ def _moving(chain: Chain, q: FloatArray) -> tuple[BoolArray, BoolArray]:
     return np.asarray(free & ~rests), np.asarray((on[1:] != on[:-1]).any(axis=1))
 
 
-STILL = 1e-12
-"""A joint that moves by less, in [rad/m], does not move: rounding."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PhasePlaneBounds:
-    """What holds on n intervals of a grid: |u + slope x| <= most, and x <= fastest where they begin.
-
-    Attributes:
-        slope: In [m/m2], shape (n, k).
-        most: In [m/s2], shape (n, k).
-        fastest: In [m2/s2], shape (n + 1,); the last one where the last interval ends.
-    """
-
-    slope: FloatArray
-    most: FloatArray
-    fastest: FloatArray
+def _derivatives_before(
+    chain: Chain,
+    path: LineArcPath,
+    s: FloatArray,
+    q: FloatArray,
+    moves: BoolArray,
+    after: JointPathDerivatives,
+) -> JointPathDerivatives:
+    """Return the derivatives at the end of each interval: those after it, unless they may step there."""
+    steps = np.append((moves[1:] != moves[:-1]).any(axis=1), True)
+    steps |= np.isin(s[1:], np.append(path.bounds, path.at))
+    stepped = joint_path_derivatives(chain, path, q[1:][steps], s[1:][steps], moves[steps], before=True)
+    dq, ddq = np.roll(after.dq, -1, axis=0), np.roll(after.ddq, -1, axis=0)
+    dq[steps], ddq[steps] = stepped.dq, stepped.ddq
+    return JointPathDerivatives(q[1:], dq, ddq)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLimits:
-    """The largest rates and accelerations of joints, and of the tool along its path.
+    """Maximum rates and accelerations of joints, and of the tool along its path.
 
     Attributes:
         velocity: In [rad/s] or [m/s], shape (joints,); infinity without one.
@@ -456,6 +399,20 @@ class JointLimits:
     tangential: float = np.inf
 
 
+class PhasePlaneBounds(NamedTuple):
+    """Limits of n intervals of a grid: |u + slope x| <= max_u, and x <= max_x at their begin.
+
+    Attributes:
+        slope: In [m/m2], shape (n, k).
+        max_u: In [m/s2], shape (n, k).
+        max_x: In [m2/s2], shape (n + 1,); the last one at the end of the last interval.
+    """
+
+    slope: FloatArray
+    max_u: FloatArray
+    max_x: FloatArray
+
+
 def time_optimal_law(
     s: FloatArray,
     after: JointPathDerivatives,
@@ -467,16 +424,16 @@ def time_optimal_law(
 
     Args:
         s: Arc lengths of the grid in [m], rising, shape (n + 1,).
-        after: Slopes where each interval begins, n rows.
-        before: Slopes where each one ends, n rows: where segments meet they are others.
-        stop: Where the path stops, shape (n + 1,); the first and the last are stops.
+        after: Derivatives at the begin of each interval, n rows.
+        before: Derivatives at the end of each interval, n rows; they step at the bounds of segments.
+        stop: Whether the path stops, shape (n + 1,); the first and the last are stops.
         limits: Of joints and tool.
 
     Source: [PhamPham2018]_.
     """
     step = np.diff(s)
-    bounds = interval_bounds(step, after, before, limits)
-    x = _run(step, bounds, stop)
+    bounds = _interval_bounds(step, after, before, limits)
+    x = _two_passes(step, bounds, stop)
     v = np.sqrt(x)
     moves = v[1:] + v[:-1] > 0.0
     with np.errstate(divide="ignore"):
@@ -484,130 +441,109 @@ def time_optimal_law(
     rows = (durations, s[:-1], v[:-1], 0.5 * np.diff(x) / step)
     phases: list[Phase] = []
     for i, row in enumerate(zip(*(part.tolist() for part in rows), strict=True)):
-        phases += [Phase(*row)] if moves[i] else _from_rest_to_rest(bounds, i, float(s[i]), float(step[i]))
+        phases += [Phase(*row)] if moves[i] else _rest_to_rest(bounds, i, float(s[i]), float(step[i]))
     return TimeLaw(phases)
 
 
-def _from_rest_to_rest(bounds: PhasePlaneBounds, i: int, s: float, step: float) -> list[Phase]:
-    """Return how an interval from s on in [m] is passed from rest to rest: faster to its middle, then slower.
-
-    With u constant x rises to u step: |u + slope x| <= most holds where u (1 + |slope| step) <= most.
-    """
-    u = float((bounds.most[i] / (1.0 + np.abs(bounds.slope[i]) * step)).min())
-    u = min(u, float(bounds.fastest[i : i + 2].min()) / step)
-    half = math.sqrt(step / u)
-    return [Phase(half, s, 0.0, u), Phase(half, s + 0.5 * step, u * half, -u)]
-
-
-def interval_bounds(
+def _interval_bounds(
     step: FloatArray, after: JointPathDerivatives, before: JointPathDerivatives, limits: JointLimits
 ) -> PhasePlaneBounds:
-    """Return the bounds that limits set at both ends of each interval.
+    """Return the bounds that limits set at both ends of each interval, of lengths in [m], shape (n,).
 
-    At its end x + 2 step u stands for x: |(dq + 2 step ddq) u + ddq x| <= a.
-
-    Args:
-        step: Lengths of the intervals in [m], shape (n,).
-        after: Slopes where each interval begins, n rows.
-        before: Slopes where each one ends, n rows.
-        limits: Of joints and tool.
+    At its end x + 2 step u replaces x: |(dq + 2 step ddq) u + ddq x| <= a.
     """
     along = np.hstack((after.dq, before.dq + 2.0 * step[:, None] * before.ddq))
     across = np.hstack((after.ddq, before.ddq))
     limit = np.tile(limits.acceleration, 2)
-    fastest = np.full(len(step) + 1, limits.speed**2)
+    max_x = np.full(len(step) + 1, limits.speed**2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        for part, ends in ((after.dq, slice(None, -1)), (before.dq, slice(1, None))):
-            rate = np.square(limits.velocity / np.abs(part)).min(axis=1)
-            fastest[ends] = np.minimum(fastest[ends], rate)
-        moves = np.abs(along) > STILL
-        alone = np.where(moves | (across == 0.0), np.inf, limit / np.abs(across)).min(axis=1)
-        slope, most = (
-            np.where(moves, own, none)
-            for own, none in ((across / along, 0.0), (limit / np.abs(along), np.inf))
-        )
-    fastest[:-1] = np.minimum(fastest[:-1], alone)
+        for dq, ends in ((after.dq, slice(None, -1)), (before.dq, slice(1, None))):
+            rate = np.square(limits.velocity / np.abs(dq)).min(axis=1)
+            max_x[ends] = np.minimum(max_x[ends], rate)
+        moves = np.abs(along) > STATIONARY_RATE
+        curved = np.where(moves | (across == 0.0), np.inf, limit / np.abs(across)).min(axis=1)
+        slope = np.where(moves, across / along, 0.0)
+        max_u = np.where(moves, limit / np.abs(along), np.inf)
+    max_x[:-1] = np.minimum(max_x[:-1], curved)
     tool = np.zeros((len(step), 1))
-    return PhasePlaneBounds(np.hstack((slope, tool)), np.hstack((most, tool + limits.tangential)), fastest)
+    return PhasePlaneBounds(np.hstack((slope, tool)), np.hstack((max_u, tool + limits.tangential)), max_x)
 
 
-def _run(step: FloatArray, bounds: PhasePlaneBounds, stop: BoolArray) -> FloatArray:
+def _two_passes(step: FloatArray, bounds: PhasePlaneBounds, stop: BoolArray) -> FloatArray:
     """Return x in [m2/s2] on the grid, shape (n + 1,); 0 at stops."""
     half = 0.5 / step
-    most = np.where(stop, 0.0, bounds.fastest)
-    most[:-1] = np.minimum(most[:-1], _feasible(bounds, half))
-    for i in range(len(step) - 1, -1, -1):  # the least u that is allowed has to lead to most[i + 1] or below
+    limit = np.where(stop, 0.0, bounds.max_x)
+    limit[:-1] = np.minimum(limit[:-1], _max_feasible_x(bounds, half))
+    for i in range(len(step) - 1, -1, -1):  # the smallest allowed u has to lead to limit[i + 1] or below
         steepness = half[i] - bounds.slope[i]
-        reach = (most[i + 1] * half[i] + bounds.most[i])[steepness > 0.0] / steepness[steepness > 0.0]
-        most[i] = min(most[i], reach.min(initial=np.inf))
+        rising = steepness > 0.0
+        reach = (limit[i + 1] * half[i] + bounds.max_u[i])[rising] / steepness[rising]
+        limit[i] = min(limit[i], reach.min(initial=np.inf))
     x = np.zeros(len(step) + 1)
     for i in range(len(step)):
-        u = (bounds.most[i] - bounds.slope[i] * x[i]).min()
-        x[i + 1] = max(min(x[i] + 2.0 * step[i] * u, most[i + 1]), 0.0)
+        u = (bounds.max_u[i] - bounds.slope[i] * x[i]).min()
+        x[i + 1] = max(min(x[i] + 2.0 * step[i] * u, limit[i + 1]), 0.0)
     return x
 
 
-def _feasible(bounds: PhasePlaneBounds, half: FloatArray) -> FloatArray:
-    """Return the largest x at which any u is allowed that leaves x + 2 step u at 0 or above, shape (n,).
+def _max_feasible_x(bounds: PhasePlaneBounds, half: FloatArray) -> FloatArray:
+    """Return the largest x at which some u is allowed that leaves x + 2 step u at 0 or above, shape (n,).
 
-    Each pair of bounds has to leave room: -most_j - slope_j x <= most_k - slope_k x.
+    Each pair of bounds has to leave room: -max_u_j - slope_j x <= max_u_k - slope_k x.
     """
     slope = np.hstack((bounds.slope, half[:, None]))
-    most = np.hstack((bounds.most, np.zeros((len(half), 1))))
-    apart = bounds.slope[:, None, :] - slope[:, :, None]
+    max_u = np.hstack((bounds.max_u, np.zeros((len(half), 1))))
+    difference = bounds.slope[:, None, :] - slope[:, :, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        room = np.where(apart > 0.0, (bounds.most[:, None, :] + most[:, :, None]) / apart, np.inf)
-    return np.asarray(room.min(axis=(1, 2)))
+        room = (bounds.max_u[:, None, :] + max_u[:, :, None]) / difference
+    return np.asarray(np.where(difference > 0.0, room, np.inf).min(axis=(1, 2)))
 
 
-INSIDE = 1e-6
-"""How far inside an interval its ends are looked at, as a share of it: where s'' steps a side is plain."""
+def _rest_to_rest(bounds: PhasePlaneBounds, i: int, s: float, step: float) -> list[Phase]:
+    """Return the phases of an interval from s in [m], at rest at both ends: up to its middle, then down.
 
-SIDE = 1e-9
-"""How far from the time at which phases meet both are looked at, as a share of it."""
-
-
-def chain_to_limits(chain: Chain, speed: float = np.inf, tangential: float = np.inf) -> JointLimits:
-    """Return the largest rates and accelerations of an arm, and of its tool along the path.
-
-    Args:
-        chain: The arm.
-        speed: The largest s' in [m/s]; infinity for none.
-        tangential: The largest s'' in [m/s2]; infinity for none.
+    With u constant x rises to u step: |u + slope x| <= max_u holds where u (1 + |slope| step) <= max_u.
     """
-    return JointLimits(
-        np.array([joint.velocity for joint in chain.moving]),
-        np.array([joint.acceleration for joint in chain.moving]),
-        speed,
-        tangential,
-    )
+    u = float((bounds.max_u[i] / (1.0 + np.abs(bounds.slope[i]) * step)).min())
+    u = min(u, float(bounds.max_x[i : i + 2].min()) / step)
+    half = math.sqrt(step / u)
+    return [Phase(half, s, 0.0, u), Phase(half, s + 0.5 * step, u * half, -u)]
 
 
 def joint_limited_law(joints: PathJoints, speed: float = np.inf, tangential: float = np.inf) -> TimeLaw:
     """Return the law in the least time within the rates and accelerations of the joints.
 
-    The limits hold on the grid of the joints; between its places they are exceeded by less than its step
-    squared makes. Where the rates of the joints step, as where the tool's turn changes its rate or a joint
-    comes to a limit, the path stops: no finite acceleration follows that.
+    The limits hold on the grid of the joints; between its points they are exceeded by less than the effect of
+    the squared step. Where the rates of the joints step, at a step of the tool's rate of rotation or where a
+    joint comes to a limit, the path stops: no finite acceleration follows that.
 
     Args:
         joints: The joints along a path that the arm reaches everywhere.
-        speed: The largest s' in [m/s], too; infinity for none.
-        tangential: The largest s'' in [m/s2], too; infinity for none.
+        speed: Additional maximum s' in [m/s]; infinity for none.
+        tangential: Additional maximum s'' in [m/s2]; infinity for none.
     """
-    stop = np.isin(joints.s, required_stops(joints.path))
+    path, stops = joints.path, joints.path.stops
+    if path.orientation is not None:
+        stops = np.append(stops, path.at[path.orientation.uneven_rows])
+    stop = np.isin(joints.s, stops)
     stop[joints.rate_steps] = True
-    limits = chain_to_limits(joints.chain, speed, tangential)
+    limits = _arm_limits(joints.chain, speed, tangential)
     return time_optimal_law(joints.s, joints.after, joints.before, stop, limits)
 
 
+def _arm_limits(chain: Chain, speed: float = np.inf, tangential: float = np.inf) -> JointLimits:
+    velocity = np.array([joint.velocity for joint in chain.moving])
+    acceleration = np.array([joint.acceleration for joint in chain.moving])
+    return JointLimits(velocity, acceleration, speed, tangential)
+
+
 class LimitUtilisation(NamedTuple):
-    """The largest use of a limit along a path.
+    """The maximum utilisation of a limit along a path.
 
     Attributes:
         share: max(|q'| / limit, sqrt(|q''| / limit)) [-]: with speeds divided by it the limit holds.
-        s: Where, in [m].
-        joint: Which of the moving joints, from 0.
+        s: Its arc length in [m].
+        joint: Index of the moving joint, from 0.
     """
 
     share: float
@@ -616,36 +552,38 @@ class LimitUtilisation(NamedTuple):
 
 
 def max_limit_utilisation(joints: PathJoints, law: TimeLaw, *, between: bool = False) -> LimitUtilisation:
-    """Return the largest use of a joint's limit by a law.
+    """Return the maximum utilisation of a joint's limit by a law.
 
-    It is looked for in the middle and just inside both ends of each interval of the grid, and on both sides
-    of the times at which phases of the law meet: rates and accelerations step at both.
+    It is searched in the middle and just inside both ends of each interval of the grid, and before and after
+    the boundaries of phases of the law: rates and accelerations step at both.
 
     Args:
         joints: The joints along a path that the arm reaches everywhere.
         law: The law.
-        between: Whether the middles alone are looked at, since the law holds the limits on the grid.
+        between: Whether only the middles are searched, because the law holds the limits on the grid.
 
     Source: [Iso9283]_ section 4, steps 17 and 18.
     """
-    limits = chain_to_limits(joints.chain)
+    limits = _arm_limits(joints.chain)
     if not np.isfinite([limits.velocity, limits.acceleration]).any():
         return LimitUtilisation(0.0, 0.0, 0)
-    s, step = joints.s, INSIDE * np.diff(joints.s)
+    s, margin = joints.s, INTERVAL_MARGIN * np.diff(joints.s)
     middle = 0.5 * (s[1:] + s[:-1])
-    looked = [_usage(joints.at(middle), law.at(law.time_at(middle)), limits)]
+    largest = [_utilisation(joints.at(middle), law.at(law.time_at(middle)), limits)]
     if not between:
-        for slopes, places in ((joints.after, s[:-1] + step), (joints.before, s[1:] - step)):
-            looked.append(_usage(slopes, law.at(law.time_at(places)), limits))
-        sides = np.concatenate((law.ends * (1.0 - SIDE), law.ends * (1.0 + SIDE)))
+        for derivatives, places in ((joints.after, s[:-1] + margin), (joints.before, s[1:] - margin)):
+            largest.append(_utilisation(derivatives, law.at(law.time_at(places)), limits))
+        sides = np.concatenate((law.ends * (1.0 - PHASE_MARGIN), law.ends * (1.0 + PHASE_MARGIN)))
         motion = law.at(np.minimum(sides, law.duration))
-        looked.append(_usage(joints.at(np.clip(motion.s, 0.0, s[-1])), motion, limits))
-    return max(looked)
+        largest.append(_utilisation(joints.at(np.clip(motion.s, 0.0, s[-1])), motion, limits))
+    return max(largest)
 
 
-def _usage(slopes: JointPathDerivatives, motion: PathMotion, limits: JointLimits) -> LimitUtilisation:
-    """Return the largest use of a limit, of n places."""
-    rates, accelerations = slopes.rates(motion.v, motion.a)
+def _utilisation(
+    derivatives: JointPathDerivatives, motion: PathMotion, limits: JointLimits
+) -> LimitUtilisation:
+    """Return the maximum utilisation of a limit at n points."""
+    rates, accelerations = derivatives.rates(motion.v, motion.a)
     share = np.maximum(np.abs(rates) / limits.velocity, np.sqrt(np.abs(accelerations) / limits.acceleration))
     place, joint = np.unravel_index(int(share.argmax()), share.shape)
     return LimitUtilisation(float(share[place, joint]), float(motion.s[place]), int(joint))

@@ -314,8 +314,8 @@ def test_slopes_that_contradict_a_step_are_seen(monkeypatch: pytest.MonkeyPatch)
     path = rows_to_path(PathRows(np.array([[0.6, 1e-7, 1.6], [-0.3, 1e-7, 1.6]])))
     monkeypatch.setattr(path_joints, "ROUNDS", 1)
     found = joints_along(load_robot("irb60"), path)
-    assert np.abs(np.diff(found.grid.q, axis=0)).max() < path_joints.FINE
-    undivided = np.flatnonzero(found.parts == path_joints.PARTS)
+    assert np.abs(np.diff(found.grid.q, axis=0)).max() < path_joints.MAX_JOINT_STEP
+    undivided = np.flatnonzero(found.parts == path_joints.MAX_DIVISION)
     assert len(undivided) > 0
     assert np.abs(path.points(found.s[undivided]).position[:, 0]).max() < 2e-3
 

@@ -23,7 +23,7 @@ from urmpipe_models.planning.laws import (
     SpeedSegment,
     TimeLaw,
     jerk_law,
-    piece_phases,
+    segment_phases,
     swing_phase,
     trapezoid_law,
 )
@@ -77,7 +77,7 @@ def test_ruckig_without_a_limit_of_jerk_takes_the_same_time(
     given_.current_velocity, given_.target_velocity, given_.target_position = [start], [end], [length]
     given_.max_velocity, given_.max_acceleration, given_.max_jerk = [v], [a], [math.inf]
     Ruckig(1).calculate(given_, found)
-    phases = TimeLaw([*piece_phases(SpeedSegment(length, math.inf, v), 0.0, start, end, a)])
+    phases = TimeLaw([*segment_phases(SpeedSegment(length, math.inf, v), 0.0, start, end, a)])
     assert phases.duration == pytest.approx(found.duration, abs=1e-9)
     reached = phases.at(np.array([phases.duration]))
     # rounding; of the speed also what it has of the place, e: sqrt(2 a e)
