@@ -47,8 +47,8 @@ MAX_JOINT_STEP = 0.02  # in an interval, [rad] or [m]
 MAX_DERIVATIVE_CHANGE = 0.1  # of dq/ds in an interval, as a share of the largest
 
 MAX_PREDICTION_ERROR = 0.05  # share of the step of an interval; a larger one is a change of branch
-MAX_DIVISION = 100  # parts of an interval in one refinement
-MAX_REFINEMENTS = 4
+MAX_DIVISION = 100  # parts of an interval from one pass to the next
+MAX_PASSES = 4  # times that a path is followed, each on a finer grid
 MIN_DIVIDED_INTERVAL = 1e-7  # [m]
 STEP_TOLERANCE = 1e-6  # difference of derivatives, as a share of the largest; rounding of a Jacobian is less
 STATIONARY_RATE = 1e-12  # [rad/m]; a joint with a smaller dq/ds does not move: rounding
@@ -319,7 +319,7 @@ def joints_along(
     counts = np.ceil(lengths * max(MIN_INTERVALS / path.total, 1.0 / MAX_INTERVAL))
     s = _divide(places, np.maximum(counts, MIN_INTERVALS_PER_PART).astype(np.intp))
     joints = _follow_grid(chain, path, s, start, progress)
-    for _ in range(MAX_REFINEMENTS - 1):
+    for _ in range(MAX_PASSES - 1):
         if not joints.reached or joints.parts.max() == 1:
             break
         s = _divide(s, joints.parts)

@@ -312,7 +312,7 @@ def test_the_contact_with_a_limit_is_found() -> None:
 def test_slopes_that_contradict_a_step_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside its axis the first joint of irb60 turns by pi; by steps far longer it goes straight on."""
     path = rows_to_path(PathRows(np.array([[0.6, 1e-7, 1.6], [-0.3, 1e-7, 1.6]])))
-    monkeypatch.setattr(path_joints, "ROUNDS", 1)
+    monkeypatch.setattr(path_joints, "MAX_PASSES", 1)
     found = joints_along(load_robot("irb60"), path)
     assert np.abs(np.diff(found.grid.q, axis=0)).max() < path_joints.MAX_JOINT_STEP
     undivided = np.flatnonzero(found.parts == path_joints.MAX_DIVISION)
