@@ -1,12 +1,15 @@
-"""A unit's modelDescription.xml for FMI 2.0 co-simulation.
+"""The texts in an FMU: modelDescription.xml for FMI 2.0 co-simulation, and the page of documentation.
 
-The page of documentation inside an FMU.
+`model_description` writes, in the order of the schema (FMI 2.0.4, section 2.2), what the FMU can do, the
+units, the log categories, the default experiment, the variables, and what the outputs depend on.
+`documentation` fills documentation.html.jinja with the table of variables (`variable_row`), the equations,
+and what happens in a step.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cache, partial
 from importlib.metadata import version
 from typing import Any, Literal
@@ -20,27 +23,26 @@ from urmpipe_fmus.si_units import BASE_NAMES, display_conversion, parse_unit
 
 Backend = Literal["native", "python"]
 
-STEP = 0.005
-"""Communication step of the default experiment in [s], where no table tells a better one."""
-
-DURATION = 1.0
-"""Duration of the default experiment in [s], where no table tells a better one."""
+DEFAULT_STEP = 0.005  # s, communication step of the default experiment of a model without a table
+DEFAULT_DURATION = 1.0  # s, duration of that experiment
 
 LOG_CATEGORIES = {
     "logStatusError": "Why a call was refused or failed",
     "logAll": "All messages",
 }
+TITLES = ("Name", "Part", "Unit", "Start", "Min", "Max", "Description")
+NUMBERS = ("Start", "Min", "Max")
 
 
 def model_description(
     model: BlockModel, guid: str, backend: Backend, source_files: Sequence[str] = ()
 ) -> str:
-    """Return the text of modelDescription.xml; the same for the same unit, GUID, backend and version.
+    """Return the text of modelDescription.xml; the same for the same model, GUID, backend and version.
 
     Args:
         model: The block model.
-        guid: What ties the binary to this description.
-        backend: Who runs the unit.
+        guid: The GUID that ties the binary to this description.
+        backend: Native or Python.
         source_files: C files below sources/ that a binary is compiled from; empty if there are none.
     """
     root = ET.Element(
@@ -52,47 +54,47 @@ def model_description(
         generationTool=f"urmpipe {version('urmpipe')}",
         variableNamingConvention="structured",
     )
-    _co_simulation(root, model, backend, source_files)
-    _unit_definitions(root, model)
+    _add_co_simulation(root, model, backend, source_files)
+    _add_unit_definitions(root, model)
     categories = ET.SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", name=name, description=description)
-    _default_experiment(root, model)
+    stop, step = default_experiment(model)
+    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime=repr(stop), stepSize=repr(step))
     variables = ET.SubElement(root, "ModelVariables")
-    for reference, (name, one) in enumerate(model.scalars):
-        _scalar_variable(variables, reference, name, one)
-    _model_structure(root, model)
+    for reference, (name, variable) in enumerate(model.scalars):
+        _add_scalar_variable(variables, reference, name, variable)
+    _add_model_structure(root, model)
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
 
 def default_experiment(model: BlockModel) -> tuple[float, float]:
-    """Return stop time and communication step in [s] of the default experiment: the table's, if any."""
+    """Return stop time and communication step in [s] of the default experiment: of the table, if any."""
     if model.table is None or len(model.table.t_ns) < 2 or model.table.t_ns[-1] <= 0:
-        return DURATION, STEP
+        return DEFAULT_DURATION, DEFAULT_STEP
     return float(model.table.t_ns[-1]) / 1e9, float(np.median(np.diff(model.table.t_ns))) / 1e9
 
 
 def markup_text(text: str) -> str:
-    """Return a text with what XML cannot hold (control characters, halves of pairs) as Python's escapes."""
+    """Return a text with Python's escapes for what XML cannot hold: control characters, single surrogates."""
     return "".join(
-        one
-        if one in "\t\n\r" or " " <= one < "\ud800" or "\udfff" < one < "\ufffe" or one > "\uffff"
-        else one.encode("unicode_escape").decode()
-        for one in text
+        char
+        if char in "\t\n\r" or " " <= char < "\ud800" or "\udfff" < char < "\ufffe" or char > "\uffff"
+        else char.encode("unicode_escape").decode()
+        for char in text
     )
 
 
-def _co_simulation(
+def _add_co_simulation(
     root: ET.Element, model: BlockModel, backend: Backend, source_files: Sequence[str]
 ) -> None:
-    """Say what the FMU can do; what is not said is false."""
+    """Declare the abilities of the FMU; the default of each is false."""
     only_python = ("needsExecutionTool", "canNotUseMemoryManagementFunctions")
-    flags = dict.fromkeys(only_python, "true") if backend == "python" else {}
     element = ET.SubElement(
         root,
         "CoSimulation",
-        flags,
+        dict.fromkeys(only_python, "true") if backend == "python" else {},
         modelIdentifier=model.name,
         canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUstate="true",
@@ -104,22 +106,21 @@ def _co_simulation(
             ET.SubElement(files, "File", name=name)
 
 
-def _unit_definitions(root: ET.Element, model: BlockModel) -> None:
-    """Define the units that variables have, each with its display units."""
-    used = sorted({one.unit for one in model.variables if one.unit})
+def _add_unit_definitions(root: ET.Element, model: BlockModel) -> None:
+    """Define the units of the variables, each with its display units."""
+    used = sorted({variable.unit for variable in model.variables if variable.unit})
     if not used:
         return
     definitions = ET.SubElement(root, "UnitDefinitions")
-    for spelling in used:
-        element = ET.SubElement(definitions, "Unit", name=spelling)
-        base = parse_unit(spelling)
+    for unit in used:
+        element = ET.SubElement(definitions, "Unit", name=unit)
+        base = parse_unit(unit)
         exponents = zip(BASE_NAMES, base.exponents, strict=True)
-        attributes = {name: str(value) for name, value in exponents if value}
-        attributes |= _scale(base.factor, base.offset)
-        ET.SubElement(element, "BaseUnit", attributes)
-        displays = {one.display_unit for one in model.variables if one.unit == spelling and one.display_unit}
-        for display in sorted(displays):
-            scale = _scale(*display_conversion(spelling, display))
+        attributes = {name: str(exponent) for name, exponent in exponents if exponent}
+        ET.SubElement(element, "BaseUnit", attributes | _scale(base.factor, base.offset))
+        displays = {variable.display_unit for variable in model.variables if variable.unit == unit}
+        for display in sorted(displays - {""}):
+            scale = _scale(*display_conversion(unit, display))
             ET.SubElement(element, "DisplayUnit", {"name": display, **scale})
 
 
@@ -128,91 +129,70 @@ def _scale(factor: float, offset: float) -> dict[str, str]:
     return ({"factor": repr(factor)} if factor != 1.0 else {}) | ({"offset": repr(offset)} if offset else {})
 
 
-def _default_experiment(root: ET.Element, model: BlockModel) -> None:
-    stop, step = default_experiment(model)
-    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime=repr(stop), stepSize=repr(step))
-
-
-def _scalar_variable(parent: ET.Element, reference: int, name: str, one: Variable) -> None:
-    """Add a scalar: an input's `initial` is not allowed, a computed output has no start."""
+def _add_scalar_variable(parent: ET.Element, reference: int, name: str, variable: Variable) -> None:
+    """Add a scalar: an input must not have `initial`, a computed output has no start."""
     attributes = {"name": name, "valueReference": str(reference)}
-    if one.description:
-        attributes["description"] = markup_text(one.description)
-    attributes |= {"causality": one.causality, "variability": one.variability}
-    if not isinstance(one, Input):
-        attributes["initial"] = "calculated" if isinstance(one, Output) else "exact"
+    if variable.description:
+        attributes["description"] = markup_text(variable.description)
+    attributes |= {"causality": variable.causality, "variability": variable.variability}
+    if not isinstance(variable, Input):
+        attributes["initial"] = "calculated" if isinstance(variable, Output) else "exact"
     element = ET.SubElement(parent, "ScalarVariable", attributes)
-    ET.SubElement(element, one.type, _type_attributes(name, one))
+
+    of_type = {}
+    if variable.unit:
+        of_type["unit"] = variable.unit
+    if variable.display_unit:
+        of_type["displayUnit"] = variable.display_unit
+    for key, bound, inside in (("min", variable.minimum, math.ceil), ("max", variable.maximum, math.floor)):
+        if variable.type == "Real" and math.isfinite(bound):
+            of_type[key] = repr(float(bound))
+        elif variable.type == "Integer" and abs(bound) <= MAX_INTEGER:
+            of_type[key] = str(inside(bound))
+    if not isinstance(variable, Output):
+        start = variable.scalar_start(name)
+        if variable.type == "Boolean":
+            of_type["start"] = "true" if start else "false"
+        else:
+            of_type["start"] = repr(float(start)) if variable.type == "Real" else str(int(start))
+    ET.SubElement(element, variable.type, of_type)
 
 
-def _type_attributes(name: str, one: Variable) -> dict[str, str]:
-    """Return unit, range and start of a scalar as its type writes them."""
-    attributes = {}
-    if one.unit:
-        attributes["unit"] = one.unit
-    if one.display_unit:
-        attributes["displayUnit"] = one.display_unit
-    for key, bound, inside in (("min", one.minimum, math.ceil), ("max", one.maximum, math.floor)):
-        if one.type == "Real" and math.isfinite(bound):
-            attributes[key] = repr(float(bound))
-        elif one.type == "Integer" and abs(bound) <= MAX_INTEGER:
-            attributes[key] = str(inside(bound))
-    if not isinstance(one, Output):
-        attributes["start"] = _number(one, one.scalar_start(name))
-    return attributes
+def _add_model_structure(root: ET.Element, model: BlockModel) -> None:
+    """Declare the dependencies of the outputs.
 
-
-def _number(one: Variable, value: float) -> str:
-    """Return a value as the variable's type writes it."""
-    if one.type == "Boolean":
-        return "true" if value else "false"
-    return repr(float(value)) if one.type == "Real" else str(int(value))
-
-
-def _model_structure(root: ET.Element, model: BlockModel) -> None:
-    """Say what the outputs depend on.
-
-    At communication points the knowns are the inputs. A state is none, as its derivative is not exposed: an
-    output that is one depends on nothing, and so does what is computed from states only. In the
-    initialization all that has an exact start value is known too (FMI 2.0.4, section 2.2.8).
+    At communication points the known variables are the inputs. A state is not one, as its derivative is not
+    exposed: an output that is a state depends on nothing, and so does an output computed from states only. In
+    the initialization all variables with an exact start value are known too (FMI 2.0.4, section 2.2.8).
     """
     index = {name: number for number, (name, _) in enumerate(model.scalars, start=1)}
-    inputs = {name for one in model.inputs for name in one.names}
+    inputs = {name for variable in model.inputs for name in variable.names}
     depends = Dependencies(model).outputs
     structure = ET.SubElement(root, "ModelStructure")
-    outputs = [name for name, one in model.scalars if one.causality == "output"]
+    outputs = [name for name, variable in model.scalars if variable.causality == "output"]
     for title, names, known in (("Outputs", outputs, inputs), ("InitialUnknowns", list(depends), set(index))):
         lines = ET.SubElement(structure, title) if names else structure
         for name in sorted(names, key=index.__getitem__):
-            on = _indices(index, depends.get(name, frozenset()) & known)
-            ET.SubElement(lines, "Unknown", index=str(index[name]), dependencies=on)
-
-
-def _indices(index: dict[str, int], names: Iterable[str]) -> str:
-    """Return the indices of variables, rising, as an XML list."""
-    return " ".join(str(number) for number in sorted(index[name] for name in names))
-
-
-TITLES = ("Name", "Part", "Unit", "Start", "Min", "Max", "Description")
-NUMBERS = ("Start", "Min", "Max")
+            numbers = sorted(index[dependency] for dependency in depends.get(name, frozenset()) & known)
+            dependencies = " ".join(map(str, numbers))
+            ET.SubElement(lines, "Unknown", index=str(index[name]), dependencies=dependencies)
 
 
 def documentation(model: BlockModel) -> str:
-    """Return a page of HTML that needs nothing else: variables, equations, source, and what a step does."""
+    """Return a self-contained HTML page: variables, equations, source, and what happens in a step."""
     page = _template().render(
         model=model,
         version=version("urmpipe"),
         titles=TITLES,
         numbers=NUMBERS,
-        rows=[list(zip(TITLES, variable_row(one), strict=True)) for one in model.variables],
-        steps=_steps(model),
+        rows=[list(zip(TITLES, variable_row(variable), strict=True)) for variable in model.variables],
+        steps=_step_texts(model),
     )
     return markup_text(page)
 
 
 @cache
 def _template() -> Any:
-    """Return the page's template."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -226,41 +206,39 @@ def _template() -> Any:
     return environment.get_template("documentation.html.jinja")
 
 
-def variable_row(one: Variable, digits: int | None = None) -> tuple[str, ...]:
-    """Return what a table says of a variable, in the order of `TITLES`.
+def variable_row(variable: Variable, digits: int | None = None) -> tuple[str, ...]:
+    """Return the cells of a variable in a table, in the order of `TITLES`.
 
     Args:
-        one: The variable.
-        digits: So many significant digits of each number; None for all.
+        variable: The variable.
+        digits: Number of significant digits; None for all.
     """
-    value = partial(_value, one, digits=digits)
-    name = one.name if one.size is None else f"{one.name}[1]" + (f" .. [{one.size}]" if one.size > 1 else "")
-    part = f"{one.causality}, {one.variability}"
-    kind = one.type if one.type != "Real" else one.unit
-    start = "computed" if isinstance(one, Output) else ", ".join(map(value, _starts(one)))
-    return name, part, kind, start, value(one.minimum), value(one.maximum), one.description
+    cell = partial(_format_value, variable, digits=digits)
+    name = variable.name
+    if variable.size is not None:
+        name += "[1]" + (f" .. [{variable.size}]" if variable.size > 1 else "")
+    part = f"{variable.causality}, {variable.variability}"
+    kind = variable.type if variable.type != "Real" else variable.unit
+    starts = variable.starts[:1] if len(set(variable.starts)) == 1 else variable.starts
+    start = "computed" if isinstance(variable, Output) else ", ".join(map(cell, starts))
+    return name, part, kind, start, cell(variable.minimum), cell(variable.maximum), variable.description
 
 
-def _starts(one: Variable) -> tuple[float, ...]:
-    """Return the start values, one if they are all the same."""
-    return one.starts[:1] if len(set(one.starts)) == 1 else one.starts
-
-
-def _value(one: Variable, value: float, digits: int | None) -> str:
-    """Return a value, and what it is in the unit that people like to see; nothing for no bound."""
+def _format_value(variable: Variable, value: float, digits: int | None) -> str:
+    """Return a value, and in parentheses the same in the display unit; empty for an infinite bound."""
     if not math.isfinite(value):
         return ""
-    if one.type == "Boolean":
+    if variable.type == "Boolean":
         return "true" if value else "false"
     short = f"{value:.{digits or 6}g}"
-    said = short if digits or float(short) == value else repr(float(value))
-    if not one.display_unit or one.display_unit == one.unit:
-        return said
-    factor, offset = display_conversion(one.unit, one.display_unit)
-    return f"{said} ({factor * value + offset:.{digits or 7}g} {one.display_unit})"
+    text = short if digits or float(short) == value else repr(float(value))
+    if not variable.display_unit or variable.display_unit == variable.unit:
+        return text
+    factor, offset = display_conversion(variable.unit, variable.display_unit)
+    return f"{text} ({factor * value + offset:.{digits or 7}g} {variable.display_unit})"
 
 
-def _steps(model: BlockModel) -> list[str]:
+def _step_texts(model: BlockModel) -> list[str]:
     """Return what happens from one communication point to the next."""
     lines = [
         "Outputs are those of the inputs as they stand: set inputs, get outputs, without a step in between."
@@ -273,12 +251,12 @@ def _steps(model: BlockModel) -> list[str]:
             " hold."
         )
     if model.memories:
-        names = ", ".join(one.name for one in model.memories)
+        names = ", ".join(variable.name for variable in model.memories)
         lines.append(
             f"fmi2DoStep first takes the sample: the next values of {names}, from the inputs as set."
         )
     if model.states:
-        names = ", ".join(one.name for one in model.states)
+        names = ", ".join(variable.name for variable in model.states)
         lines.append(
             f"{'Then it' if model.memories else 'fmi2DoStep'} integrates {names} with the classical"
             f" Runge-Kutta method in equal steps of at most the parameter {INTERNAL_STEP}, the inputs held."

@@ -17,7 +17,7 @@ from loaded_fmu import Loaded
 from urmpipe_fmus.block import BlockModel, Recipe, Table
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.user import load_block_file
-from urmpipe_fmus.build.fmu import _key, cache_folder, cached_fmu
+from urmpipe_fmus.build.fmu import cache_folder, cache_key, cached_fmu
 from urmpipe_models.errors import FmuError
 
 Make = Callable[..., BlockModel]
@@ -51,7 +51,7 @@ def test_other_tables_arguments_sources_variables_and_backends_are_other_fmus(ma
     shifted = replace(model, table=Table(model.table.t_ns + np.int64(1), model.table.values))
     other_source = replace(model, recipe=replace(model.recipe, source=model.recipe.source + "\n# changed\n"))
     units = [model, other_table, shifted, other_source, make("playback", gain=2.0)]
-    keys = [_key(one, "python", "linux64") for one in units] + [_key(model, "native", "linux64")]
+    keys = [cache_key(one, "python", "linux64") for one in units] + [cache_key(model, "native", "linux64")]
     assert len(set(keys)) == len(keys)
 
 
@@ -117,7 +117,7 @@ def test_another_file_behind_the_command_of_the_compiler_is_another_fmu(
         compiler.write_text(text, encoding="ascii")
         compiler.chmod(0o755)
         monkeypatch.setenv("CC", f"env {compiler}")
-        keys.append(_key(make_block("inertia"), "native", "linux64"))
+        keys.append(cache_key(make_block("inertia"), "native", "linux64"))
     assert keys[0] != keys[1]
 
 
@@ -125,7 +125,7 @@ def test_another_file_behind_the_command_of_the_compiler_is_another_fmu(
 def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
     built = cached_fmu(make_block("inertia"))
     code = (
-        "from urmpipe_fmus.build.fmu.fmu import cached_fmu\n"
+        "from urmpipe_fmus.build.fmu import cached_fmu\n"
         "from urmpipe_fmus.blocks import make_block\n"
         "import sys; print(cached_fmu(make_block('inertia')))\n"
         "print(*sorted({'casadi', 'fmpy', 'pythonfmu', 'jinja2', 'lxml', 'scipy'} & set(sys.modules)))\n"
