@@ -189,13 +189,6 @@ OVERFLOWS = "overflow(0);"
 TAKES_MEMORY = "take(20000000000u);"
 """C that takes 20 GB in one piece; where it gets none, it writes to NULL."""
 
-NAN_OUTPUT = Foreign(
-    name="nan_output",
-    scalars=(Scalar("y", 0), Scalar("well", 1)),
-    compute="v->r[0] = v->time > 0.15 ? NAN : v->time; v->r[1] = v->time;",
-)
-"""y is nan from 0.15 s on."""
-
 STAIR = Foreign(
     name="stair",
     scalars=(Scalar("at", 0, "parameter", start="0.9"), Scalar("y", 1)),

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from asserting import refusal
-from foreign_fmus import Foreign, Scalar, fmu
+from foreign_fmus import STAIR, Foreign, Scalar, fmu, trouble_in
 from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.blocks.user import block_from_source
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
@@ -153,16 +153,6 @@ def test_a_step_that_fails_is_told_with_the_last_lines_of_the_log(tmp_path: Path
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
-def test_an_fmu_that_ends_its_process_does_not_end_ours(tmp_path: Path) -> None:
-    found = check_fmu(built(failing("os.abort()"), tmp_path))
-    assert found.problems == ("fmi2DoStep at 0.015 s ended the process: Aborted (SIGABRT)",)
-    assert not found.ran
-    found = check_fmu(built(failing("os._exit(3)"), tmp_path))
-    assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 3",)
-
-
-@pytest.mark.slow
 def test_files_of_the_working_folder_are_no_modules(
     make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -186,6 +176,27 @@ def test_outputs_that_are_not_finite_are_a_problem_with_their_time() -> None:
     )
     assert found.ran
     assert [(one.before, one.after) for one in found.variables] == [(None, None), (1.0, None), (None, None)]
+
+
+@pytest.mark.slow
+def test_a_run_that_the_fmu_ends_early_is_no_pass_and_its_values_are_those_of_its_last_time() -> None:
+    report = check_fmu(fmu(replace(STAIR, start="m->v.r[0] = 0.0275;", variable_step=False)))
+    said = "fmi2DoStep at 0.025 s ended the run (fmi2Discard, terminated) after 5 of 20 steps"
+    assert (report.problems[1:], report.ran, report.variables[1].after) == ((said,), False, 0.0275)
+    discards = trouble_in("step", "if (t > 0.022) return fmi2Discard;")
+    (said,) = check_fmu(fmu(replace(discards, variable_step=False))).problems[1:]
+    assert said == "fmi2DoStep at 0.025 s: fmi2DoStep failed with status 2 (discard)."
+
+
+@pytest.mark.slow
+def test_warnings_of_an_fmu_are_reported_and_are_no_problem() -> None:
+    warm = 'if (t > 0.022) { LOG(m, fmi2Warning, "warm"); v->time = t + h; return fmi2Warning; }'
+    for call, code, warning in (
+        ("step", warm, "fmi2DoStep at 0.025 s returned fmi2Warning, and 14 more of its calls; its log: warm"),
+        ("terminate", "return fmi2Warning;", "fmi2Terminate returned fmi2Warning"),
+    ):
+        report = check_fmu(fmu(replace(trouble_in(call, code), variable_step=False)))
+        assert (report.problems[1:], report.ran, report.warnings) == ((), True, (warning,))
 
 
 @pytest.mark.slow
