@@ -27,6 +27,9 @@ DRIVES: dict[str, dict[str, Any]] = {
     "stewart-gough-driven": {f"leg{k}": (0.8, 0.8 + 0.03 * (-1) ** k * k / 6) for k in range(1, 7)},
 }
 
+COMPONENTS = [f"{what} {axis}" for what in ("force", "moment") for axis in ("m", "n", "m x n")]
+PINS = {"theta2": ("ground", 0.0), "A": ("input", 0.4), "B": ("coupler", 0.9), "theta4": ("ground", 1.0)}
+
 
 def loaded(name: str) -> tuple[NetworkMotion, Wrench, dict[str, float]]:
     """Return a motion under a wrench on its last body, and under torques at its last two joints."""
@@ -88,9 +91,6 @@ def test_every_body_is_in_equilibrium(name: str) -> None:
         np.testing.assert_allclose(sums[body], 0.0, rtol=0, atol=1e-10)
 
 
-COMPONENTS = [f"{what} {axis}" for what in ("force", "moment") for axis in ("m", "n", "m x n")]
-
-
 @pytest.mark.slow
 def test_a_four_bar_in_its_plane_has_the_reactions_of_the_textbook() -> None:
     """Nine equations, three of each link, for the forces of four pins and the torque of the crank."""
@@ -98,14 +98,13 @@ def test_a_four_bar_in_its_plane_has_the_reactions_of_the_textbook() -> None:
     moved = network_drive("four-bar", {"crank": (0.2, 6)}, steps=30, wrenches=[load])
     assert moved.forces is not None
     poses = dict(zip(moved.network.body_names, moved.poses().transpose(1, 0, 2, 3), strict=True))
+    joints = {one.name: one for one in moved.network.joints}
     for row in range(len(moved)):
-        pins = [poses[body][row] @ [*place, 0, 0, 1] for body, place in PINS]
+        pins = [poses[body][row] @ [place, 0, 0, 1] for body, place in PINS.values()]
         at = (poses["coupler"][row] @ [0.45, 0.2, 0.0, 1.0])[:2]
         matrix_of, right = np.zeros((9, 9)), np.zeros(9)
-        for k, (pin, (first, second)) in enumerate(
-            zip(pins, [(None, 0), (0, 1), (1, 2), (None, 2)], strict=True)
-        ):
-            for body, sign in ((first, -1.0), (second, 1.0)):
+        for k, (pin, sides) in enumerate(zip(pins, [(None, 0), (0, 1), (1, 2), (None, 2)], strict=True)):
+            for body, sign in zip(sides, (-1.0, 1.0), strict=True):
                 if body is not None:
                     block = np.array([[1.0, 0.0], [0.0, 1.0], [-pin[1], pin[0]]])
                     matrix_of[3 * body : 3 * body + 3, 2 * k : 2 * k + 2] += sign * block
@@ -113,36 +112,19 @@ def test_a_four_bar_in_its_plane_has_the_reactions_of_the_textbook() -> None:
         right[3:6] = -3.0, 50.0, -(at[0] * -50.0 - at[1] * 3.0)
         answer = np.linalg.solve(matrix_of, right)
         assert moved.forces.drives[row, 0] == pytest.approx(answer[8], abs=1e-9)
-        for k, (joint, base) in enumerate(zip(("theta2", "A", "B", "theta4"), BASES, strict=True)):
-            frame = poses[base][row] @ matrix(
-                next(one for one in moved.network.joints if one.name == joint).frames[0]
-            )
+        for k, (joint, (base, _)) in enumerate(PINS.items()):
+            frame = poses[base][row] @ matrix(joints[joint].frames[0])
             names = [f"{joint} {one}" for one in COMPONENTS]
             values = moved.forces.reactions[row, [moved.forces.names.index(one) for one in names]]
             in_plane = frame[:2, :3] @ np.where(np.abs(frame[:3, :3][2]) < 0.5, values[:3], 0.0)
             np.testing.assert_allclose(in_plane, answer[2 * k : 2 * k + 2], rtol=0, atol=1e-9)
-            assert np.isnan(values).tolist() == [
-                False,
-                True,
-                False,
-                True,
-                False,
-                True,
-            ]  # n is across the plane
-
-
-PINS = [("ground", (0.0,)), ("input", (0.4,)), ("coupler", (0.9,)), ("ground", (1.0,))]
-BASES = ["ground", "input", "coupler", "ground"]
+            assert np.isnan(values).tolist() == [False, True] * 3  # n is across the plane
 
 
 def test_the_legs_of_a_platform_carry_its_load() -> None:
     """sum of f u = -F, sum of (p + R b) x f u = -M with the directions u from base to platform."""
-    moved = network_drive(
-        "stewart-gough-driven",
-        DRIVES["stewart-gough-driven"],
-        steps=10,
-        wrenches=["platform:0.1,0,0.2:3,4,-100,5,0,-2"],
-    )
+    name, load_text = "stewart-gough-driven", "platform:0.1,0,0.2:3,4,-100,5,0,-2"
+    moved = network_drive(name, DRIVES[name], steps=10, wrenches=[load_text])
     assert moved.forces is not None
     points = np.array([one["a"] for one in tables_of("stewart-gough-driven")["elements"].values()])
     for row, pose in enumerate(moved.poses()[:, 1]):
