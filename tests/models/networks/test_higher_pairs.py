@@ -1,22 +1,20 @@
-"""Gears, racks and cams: closed forms, derivatives against differences, redundancy, texts of faults."""
+"""Gears, racks and cams: closed forms, derivatives against differences, redundancy."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from asserting import refusal, there
+from asserting import there
+from pairs import CAM, GEARED, RACK, UNEVEN, shaft, wheels
 from random_networks import difference
 from urmpipe import load_network, network_check, network_drive, network_solve
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import evaluate_closure, iter_release_columns
 from urmpipe_models.networks.forces import Wrench, compute_forces
@@ -24,30 +22,6 @@ from urmpipe_models.networks.joint_motion import transmission
 from urmpipe_models.networks.mechanism import build_mechanism
 
 ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps
-
-UNEVEN = [[10, 0.0], [55, 4.0], [90, 9.0], [200, -3.0], [310, 1.5]]  # deg and mm
-
-
-def shaft(bodies: tuple[str, str], x: float = 0.0, **more: Any) -> dict[str, Any]:
-    return {"kind": "revolute", "bodies": bodies, "n": [0, 0, 1], "a": [[x, 0, 0], [0, 0, 0]], **more}
-
-
-def wheels(element: dict[str, Any], **joints: dict[str, Any]) -> dict[str, Any]:
-    """Return tables of a driven shaft A, what else is on the ground, and a pair; in mm and deg."""
-    names = ["A", *joints]
-    return {
-        "length_unit": "mm", "angle_unit": "deg",
-        "bodies": {name.lower(): {} for name in names},
-        "controls": {"turn": {"start": 50}},
-        "joints": {"A": shaft(("ground", "a"), driven="turn"), **joints},
-        "elements": {"pair": {"joints": ["A", names[-1]], **element}},
-    }  # fmt: skip
-
-
-SLIDE = {"kind": "prismatic", "bodies": ["ground", "s"], "n": [1, 0, 0]}
-GEARED = wheels({"kind": "gear", "teeth": [20, 40], "offset": 30}, B=shaft(("ground", "b"), 300))
-RACK = wheels({"kind": "rack", "radius": -8, "offset": 3}, S=SLIDE)
-CAM = wheels({"kind": "cam", "profile": UNEVEN}, S=SLIDE)
 
 
 def value(tables: dict[str, Any], joint: str, turn: float) -> float:
@@ -263,88 +237,3 @@ def test_a_load_on_a_wheel_is_held_by_the_drive_through_the_gear(is_cut: bool) -
     assert forces.reactions["pair"].item() == pytest.approx(-5.0, abs=ROUNDING)
     for name in tables["joints"].keys() - {"A"}:
         assert forces.reactions[name][4].item() == pytest.approx(0.0, abs=ROUNDING)
-
-
-# --- faults
-
-
-def test_everything_wrong_with_pairs_is_reported_at_once() -> None:
-    pairs = {
-        "p1": {"kind": "gear", "joints": ["A", "a"], "teeth": [20, 0]},
-        "p2": {"kind": "gear", "joints": ["A", "A"], "teeth": [-20, -30]},
-        "p3": {"kind": "rack", "joints": ["S", "A"], "radius": 0, "teeth": [1, 2]},
-        "p4": {"kind": "cam", "joints": ["A"], "profile": [[0, 0], [20, 1], [20, 2]]},
-        "p5": {"kind": "cam", "joints": ["A", "S"], "profile": [[0, 0], [9, 1], [50, 2], [360, 1]]},
-        "p6": {"kind": "cam", "joints": ["A", "S"], "profile": [[0, 0], "x"], "offset": "speed"},
-        "p7": {"kind": "rack", "joints": ["A", "S"]},
-    }
-    assert refusal(NetworkError, lambda: load_network({**RACK, "elements": pairs})).splitlines() == [
-        "elements.p3.teeth: unknown; allowed: kind, joints, offset, radius",
-        "elements.p6.profile[1]: found 'x', allowed: [angle, lift], two finite numbers",
-        "elements.p7.radius: found nothing, allowed: a finite number",
-        "elements.p1.joints: joint found 'a' (did you mean A?), allowed: A, S",
-        "elements.p1.teeth: found 20, 0, allowed: two numbers other than 0, at most one of them negative:"
-        " that of an internal wheel",
-        "elements.p2.joints: found A twice, allowed: two joints",
-        "elements.p2.teeth: found -20, -30, allowed: two numbers other than 0, at most one of them negative:"
-        " that of an internal wheel",
-        "elements.p3.joints: found S, a prismatic joint, allowed as the first of a rack:"
-        " revolute, cylindrical, helical",
-        "elements.p3.joints: found A, a revolute joint, allowed as the second of a rack:"
-        " prismatic, cylindrical",
-        "elements.p3.radius: found 0 m, allowed: a radius other than 0, 1e+09 m at most;"
-        " its sign is that of the motion",
-        "elements.p4.joints: found 1, allowed: the names of two joints",
-        "elements.p4.profile: found 3 points, allowed: 4 to 1000",
-        "elements.p4.profile[2]: found the angle 0.349066 rad after 0.349066 rad,"
-        " allowed: angles that increase",
-        "elements.p5.profile: found angles over 6.28319 rad, allowed: less than a full turn:"
-        " the first point repeats after it",
-        "elements.p6.offset: control found 'speed', allowed: turn",
-    ]
-
-
-def test_joints_that_could_not_be_read_are_no_faults_of_their_pairs() -> None:
-    wrong = {**GEARED, "joints": {**GEARED["joints"], "B": {**GEARED["joints"]["B"], "kind": "round"}}}
-    text = refusal(NetworkError, lambda: load_network(wrong))
-    assert text.startswith("joints.B.kind: found 'round'")
-    assert "\n" not in text
-
-    chain = {**wrong, "chains": {"arm": {"robot": "ur50"}}}
-    chain["elements"] = {"pair": {**GEARED["elements"]["pair"], "joints": ["A", "arm.elbow"]}}
-    assert "elements" not in refusal(NetworkError, lambda: load_network(chain))
-
-
-def test_the_bodies_of_a_pair_in_python_are_those_of_its_joints() -> None:
-    network = load_network(GEARED)
-    pair = replace(network.elements[0], bodies=("ground", "b"))
-    text = refusal(NetworkError, lambda: replace(network, elements=(pair,)))
-    assert text == "elements.pair.bodies: found ground, b, allowed: those of its joints, a, b"
-
-
-def test_a_profile_is_read_from_a_file_beside_the_network(tmp_path: Path) -> None:
-    (tmp_path / "lift.csv").write_text("angle,lift\n" + "".join(f"{a},{b}\n\n" for a, b in UNEVEN))
-    (tmp_path / "net.toml").write_text(
-        'angle_unit = "deg"\nlength_unit = "mm"\n[bodies]\na = {}\ns = {}\n'
-        '[joints.A]\nkind = "revolute"\nbodies = ["ground", "a"]\nn = [0, 0, 1]\n'
-        '[joints.S]\nkind = "prismatic"\nbodies = ["ground", "s"]\n'
-        '[elements.lift]\nkind = "cam"\njoints = ["A", "S"]\nprofile = "lift.csv"\n'
-    )
-    assert load_network(tmp_path / "net.toml").elements[0].profile == load_network(CAM).elements[0].profile
-
-
-def test_faults_of_a_file_of_a_profile_have_its_lines(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "lift.csv").write_text("0,0\n1;2\n3,inf\n4,5,6\n7,8\n")
-    expected = [
-        f"elements.pair.profile: lift.csv, line {line}, allowed: angle,lift, two finite numbers"
-        for line in ("2: found '1;2'", "3: found '3,inf'", "4: found '4,5,6'")
-    ]
-    for file, lines in (("lift.csv", expected), ("no.csv", [
-        "elements.pair.profile: 'no.csv' cannot be read: No such file or directory;"
-        " allowed: a .csv file of two columns",
-    ])):  # fmt: skip
-        wrong = {**CAM, "elements": {"pair": {**CAM["elements"]["pair"], "profile": file}}}
-        assert refusal(NetworkError, load_network, wrong).splitlines() == lines

@@ -1,15 +1,19 @@
-"""What joints do: poses against matrix exponentials, twists against differences, what they forbid."""
+"""Rotation vectors and joints: matrix exponentials, differences, constraints, poses of networks."""
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
 
 from random_networks import (
     KINDS,
     Poses,
+    assert_same_space,
+    axis_frame,
+    body_jacobian,
+    column_space,
     difference,
     generator,
     joint_between,
@@ -17,20 +21,197 @@ from random_networks import (
     matrix,
     motion,
     one_by_one,
+    pose_of,
     random_network,
     random_pose,
     random_values,
+    skew,
     transform,
 )
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.joint_motion import constraint_twists, joint_frame, joint_twists
+from urmpipe_models.networks.joint_motion import (
+    SMALL_ANGLE_SQUARED,
+    constraint_twists,
+    exp3,
+    joint_frame,
+    joint_twists,
+    left_jacobian,
+    left_jacobian_inverse,
+    wrap_rotation_vector,
+)
 from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.parts import JOINT_UNITS, Body, Control, Expression, Joint, JointKind
 
-ROUNDING = 1e-13
-"""Products of some ten matrices with entries near 1, and scipy's expm."""
+ROUNDING = 1e-13  # products of some ten matrices with entries near 1, and scipy's expm
+ROTATION_ROUNDING = 1e-14  # entries of rotations are sums of a few products of rounded numbers up to pi^2
+
+# --- rotation vectors
+
+ANGLES = [
+    0.0, 1e-300, 1e-160, 1e-12, *(factor * SMALL_ANGLE_SQUARED**0.5 for factor in (0.99, 1.0, 1.01)),
+    1e-3, 1.0, np.pi - 1e-9, np.pi, np.pi + 1e-9, 5.0, 2.0 * np.pi, 40.0,
+]  # fmt: skip
+
+
+def vectors(angle: float) -> FloatArray:
+    """Return 20 rotation vectors of an angle, those along the axes among them, shape (3, 20)."""
+    axes = np.random.default_rng(1).normal(size=(3, 20))
+    axes[:, :3], axes[:, 3:6] = np.eye(3), -np.eye(3)
+    return np.asarray(angle * axes / np.linalg.norm(axes, axis=0))
+
+
+def rotations(q: FloatArray) -> FloatArray:
+    """Return the rotations of rotation vectors, shape (n, 3, 3)."""
+    rows = exp3((q[0], q[1], q[2])).rotation
+    return np.array(rows).transpose(2, 0, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("angle", ANGLES)
+def test_rotations_are_orthogonal_and_equal_the_matrix_exponential(angle: float) -> None:
+    q = vectors(angle)
+    found = rotations(q)
+    size = max(1.0, angle)  # the rounding of the angle itself turns by eps |q|
+    np.testing.assert_allclose(
+        found @ found.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), rtol=0.0, atol=ROTATION_ROUNDING
+    )
+    np.testing.assert_allclose(np.linalg.det(found), 1.0, rtol=0.0, atol=ROTATION_ROUNDING)
+    expected = np.array([expm(skew(one)) for one in q.T])
+    np.testing.assert_allclose(
+        found, expected, rtol=0.0, atol=10 * ROTATION_ROUNDING * size
+    )  # expm squares 6 times
+
+
+def test_one_rotation_vector_of_floats_is_the_same() -> None:
+    q = vectors(2.0)
+    rows: FloatArray = np.array(exp3((float(q[0, 7]), float(q[1, 7]), float(q[2, 7]))).rotation)
+    np.testing.assert_array_equal(rows, rotations(q)[7])
+
+
+def test_series_and_closed_form_meet_where_they_take_over() -> None:
+    """Both neglect less than rounding: no step in the rotation, nor in what turns it, at the threshold."""
+    axis = vectors(1.0)
+    below, above = ((1.0 + sign * 1e-15) * SMALL_ANGLE_SQUARED**0.5 * axis for sign in (-1, 1))
+    for function in (exp3, left_jacobian):
+        one, other = (
+            np.array(getattr(found, "rotation", found))
+            for found in (function((q[0], q[1], q[2])) for q in (below, above))
+        )
+        # the closed forms of 1 - cos and a - sin lose digits there, which count times |q| = 1e-4
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-13)
+
+
+def test_the_printed_matrix_is_no_rotation() -> None:
+    """T(1,1) = u1 u3 v + cos(theta), as printed, has another determinant and other lengths of its columns."""
+    q = np.array([0.3, -0.5, 0.4])
+    theta = float(np.linalg.norm(q))
+    u = q / theta
+    v = 1.0 - np.cos(theta)
+    right: FloatArray = np.array(joint_frame(Joint("G", "global", ("a", "b")), q.tolist()).rotation)
+    printed = np.array(right)
+    printed[0, 0] = u[0] * u[2] * v + np.cos(theta)
+    corrected = np.array(right)
+    corrected[0, 0] = u[0] * u[0] * v + np.cos(theta)
+    np.testing.assert_allclose(corrected, right, rtol=0.0, atol=ROTATION_ROUNDING)
+    assert abs(np.linalg.det(right) - 1.0) < ROTATION_ROUNDING
+    assert abs(np.linalg.det(printed) - 1.0) > 0.01
+    assert np.abs(printed @ printed.T - np.eye(3)).max() > 0.01
+
+
+def test_the_printed_determinant_is_that_of_the_errata() -> None:
+    """Of the errata's 1.025: somewhere the printed matrix has that, so it is no rounding of print."""
+    rng = np.random.default_rng(2)
+    worst = 0.0
+    for q in rng.normal(size=(200, 3)):
+        u, theta = q / np.linalg.norm(q), np.linalg.norm(q)
+        printed = Rotation.from_rotvec(q).as_matrix()
+        printed[0, 0] = u[0] * u[2] * (1.0 - np.cos(theta)) + np.cos(theta)
+        worst = max(worst, abs(np.linalg.det(printed) - 1.0))
+    assert worst > 0.025
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 5.0])
+def test_turning_is_the_derivative_of_the_rotation(angle: float) -> None:
+    for q in vectors(angle).T:
+        rates = difference(lambda at: rotations(at).transpose(1, 2, 0), q, 1e-2)
+        w = rates.transpose(2, 0, 1) @ np.array(exp3((q[0], q[1], q[2])).rotation).T
+        expected = np.array([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
+        found: FloatArray = np.array(left_jacobian((q[0], q[1], q[2]))).T
+        # differences of step 1e-2: truncation 1e-12 / 140, rounding 1e-14
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=2e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 6.0])
+def test_left_jacobian_inverse_is_the_inverse(angle: float) -> None:
+    q = vectors(angle)
+    turning: FloatArray = np.array(left_jacobian((q[0], q[1], q[2]))).transpose(2, 1, 0)
+    back = left_jacobian_inverse(q).transpose(2, 0, 1)
+    # near 2 pi the inverse grows like 1 / (2 pi - angle), here 1 / 0.28
+    np.testing.assert_allclose(back @ turning, np.tile(np.eye(3), (20, 1, 1)), rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [*ANGLES, 3.0 * np.pi - 1e-6, 3.0 * np.pi + 1e-6, 100.0])
+def test_wrapped_vectors_turn_the_same_by_half_a_turn_at_most(angle: float) -> None:
+    q = vectors(angle)
+    short = np.array(wrap_rotation_vector(tuple(q)))
+    assert (np.linalg.norm(short, axis=0) <= np.pi + 1e-14 * max(1.0, angle)).all()
+    # 2 pi n is rounded to eps |q|
+    np.testing.assert_allclose(rotations(short), rotations(q), rtol=0.0, atol=1e-13 * max(1.0, angle))
+
+
+def one_joint(joints: list[Joint], bodies: int) -> Network:
+    return Network("arm", tuple(Body(f"b{k}") for k in range(1, bodies + 1)), tuple(joints))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_global_joint_is_three_revolutes_whose_axes_meet(seed: int) -> None:
+    """The second axis across both others they reach every rotation; twists span the same three."""
+    rng = np.random.default_rng(seed)
+    before, after = random_pose(rng), random_pose(rng)
+    q = rng.normal(size=3)
+    ball = Joint("G", "global", ("ground", "b1"), (transform(before), transform(after)))
+    ball_arm = build_mechanism(one_joint([ball], 1))
+
+    # R = R(n1, t1) R(n2, t2) R(n3, t3) with n2 across both others: angles of Davenport
+    n2, seen = np.array([0.0, 1.0, 0.0]), rng.uniform(0.3, 1.2)
+    n1, n3 = np.array([1.0, 0.0, 0.0]), np.array([np.cos(seen), 0.0, np.sin(seen)])
+    angles = Rotation.from_rotvec(q).as_davenport(np.array([n1, n2, n3]), "intrinsic")
+    origin = np.zeros(3)
+    frames = [axis_frame(n, origin, rng) for n in (n1, n2, n3)]
+    hinges = []
+    for k, frame in enumerate(frames):
+        first = before @ frame if k == 0 else frame
+        second = np.linalg.inv(np.linalg.inv(frame) if k < 2 else np.linalg.inv(frame) @ np.linalg.inv(after))
+        names = ("ground", "b1", "b2", "b3")
+        hinges.append(
+            Joint(f"R{k}", "revolute", (names[k], names[k + 1]), (transform(first), transform(second)))
+        )
+    three = build_mechanism(one_joint(hinges, 3))
+
+    np.testing.assert_allclose(
+        pose_of(three, np.asarray(angles), "b3"), pose_of(ball_arm, q, "b1"), rtol=0.0, atol=1e-13
+    )  # rounding of seven matrix products
+    # 1e-10: differences are good to 1e-12, the least sine of these axes with each other is 0.05
+    assert_same_space(
+        column_space(body_jacobian(ball_arm, q, "b1")),
+        column_space(body_jacobian(three, np.asarray(angles), "b3")),
+        1e-9,
+    )
+
+
+def test_a_global_joint_keeps_its_centre() -> None:
+    rng = np.random.default_rng(3)
+    joint = Joint("G", "global", ("ground", "b1"), (transform(random_pose(rng)), transform(random_pose(rng))))
+    arm = build_mechanism(one_joint([joint], 1))
+    centre = matrix(joint.frames[0])[:3, 3]
+    for q in vectors(2.5).T:
+        seen = pose_of(arm, q, "b1") @ matrix(joint.frames[1])
+        np.testing.assert_allclose(seen[:3, 3], centre, rtol=0.0, atol=1e-14)
+
+
+# --- joints
 
 
 def joint_of(kind: JointKind, rng: np.random.Generator) -> Joint:
@@ -42,20 +223,13 @@ def twists_of(joint: Joint, q: FloatArray, at: FloatArray) -> FloatArray:
     return np.array([(*w, *v) for w, v in joint_twists(joint, list(q), transform(at))]).T
 
 
-def moved_from(at: FloatArray, joint: Joint, q: FloatArray) -> FloatArray:
-    return at @ moved(joint, q)
-
-
-def moved(joint: Joint, q: FloatArray) -> FloatArray:
-    return motion(joint.kind, q, joint.pitch)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(5))
 def test_joints_move_as_matrix_exponentials_of_their_twists(kind: JointKind, seed: int) -> None:
     rng = np.random.default_rng(seed)
     joint, q = joint_of(kind, rng), np.array(random_values(kind, rng))
-    np.testing.assert_allclose(matrix(joint_frame(joint, list(q))), moved(joint, q), rtol=0.0, atol=ROUNDING)
+    expected = motion(kind, q, joint.pitch)
+    np.testing.assert_allclose(matrix(joint_frame(joint, list(q))), expected, rtol=0.0, atol=ROUNDING)
 
 
 @pytest.mark.slow
@@ -64,8 +238,11 @@ def test_twists_are_derivatives_of_matrix_exponentials(kind: JointKind) -> None:
     rng = np.random.default_rng(8)
     for _ in range(10):
         joint, q, at = joint_of(kind, rng), np.array(random_values(kind, rng)), random_pose(rng)
-        rates = difference(one_by_one(partial(moved_from, at, joint)), q, 1e-2)
-        inverse = np.linalg.inv(at @ moved(joint, q))
+
+        def pose(q: FloatArray, at: FloatArray = at, joint: Joint = joint) -> FloatArray:
+            return at @ motion(joint.kind, q, joint.pitch)
+
+        rates, inverse = difference(one_by_one(pose), q, 1e-2), np.linalg.inv(pose(q))
         found = twists_of(joint, q, at)
         for k in range(len(q)):
             expected = rates[:, :, k] @ inverse
@@ -73,29 +250,11 @@ def test_twists_are_derivatives_of_matrix_exponentials(kind: JointKind) -> None:
             np.testing.assert_allclose(generator(found[:3, k], found[3:, k]), expected, rtol=0.0, atol=3e-12)
 
 
-def turning_about(axis: int, angle: str) -> list[list[str]]:
-    """Return the entries of a rotation about x, y or z as formulas."""
-    rows = [["0"] * 3 for _ in range(3)]
-    rows[axis][axis] = "1"
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    rows[j][j] = rows[k][k] = f"cos({angle})"
-    rows[j][k], rows[k][j] = f"-sin({angle})", f"sin({angle})"
-    return rows
-
-
 def user_motion() -> tuple[Expression, ...]:
     """Return R = Rz(s t) Rx(t), a = (s, t^2, sin(s t)) as a user joint's nine formulas of s and t."""
-    left, right = turning_about(2, "s * t"), turning_about(0, "t")
-    R = [
-        [" + ".join(f"({left[i][k]}) * ({right[k][j]})" for k in range(3)) for j in range(3)]
-        for i in range(3)
-    ]
-    return tuple(
-        map(
-            Expression,
-            [*(R[i][0] for i in range(3)), *(R[i][1] for i in range(3)), "s", "t ** 2", "sin(s * t)"],
-        )
-    )
+    m = ("cos(s * t)", "sin(s * t)", "0")
+    n = ("-sin(s * t) * cos(t)", "cos(s * t) * cos(t)", "sin(t)")
+    return tuple(map(Expression, (*m, *n, "s", "t ** 2", "sin(s * t)")))
 
 
 @pytest.mark.slow
