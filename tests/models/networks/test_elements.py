@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 from asserting import refusal
-from pairs import CAM, GEARED, RACK, UNEVEN
+from pair_tables import CAM, GEARED, RACK, UNEVEN
 from random_networks import matrix
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain

@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from asserting import there
-from pairs import CAM, GEARED, RACK, UNEVEN, shaft, wheels
+from pair_tables import CAM, GEARED, RACK, UNEVEN, shaft, wheels
 from random_networks import difference
 from urmpipe import load_network, network_check, network_drive, network_solve
 from urmpipe_models.elementwise import FloatArray
