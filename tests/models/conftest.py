@@ -10,7 +10,20 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from urmpipe_models.arm.chain import Chain, Inertial, Joint, JointKind, Mimic
+from urmpipe_models.arm.chain import (
+    Box,
+    Capsule,
+    Chain,
+    Cylinder,
+    Inertial,
+    Joint,
+    JointKind,
+    Mesh,
+    Mimic,
+    Shape,
+    Sphere,
+    Visual,
+)
 from urmpipe_models.arm.geometric_models import DHRow
 from urmpipe_models.drives import (
     NO_SPRING,
@@ -120,6 +133,32 @@ def random_heavy_chains(draw: DrawFn) -> Chain:
     return replace(chain, inertials=tuple(masses), gravity=gravity, left_out=left_out, drives=tuple(driven))
 
 
+sizes = st.floats(0.0, 2.0)
+factors = st.floats(-2.0, 2.0)
+shares = st.floats(0.0, 1.0)
+shapes: SearchStrategy[Shape] = st.one_of(
+    st.builds(Box, st.tuples(sizes, sizes, sizes)),
+    st.builds(Cylinder, sizes, sizes),
+    st.builds(Capsule, sizes, sizes),
+    st.builds(Sphere, sizes),
+    st.builds(
+        Mesh,
+        st.sampled_from(["file:///nowhere/a%20b.stl", "package://p/b & c.obj"]),
+        st.tuples(factors, factors, factors),
+    ),
+)
+colours = st.none() | st.tuples(shares, shares, shares, shares)
+
+
+@st.composite
+def with_visuals(draw: DrawFn, chains: SearchStrategy[Chain]) -> Chain:
+    """A chain with up to four shapes on its base and its joints."""
+    chain = draw(chains)
+    carriers = st.sampled_from([None, *(joint.name for joint in chain.joints)])
+    visuals = st.lists(st.builds(Visual, carriers, shapes, frames, colours), max_size=4)
+    return replace(chain, visuals=tuple(draw(visuals)))
+
+
 dh_row = st.builds(DHRow, theta=angles, d=lengths, a=lengths, alpha=angles, kind=kinds)
 random_dh_rows = st.lists(dh_row, min_size=1, max_size=7)
 """One to seven rows of DH parameters, prismatic joints among them."""
@@ -138,3 +177,8 @@ def heavy_chains() -> SearchStrategy[Chain]:
 @pytest.fixture(scope="session")
 def dh_rows() -> SearchStrategy[list[DHRow]]:
     return random_dh_rows
+
+
+@pytest.fixture(scope="session")
+def visual_chains() -> SearchStrategy[Chain]:
+    return with_visuals(random_heavy_chains())

@@ -1,37 +1,33 @@
-"""The robots that come along, and finding one by name or file."""
+"""The catalogue: its robots, their numbers and masses, and finding one by name or file."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from asserting import refusal
+from urmpipe_models.dynamics.equations import inverse_dynamics, mass_matrix
 from urmpipe_models.errors import OptionError, RobotError
 from urmpipe_models.kinematics.forward import forward, poses_over_log
-from urmpipe_models.math3d import from_offset
-from urmpipe_models.robots.catalogue import load_robot, parse_offset, robot_names
+from urmpipe_models.math3d import Transform, from_offset, rotation_z
+from urmpipe_models.robots.catalogue import (
+    kinematically_distinct_names,
+    load_robot,
+    parse_offset,
+    robot_names,
+)
 from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
 
 NAMES = (
-    "arm6",
-    "articulated6r",
-    "iiwa14",
-    "irb60",
-    "irb60-spring",
-    "panda",
-    "ur3",
-    "ur5",
-    "ur10",
-    "ur3e",
-    "ur5e",
-    "ur10e",
-    "urm4",
-    "urm6",
-    "urm8",
-)
+    "arm6", "articulated6r", "iiwa14", "irb60", "irb60-spring", "panda", "ur3", "ur5", "ur10", "ur3e", "ur5e",
+    "ur10e", "urm4", "urm6", "urm8",
+)  # fmt: skip
 
 DH = {  # d1, a2, a3, d4, d5, d6 in m, as Universal Robots publishes them
     "ur3": (0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819),
@@ -47,9 +43,10 @@ SPEEDS = {"ur3": (180,) * 3 + (360,) * 3, "ur5": (180,) * 6, "ur10": (120,) * 2 
 def test_a_xacro_file_is_told_the_command_that_expands_it(tmp_path: Path) -> None:
     file = tmp_path / "arm.xacro"
     file.write_text('<robot name="arm"/>', encoding="utf-8")
-    with pytest.raises(RobotError) as caught:
-        load_robot(file)
-    assert str(caught.value) == f"{file}: is a xacro file; expand it first: xacro {file} -o arm.urdf"
+    assert (
+        refusal(RobotError, load_robot, file)
+        == f"{file}: is a xacro file; expand it first: xacro {file} -o arm.urdf"
+    )
 
 
 def test_all_robots_are_there_and_say_what_they_are() -> None:
@@ -144,36 +141,32 @@ def test_the_start_lies_within_the_joint_ranges(name: str) -> None:
         assert joint.lower <= value <= joint.upper
 
 
+def test_arms_that_differ_in_masses_or_drives_alone_move_alike() -> None:
+    assert kinematically_distinct_names() == tuple(name for name in NAMES if name != "irb60-spring")
+
+
 def test_a_name_is_known_as_data_sheets_write_it() -> None:
     assert load_robot("UR5e") == load_robot("ur5e")
 
 
-def test_an_unknown_name_gets_the_nearest_and_all_others() -> None:
-    with pytest.raises(RobotError) as caught:
-        load_robot("urm66")
+@pytest.mark.parametrize(
+    ("name", "hint"), [("urm66", " (did you mean urm6?)"), ("kuka", ""), ("iiwa", " (did you mean iiwa14?)")]
+)
+def test_an_unknown_name_gets_the_nearest_and_all_others(name: str, hint: str) -> None:
     allowed = f"allowed: {', '.join(NAMES)}, or a .toml or .urdf file"
-    assert str(caught.value) == f"unknown robot 'urm66' (did you mean urm6?); {allowed}"
-    with pytest.raises(RobotError) as caught:
-        load_robot("kuka")
-    assert str(caught.value) == f"unknown robot 'kuka'; {allowed}"
-    with pytest.raises(RobotError) as caught:
-        load_robot("iiwa")
-    assert str(caught.value) == f"unknown robot 'iiwa' (did you mean iiwa14?); {allowed}"
+    assert refusal(RobotError, load_robot, name) == f"unknown robot '{name}'{hint}; {allowed}"
 
 
 def test_files_are_loaded_by_their_suffix(tmp_path: Path) -> None:
     chain = load_robot("urm4")
     write_urdf(chain, tmp_path / "a.urdf")
     assert load_robot(tmp_path / "a.urdf").coordinates == chain.coordinates
-    assert load_robot(str(tmp_path / "a.urdf"), base_link="link1", tip_link="link3").coordinates == (
-        "phi2",
-        "phi3",
-    )
+    part = load_robot(str(tmp_path / "a.urdf"), base_link="link1", tip_link="link3")
+    assert part.coordinates == ("phi2", "phi3")
     (tmp_path / "b.toml").write_text('kind = "urm"\nlengths = [1, 1]\ntilts = [1]', encoding="utf-8")
     assert load_robot(tmp_path / "b.toml").name == "b"
-    with pytest.raises(OptionError) as caught:
-        load_robot("urm4", tip_link="link3")
-    assert str(caught.value) == "robot urm4: found a base or tip link, allowed only for a .urdf file"
+    said = "robot urm4: found a base or tip link, allowed only for a .urdf file"
+    assert refusal(OptionError, load_robot, "urm4", tip_link="link3") == said
 
 
 def test_offsets_are_read() -> None:
@@ -187,3 +180,42 @@ def test_other_offsets_are_refused(text: str) -> None:
         parse_offset(text)
     allowed = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15"
     assert str(caught.value) == f"found {text!r}, {allowed}"
+
+
+SAME = 1e-9
+"""In [kg.m2] and [N.m]: right angles of the URDFs of Universal Robots' arms have twelve digits."""
+
+MASS_URDFS = {
+    "ur3": ("ur3_robot.urdf", "base_link", "tool0", rotation_z(math.pi)),
+    "ur10": ("ur10_robot.urdf", "base_link", "tool0", rotation_z(math.pi)),
+    "panda": ("panda.urdf", "panda_link0", "panda_link8", Transform()),
+}
+"""The file, its first and last link, and where the catalogue's base stands in the first."""
+
+
+def test_three_arms_have_masses_of_a_urdf_and_irb60_assumed_ones() -> None:
+    assert {name for name in robot_names() if load_robot(name).inertials} == {
+        *MASS_URDFS,
+        "irb60",
+        "irb60-spring",
+    }
+    assert all(one.source.startswith("assumption: ") for one in load_robot("irb60").inertials)
+
+
+@pytest.mark.parametrize("name", MASS_URDFS)
+def test_an_arm_needs_the_torques_of_its_urdf(shared: Path, name: str) -> None:
+    file, first, last, base = MASS_URDFS[name]
+    path = shared / "robots" / "Gepetto_example-robot-data" / file
+    urdf, arm = read_urdf(path, base_link=first, tip_link=last), load_robot(name).placed(base)
+    links = tuple(
+        one for one in urdf.inertials if one.source != "link panda_hand"
+    )  # a tool of the catalogue's
+    urdf = replace(urdf, inertials=links)
+    assert sum(one.mass for one in arm.inertials) == pytest.approx(sum(one.mass for one in urdf.inertials))
+    random = np.random.default_rng(1)
+    for _ in range(5):
+        q, qd, qdd = random.uniform(-2.0, 2.0, (3, len(arm.coordinates))).tolist()
+        np.testing.assert_allclose(mass_matrix(arm, q), mass_matrix(urdf, q), rtol=0.0, atol=SAME)
+        for rates in (([0.0] * len(q),) * 2, (qd, qdd)):  # at rest gravity alone
+            needed, expected = (inverse_dynamics(one, q, *rates) for one in (arm, urdf))
+            np.testing.assert_allclose(needed, expected, rtol=0.0, atol=1e2 * SAME)  # up to 100 N.m

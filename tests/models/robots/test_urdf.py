@@ -1,4 +1,4 @@
-"""URDF in: what is read, what is refused, whole error texts."""
+"""URDF in: joints, masses, shapes, and whole error texts."""
 
 from __future__ import annotations
 
@@ -7,13 +7,27 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from asserting import refusal
-from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.chain import (
+    Box,
+    Capsule,
+    Chain,
+    Cylinder,
+    Inertial,
+    Joint,
+    Mesh,
+    Mimic,
+    Sphere,
+    Visual,
+)
+from urmpipe_models.dynamics.links import check_masses
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import joint_values
-from urmpipe_models.math3d import translation
+from urmpipe_models.math3d import Transform, translation
+from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
 from urmpipe_models.robots.urdf import read_urdf
 
 ARM = """<robot name="arm">
@@ -33,6 +47,23 @@ ARM = """<robot name="arm">
   </joint>
 </robot>
 """
+
+
+def link(name: str, inside: str = "") -> str:
+    return f'<link name="{name}">{inside}</link>'
+
+
+def joint(name: str, parent: str, child: str, kind: str = "continuous", inside: str = "") -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
+
+
+def robot(*elements: str) -> str:
+    return "\n".join(['<robot name="arm">', *elements, "</robot>"])
+
+
+def at(xyz: str) -> str:
+    return f'<origin xyz="{xyz}"/>'
 
 
 @pytest.fixture
@@ -74,19 +105,6 @@ def test_base_and_tip_are_chosen_by_name(urdf: Any) -> None:
     assert complaint(urdf, ARM, base_link="b", tip_link="a") == [
         "arm.urdf: tip link a does not follow base link b; allowed: b, c, flange"
     ]
-
-
-def link(name: str) -> str:
-    return f'<link name="{name}"/>'
-
-
-def joint(name: str, parent: str, child: str, kind: str = "continuous", inside: str = "") -> str:
-    ends = f'<parent link="{parent}"/><child link="{child}"/>'
-    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
-
-
-def robot(*elements: str) -> str:
-    return "\n".join(['<robot name="arm">', *elements, "</robot>"])
 
 
 def test_of_several_ends_the_one_with_most_moving_joints_is_the_tip(urdf: Any) -> None:
@@ -242,7 +260,7 @@ def test_joints_that_no_chain_holds_may_stand_beside_it(urdf: Any, kind: str) ->
 
 
 def test_a_mimic_follows_through_others_to_the_joint_that_moves(urdf: Any) -> None:
-    links = [link(name) for name in "rabc"]
+    links = map(link, "rabc")
     text = robot(
         *links,
         joint("j1", "r", "a"),
@@ -255,7 +273,7 @@ def test_a_mimic_follows_through_others_to_the_joint_that_moves(urdf: Any) -> No
 
 
 def test_a_mimic_of_a_joint_outside_the_chain_is_refused(urdf: Any) -> None:
-    links = [link(name) for name in "rabc"]
+    links = map(link, "rabc")
     follower = joint("j3", "a", "c", inside='<mimic joint="j2"/>')
     text = robot(*links, joint("j1", "r", "a"), joint("j2", "a", "b"), follower)
     assert urdf(text, tip_link="b").coordinates == ("j1", "j2")
@@ -264,19 +282,21 @@ def test_a_mimic_of_a_joint_outside_the_chain_is_refused(urdf: Any) -> None:
     ]
 
 
-def test_mimics_of_fixed_joints_and_of_themselves_are_refused(urdf: Any) -> None:
-    links = [link(name) for name in "rabcd"]
+def test_mimics_of_fixed_joints_of_themselves_and_of_none_are_refused(urdf: Any) -> None:
+    links = map(link, "rabcde")
     text = robot(
         *links,
         joint("j0", "r", "a", "fixed"),
         joint("j1", "a", "b", inside='<mimic joint="j0"/>'),
         joint("j2", "b", "c", inside='<mimic joint="j3"/>'),
         joint("j3", "c", "d", inside='<mimic joint="j2"/>'),
+        joint("j4", "d", "e", inside='<mimic joint="ghost"/>'),
     )
     assert complaint(urdf, text) == [
-        "arm.urdf:8: joint j1: mimics j0, which is fixed; allowed: a moving joint",
-        "arm.urdf:9: joint j2: mimics itself by way of j2",
-        "arm.urdf:10: joint j3: mimics itself by way of j3",
+        "arm.urdf:12: joint j4: mimics 'ghost'; allowed: a joint of the file",
+        "arm.urdf:9: joint j1: mimics j0, which is fixed; allowed: a moving joint",
+        "arm.urdf:10: joint j2: mimics itself by way of j2",
+        "arm.urdf:11: joint j3: mimics itself by way of j3",
     ]
 
 
@@ -354,38 +374,270 @@ def test_long_lists_of_links_are_cut_and_only_the_first_faults_ask(urdf: Any) ->
 
 def test_xacro_files_are_told_the_command_that_expands_them(shared: Path) -> None:
     path = shared / "robots" / "ros-industrial_kuka_experimental" / "kr3r540.xacro"
-    with pytest.raises(RobotError) as caught:
-        read_urdf(path)
-    assert str(caught.value) == f"{path}: is a xacro file; expand it first: xacro {path} -o kr3r540.urdf"
+    assert (
+        refusal(RobotError, read_urdf, path)
+        == f"{path}: is a xacro file; expand it first: xacro {path} -o kr3r540.urdf"
+    )
 
 
 def test_a_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(RobotError) as caught:
-        read_urdf(tmp_path / "none.urdf")
-    assert str(caught.value) == f"{tmp_path / 'none.urdf'}: cannot be read: No such file or directory"
+    assert (
+        refusal(RobotError, read_urdf, tmp_path / "none.urdf")
+        == f"{tmp_path / 'none.urdf'}: cannot be read: No such file or directory"
+    )
 
 
 def test_the_fingers_of_a_gripper(shared: Path) -> None:
     path = shared / "robots" / "Gepetto_example-robot-data" / "panda.urdf"
-    with pytest.raises(RobotError) as caught:
-        read_urdf(path)
-    assert str(caught.value) == (
+    assert refusal(RobotError, read_urdf, path) == (
         f"{path}: found panda_finger_joint2 on the arm beside the way to panda_leftfinger, as of a gripper;"
         " tip_link=LINK chooses one: panda_hand, panda_hand_tcp, panda_leftfinger,"
         " panda_rightfinger"
     )
-    with pytest.raises(RobotError) as caught:
-        read_urdf(path, tip_link="panda_rightfinger")
-    assert "joint panda_finger_joint2: mimics panda_finger_joint1, which is not on the chain" in str(
-        caught.value
-    )
+    said = "joint panda_finger_joint2: mimics panda_finger_joint1, which is not on the chain"
+    assert said in refusal(RobotError, read_urdf, path, tip_link="panda_rightfinger")
 
 
 @pytest.mark.parametrize("encoding", ["gb2312", "no-such"])
 def test_an_encoding_that_cannot_be_read_is_one_line(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(f'<?xml version="1.0" encoding="{encoding}"?><robot name="a"/>', encoding="ascii")
-    with pytest.raises(RobotError) as error:
-        read_urdf(path)
-    assert str(error.value).startswith(f"{path}: cannot be decoded: ")
-    assert str(error.value).endswith("; allowed: UTF-8")
+    said = refusal(RobotError, read_urdf, path)
+    assert said.startswith(f"{path}: cannot be decoded: ")
+    assert said.endswith("; allowed: UTF-8")
+
+
+def inertial(mass: float, moments: tuple[float, ...] = (0.1, 0.1, 0.1), origin: str = "") -> str:
+    ixx, iyy, izz = moments
+    inertia = f'<inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}"/>'
+    return f'<inertial>{origin}<mass value="{mass}"/>{inertia}</inertial>'
+
+
+def test_each_link_of_the_chain_weighs_on_the_joint_that_carries_it(urdf: Any) -> None:
+    quarter = '<origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/>'
+    chain = urdf(robot(
+        link("r", inertial(5.0)), link("a", inertial(2.0, (0.1, 0.2, 0.25), quarter)),
+        link("plate", inertial(0.5)), link("b"), link("end", inertial(0.0, (0.0, 0.0, 0.0))),
+        joint("j1", "r", "a"), joint("sensor", "a", "plate", "fixed", at("0 0 1")),
+        joint("j2", "plate", "b"), joint("flange", "b", "end", "fixed"),
+    ))  # fmt: skip
+    ball = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+    assert chain.inertials == (
+        Inertial(None, 5.0, inertia=ball, source="link r"),
+        Inertial("j1", 2.0, (0.1, 0.0, 0.0), (0.2, 0.1, 0.25, 0.0, 0.0, 0.0), "link a"),
+        Inertial("sensor", 0.5, inertia=ball, source="link plate"),
+    )
+    assert chain.left_out == ()
+
+
+def test_an_inertia_is_turned_by_the_rpy_of_its_origin(urdf: Any) -> None:
+    turned = '<origin rpy="0.4 -0.7 1.9"/>'
+    chain = urdf(robot(link("r"), link("a", inertial(1.0, (0.2, 0.3, 0.4), turned)), joint("j", "r", "a")))
+    ixx, iyy, izz, ixy, ixz, iyz = chain.inertials[0].inertia
+    pin = pytest.importorskip("pinocchio")
+    rotation = pin.rpy.rpyToMatrix(0.4, -0.7, 1.9)
+    expected = rotation @ np.diag([0.2, 0.3, 0.4]) @ rotation.T
+    found = [[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-15)
+
+
+GRIPPING = (
+    link("floor", inertial(9.0)), link("r"), link("a", inertial(2.0)), link("b", inertial(1.0)),
+    link("cable", inertial(0.2)), link("plug", inertial(0.1)),
+    link("finger", inertial(0.3)), link("nail", inertial(0.01)), link("light"),
+    link("wheel", inertial(4.0)), link("box", inertial(3.0)),
+    joint("stands", "floor", "r", "fixed", at("0 0 0.5")), joint("j1", "r", "a"), joint("j2", "a", "b"),
+    joint("clip", "a", "cable", "fixed", at("0 0.1 0")),
+    joint("plugged", "cable", "plug", "fixed", at("0 0 0.2")),
+    joint("grips", "plug", "finger", "prismatic"), joint("grown", "finger", "nail", "fixed"),
+    joint("hangs", "a", "light", "floating"),
+    joint("rolls", "r", "wheel"), joint("lies", "r", "box", "fixed", at("1 0 0")),
+)  # fmt: skip
+
+
+def test_what_is_fixed_beside_the_chain_is_carried_and_what_moves_on_it_is_left_out(urdf: Any) -> None:
+    chain = urdf(robot(*GRIPPING), tip_link="b")
+    assert [(one.source, one.joint, one.centre) for one in chain.inertials] == [
+        ("link floor", None, (0.0, 0.0, 0.0)),
+        ("link box", "stands", (1.0, 0.0, 0.0)),
+        ("link a", "j1", (0.0, 0.0, 0.0)),
+        ("link cable", "j1", (0.0, 0.1, 0.0)),
+        ("link plug", "j1", (0.0, 0.1, 0.2)),
+        ("link b", "j2", (0.0, 0.0, 0.0)),
+    ]
+    assert chain.left_out == ("finger", "nail")
+
+
+def test_links_beyond_the_tip_and_above_the_base_are_no_part_of_the_chain(urdf: Any) -> None:
+    shorter = urdf(robot(*GRIPPING), base_link="r", tip_link="a")
+    assert [one.source for one in shorter.inertials] == ["link box", "link a", "link cable", "link plug"]
+    assert shorter.left_out == ("b", "finger", "nail")
+
+
+def test_what_hangs_on_base_tip_and_tool_is_carried_by_the_joint_before(urdf: Any) -> None:
+    chain = urdf(robot(
+        link("w", inertial(1.0)), link("r", inertial(2.0)), link("a"), link("t", inertial(3.0)),
+        link("e", inertial(4.0)), joint("urmpipe_base", "w", "r", "fixed", at("0 0 1")), joint("j", "r", "a"),
+        joint("urmpipe_tip", "a", "t", "fixed", at("0.1 0 0")),
+        joint("urmpipe_tool", "t", "e", "fixed", at("0.1 0 0")),
+    ))  # fmt: skip
+    assert [(one.joint, one.mass, one.centre) for one in chain.inertials] == [
+        (None, 1.0, (0.0, 0.0, -1.0)), (None, 2.0, (0.0, 0.0, 0.0)),
+        ("j", 3.0, (0.1, 0.0, 0.0)), ("j", 4.0, (0.2, 0.0, 0.0)),
+    ]  # fmt: skip
+
+
+def test_masses_that_are_not_right_are_not_used_and_say_why_with_link_and_line(urdf: Any) -> None:
+    """The kinematics are read; nothing is said of what stands still or moves on its own."""
+    chain = urdf(robot(
+        link("r", "<inertial/>"),
+        link("a", '<inertial><mass/>\n<inertia ixx="1" iyy="x" izz="1" ixz="0"/></inertial>'),
+        link("b", inertial(math.inf, origin='<origin xyz="1"/>')),
+        link("c", inertial(-1.0)),
+        link("d", inertial(1.0, (0.1, 0.1, 0.3))),
+        link("e", inertial(0.0)),
+        link("f", "\n" + inertial(-2.0)),
+        link("g", '<inertial><mass value="1"/></inertial>'),
+        link("h", inertial(1.0) + inertial(2.0)),
+        link("wheel", "<inertial/>"),
+        joint("j1", "r", "a"), joint("j2", "a", "b"), joint("j3", "b", "c"), joint("j4", "c", "d"),
+        joint("fixed", "c", "e", "fixed"), joint("onto", "a", "f", "fixed"), joint("moves", "b", "g"),
+        joint("twice", "d", "h", "fixed"), joint("rolls", "r", "wheel")), tip_link="d")  # fmt: skip
+    assert (chain.coordinates, chain.inertials, chain.left_out) == (("j1", "j2", "j3", "j4"), (), ("g",))
+    faults = [
+        "arm.urdf:3: link a: inertial: mass: no value; allowed: a number each",
+        "arm.urdf:4: link a: inertial: inertia: no ixy, iyz; allowed: a number each",
+        "arm.urdf:4: link a: inertial: inertia iyy: found 'x', expected a number",
+        "arm.urdf:10: link f: inertial on joint j1: mass -2 kg; allowed: 0 or more",
+        "arm.urdf:5: link b: inertial: mass value: found 'inf', expected a number",
+        "arm.urdf:5: link b: inertial: origin xyz: found '1', expected three numbers",
+        "arm.urdf:6: link c: inertial on joint j3: mass -1 kg; allowed: 0 or more",
+        "arm.urdf:8: link e: inertial on joint j3: mass 0 with an inertia; allowed: a mass, or no inertia",
+        "arm.urdf:7: link d: inertial on joint j4: principal moments 0.1, 0.1, 0.3 kg.m2; allowed: none above"
+        " the sum of the other two",
+        "arm.urdf:12: link h: found a second <inertial>; allowed: one",
+    ]
+    assert list(chain.mass_faults) == faults
+    assert refusal(RobotError, check_masses, chain).splitlines() == faults
+    assert chain_from_dict(chain_to_dict(chain)) == chain
+
+
+def test_the_hand_adds_to_the_flange_and_the_fingers_are_left_out(shared: Path) -> None:
+    path = shared / "robots" / "Gepetto_example-robot-data" / "panda.urdf"
+    chain = read_urdf(path, tip_link="panda_link8")
+    hand = chain.inertials[-1]
+    assert (hand.joint, hand.mass, hand.source) == ("panda_joint8", 0.73, "link panda_hand")
+    c = -0.01 * math.sqrt(0.5)  # the hand is turned by -45 deg about z
+    np.testing.assert_allclose(hand.centre, (c, -c, 0.03), rtol=1e-15)
+    assert chain.left_out == ("panda_leftfinger", "panda_rightfinger")
+    assert [one.effort for one in chain.moving] == [87.0] * 4 + [12.0] * 3
+
+
+VISUAL_ARM = """<robot name="arm">
+  <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>
+  <link name="root">
+    <visual><geometry><box size="0.1 0.2 0.3"/></geometry><material name="grey"/></visual>
+    <collision><geometry><sphere radius="9"/></geometry></collision>
+  </link>
+  <link name="a">
+    <visual>
+      <origin xyz="0 0 0.1" rpy="0 0 1.5707963267948966"/>
+      <geometry><cylinder radius="0.05" length="0.2"/></geometry>
+      <material name="red"><color rgba="1 0 0 0.5"/></material>
+    </visual>
+    <visual><geometry><sphere radius="0.06"/></geometry><material name="red"/></visual>
+  </link>
+  <link name="flange">
+    <visual><geometry><capsule radius="0.01" length="0.03"/></geometry><material name="unknown"/></visual>
+  </link>
+  <link name="hand">
+    <visual><geometry><mesh filename="meshes/hand.stl" scale="0.001 0.001 -0.001"/></geometry></visual>
+  </link>
+  <link name="beside"><visual><geometry><box size="1 1 1"/></geometry></visual></link>
+  <joint name="j1" type="continuous">
+    <parent link="root"/><child link="a"/><axis xyz="0 0 1"/>
+  </joint>
+  <joint name="plate" type="fixed"><parent link="a"/><child link="flange"/><origin xyz="0 0 0.2"/></joint>
+  <joint name="j2" type="continuous">
+    <parent link="flange"/><child link="hand"/><axis xyz="0 0 1"/>
+  </joint>
+  <joint name="arm_beside" type="fixed"><parent link="a"/><child link="beside"/></joint>
+</robot>
+"""
+
+
+def test_the_links_of_the_chain_keep_what_they_show(urdf: Any, tmp_path: Path) -> None:
+    turned = Transform(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.1))
+    assert urdf(VISUAL_ARM).visuals == (
+        Visual(None, Box((0.1, 0.2, 0.3)), colour=(0.5, 0.5, 0.5, 1.0)),
+        Visual("j1", Cylinder(0.05, 0.2), turned, (1.0, 0.0, 0.0, 0.5)),
+        Visual("j1", Sphere(0.06), colour=(1.0, 0.0, 0.0, 0.5)),
+        Visual("plate", Capsule(0.01, 0.03)),
+        Visual("j2", Mesh(str(tmp_path / "meshes" / "hand.stl"), (0.001, 0.001, -0.001))),
+    )
+
+
+def test_the_base_link_carries_what_it_shows_wherever_the_chain_begins(urdf: Any) -> None:
+    chain = urdf(VISUAL_ARM, base_link="a")
+    assert [(visual.joint, type(visual.shape)) for visual in chain.visuals] == [
+        (None, Cylinder), (None, Sphere), ("plate", Capsule), ("j2", Mesh),
+    ]  # fmt: skip
+
+
+def test_a_colour_is_a_material_s_own_or_that_of_its_name(urdf: Any, tmp_path: Path) -> None:
+    """A colour left out is white, a scale 1; materials without a name have nothing in common."""
+    shape = "<geometry><mesh filename='a.stl'/></geometry>"
+    materials = [
+        "<material name='m'><color rgba='1 0 0 1'/></material>",
+        "<material name='m'><color rgba='0 2 -1 1'/></material>",
+        "<material name='m'/>",
+        "<material><color rgba='0 0 1 1'/></material>",
+        "<material/>",
+        "<material name='w'><color/></material>",
+        "<material name='urmpipe'/>",
+        "",
+    ]
+    visuals = "".join(f"<visual>{shape}{material}</visual>" for material in materials)
+    joint = "<joint name='j' type='continuous'><parent link='b'/><child link='e'/></joint>"
+    text = f"<robot name='r'><link name='b'>{visuals}</link><link name='e'/>{joint}</robot>"
+    found = urdf(text).visuals
+    red, green, blue, white = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (1.0,) * 4
+    assert [one.colour for one in found] == [red, green, red, blue, None, white, None]
+    assert {one.shape for one in found} == {Mesh(str(tmp_path / "a.stl"), (1.0, 1.0, 1.0))}
+
+
+def test_what_is_wrong_with_a_visual_is_said_with_its_line(urdf: Any) -> None:
+    wrong = [
+        "<visual/>",
+        "<visual><geometry><plane/><box size='1 1'/></geometry></visual>",
+        "<visual><geometry><plane/></geometry></visual>",
+        "<visual><geometry><sphere radius='1'/><plane/><box size='1 1 1'/></geometry></visual>",
+        "<visual><geometry><sphere/></geometry></visual>",
+        "<visual><geometry><cylinder radius='-1' length='x'/></geometry></visual>",
+        "<visual><geometry><mesh filename='' scale='1'/></geometry><origin rpy='0'/></visual>",
+        "<visual><geometry><sphere radius='1'/></geometry>"
+        "<material name='m'><color rgba='1 1 1'/></material></visual>",
+    ]
+    joint = "<joint name='j' type='continuous'><parent link='b'/><child link='e'/></joint>"
+    text = "\n".join(
+        ["<robot name='r'><link name='b'>", *wrong, "</link><link name='e'/>", joint, "</robot>"]
+    )
+    assert complaint(urdf, text) == [
+        "arm.urdf:2: link b: visual: found no shape; allowed: one of box, cylinder, capsule, sphere, mesh",
+        "arm.urdf:3: link b: visual: box size: found '1 1', expected three numbers",
+        "arm.urdf:4: link b: visual: found plane; allowed: one of box, cylinder, capsule, sphere, mesh",
+        "arm.urdf:5: link b: visual: found sphere, plane, box; allowed: one of box, cylinder, capsule,"
+        " sphere, mesh",
+        "arm.urdf:6: link b: visual: sphere: no radius; allowed: one",
+        "arm.urdf:7: link b: visual: cylinder radius: found -1; allowed: 0 or more",
+        "arm.urdf:7: link b: visual: cylinder length: found 'x', expected a number",
+        "arm.urdf:8: link b: visual: mesh scale: found '1', expected three numbers",
+        "arm.urdf:8: link b: visual: mesh: no filename; allowed: one",
+        "arm.urdf:8: link b: visual: origin rpy: found '0', expected three numbers",
+        "arm.urdf:9: link b: visual: color rgba: found '1 1 1', expected four numbers",
+    ]
+
+
+def test_what_stands_beside_the_chain_is_not_looked_at(urdf: Any) -> None:
+    text = VISUAL_ARM.replace('<box size="1 1 1"/>', "<plane/>")
+    assert urdf(text).visuals == urdf(VISUAL_ARM).visuals

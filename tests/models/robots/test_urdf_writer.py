@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +13,23 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.arm.chain import Capsule, Chain, Cylinder, Joint, Sphere
+from asserting import refusal
+from urmpipe_models.arm.chain import (
+    Box,
+    Capsule,
+    Chain,
+    Cylinder,
+    Inertial,
+    Joint,
+    Sphere,
+    Visual,
+)
 from urmpipe_models.arm.geometric_models import DHRow, dh_chain
 from urmpipe_models.arm.solids import build_placeholder_solids
+from urmpipe_models.dynamics.links import chain_to_links
 from urmpipe_models.errors import OutputError, RobotError
-from urmpipe_models.kinematics.forward import forward, joint_values
-from urmpipe_models.math3d import from_offset
+from urmpipe_models.kinematics.forward import forward, frames_over_log, joint_values
+from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text, write_urdf
@@ -44,15 +56,27 @@ def assert_same(chain: Chain, back: Chain) -> None:
         np.testing.assert_allclose(a.rotation, b.rotation, rtol=0.0, atol=SAME)
 
 
-@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_the_file_read_back_is_the_same_chain(
-    chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
+    visual_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
 ) -> None:
-    chain = data.draw(chains)
+    """With its efforts, its masses on each joint in order, and its shapes likewise."""
+    chain = data.draw(visual_chains)
     write_urdf(chain, tmp_path / "chain.urdf")
-    assert_same(chain, read_urdf(tmp_path / "chain.urdf"))
+    back = read_urdf(tmp_path / "chain.urdf")
+    assert_same(chain, back)
+    assert [one.joint for one in back.inertials] == [one.joint for one in chain.inertials]
+    for one, other in zip(chain.inertials, back.inertials, strict=True):
+        numbers, again = ([mass.mass, *mass.centre, *mass.inertia] for mass in (one, other))
+        np.testing.assert_allclose(again, numbers, rtol=SAME, atol=SAME)
+    assert (back.gravity, back.left_out, back.drives) == ((0.0, 0.0, -9.81), (), ())  # URDF has none
+    for joint in (None, *(joint.name for joint in chain.joints)) if chain.visuals else ():
+        visuals, read = ([one for one in arm.visuals if one.joint == joint] for arm in (chain, back))
+        for visual, found in zip(visuals, read, strict=True):
+            assert replace(visual, origin=found.origin) == found
+            np.testing.assert_allclose(visual.origin.rotation, found.origin.rotation, rtol=0.0, atol=SAME)
+            np.testing.assert_allclose(visual.origin.translation, found.origin.translation, rtol=0, atol=SAME)
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -164,12 +188,88 @@ def test_reserved_joint_names_are_refused(tmp_path: Path) -> None:
 
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "missing" / "a.urdf"
-    with pytest.raises(OutputError) as caught:
-        write_urdf(Chain("a", (Joint("j"),)), path)
-    assert str(caught.value) == f"{path}: cannot be written: No such file or directory"
+    assert (
+        refusal(OutputError, write_urdf, Chain("a", (Joint("j"),)), path)
+        == f"{path}: cannot be written: No such file or directory"
+    )
 
 
 def test_a_written_file_is_whole_and_alone(tmp_path: Path) -> None:
     write_urdf(Chain("a", (Joint("j"),)), tmp_path / "a.urdf")
     assert [path.name for path in tmp_path.iterdir()] == ["a.urdf"]
     assert (tmp_path / "a.urdf").read_text(encoding="utf-8").endswith("</robot>\n")
+
+
+def test_a_second_mass_of_a_joint_is_a_link_fixed_to_the_first(tmp_path: Path) -> None:
+    inertials = tuple(Inertial(on, mass, (0.0, 0.0, mass)) for on in (None, "j") for mass in (1.0, 2.0, 3.0))
+    chain = Chain("arm", (Joint("j", origin=translation(0.0, 0.0, 1.0)),), inertials=inertials)
+    write_urdf(chain, tmp_path / "arm.urdf")
+    back = read_urdf(tmp_path / "arm.urdf")  # the further masses are no ends of the arm
+    assert [(one.joint, one.mass, one.centre, one.source) for one in back.inertials] == [
+        (None, 1.0, (0.0, 0.0, 1.0), "link base_link"),
+        (None, 2.0, (0.0, 0.0, 2.0), "link base_link_mass2"),
+        (None, 3.0, (0.0, 0.0, 3.0), "link base_link_mass3"),
+        ("j", 1.0, (0.0, 0.0, 1.0), "link link1"),
+        ("j", 2.0, (0.0, 0.0, 2.0), "link link1_mass2"),
+        ("j", 3.0, (0.0, 0.0, 3.0), "link link1_mass3"),
+    ]
+
+
+def assert_same_inertias(chain: Chain, model: Any) -> None:
+    """Hold mass, moment and inertia about the origin of each moving link against those of Pinocchio."""
+    for one in chain_to_links(chain).links:
+        other = model.inertias[model.getJointId(one.joint.name)]
+        np.testing.assert_allclose(one.mass, other.mass, rtol=SAME)
+        np.testing.assert_allclose(one.moment, other.mass * other.lever, rtol=0.0, atol=SAME)
+        np.testing.assert_allclose(one.inertia, other.matrix()[3:, 3:], rtol=0.0, atol=SAME)
+
+
+@pytest.mark.parametrize(
+    ("file", "tip"),
+    [("ur5_robot.urdf", "tool0"), ("panda.urdf", "panda_link8"), ("panda.urdf", "panda_hand")],
+)
+def test_pinocchio_reads_the_same_inertias(shared: Path, file: str, tip: str) -> None:
+    pin = pytest.importorskip("pinocchio")
+    path = shared / "robots" / "Gepetto_example-robot-data" / file
+    assert_same_inertias(read_urdf(path, tip_link=tip), pin.buildModelFromUrdf(str(path)))
+
+
+@pytest.mark.slow
+@settings(deadline=None, max_examples=25)
+@given(data=st.data())
+def test_pinocchio_reads_the_file_that_was_written(
+    heavy_chains: SearchStrategy[Chain], data: st.DataObject
+) -> None:
+    pin = pytest.importorskip("pinocchio")
+    chain = data.draw(heavy_chains.filter(lambda one: bool(one.name and one.inertials)))
+    assert_same_inertias(chain, pin.buildModelFromXML(urdf_text(chain)))
+
+
+def test_pinocchio_sees_the_visuals_where_they_are(tmp_path: Path) -> None:
+    pin = pytest.importorskip("pinocchio")
+    robot = load_robot("ur5e").placed(from_offset([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]))
+    origin = from_offset([0.1, 0.0, 0.2, 0.3, 0.2, 0.1])
+    box = Visual(None, Box((0.1, 0.2, 0.3)), origin, (1.0, 0.5, 0.0, 1.0))
+    cylinders = (Visual(joint.name, Cylinder(0.05, 0.4), origin) for joint in robot.joints)
+    chain = replace(robot, visuals=(box, *cylinders))
+    text = urdf_text(chain)
+    model = pin.buildModelFromXML(text)
+    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL)
+    q = np.array([0.3, -0.4, 0.5, -0.6, 0.7, -0.8])
+    configuration = [
+        part
+        for value, joint in zip(q, list(model.joints)[1:], strict=True)
+        for part in ([math.cos(value), math.sin(value)] if joint.nq == 2 else [value])
+    ]
+    data, placed = model.createData(), geometry.createData()
+    pin.forwardKinematics(model, data, np.array(configuration))
+    pin.updateGeometryPlacements(model, data, geometry, placed)
+    position, rotation = frames_over_log(chain, q[np.newaxis])
+    names = [None, *(joint.name for joint in chain.joints)]
+    for visual, peer in zip(chain.visuals, placed.oMg, strict=True):
+        k = names.index(visual.joint)
+        np.testing.assert_allclose(
+            position[0, k] + rotation[0, k] @ np.array(origin.translation), peer.translation, atol=SAME
+        )
+        np.testing.assert_allclose(rotation[0, k] @ np.array(origin.rotation), peer.rotation, atol=SAME)
+    np.testing.assert_array_equal(geometry.geometryObjects[0].meshColor, [1.0, 0.5, 0.0, 1.0])

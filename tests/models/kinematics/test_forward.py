@@ -1,10 +1,11 @@
-"""Kinematics against Pinocchio, printed numbers, finite differences and its own traced form."""
+"""Forward kinematics against Pinocchio, printed numbers, differences, and the product of exponentials."""
 
 from __future__ import annotations
 
 import csv
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from asserting import there
 from differences import assert_slope
-from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
 from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain, urm_chain
 from urmpipe_models.elementwise import BLOCK, FloatArray, row_blocks
 from urmpipe_models.kinematics.forward import (
+    Screws,
+    chain_to_screws,
     forward,
+    iter_frames,
     jacobian,
     jacobian_over_log,
     joint_values,
@@ -28,13 +33,69 @@ from urmpipe_models.kinematics.forward import (
     points_over_log,
     poses_over_log,
     positions_over_log,
+    screws_to_chain,
     tip_pose,
     tip_position,
 )
-from urmpipe_models.math3d import Transform, euler_zyx, from_offset, from_rpy, translation
-from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.math3d import (
+    Transform,
+    euler_zyx,
+    from_offset,
+    from_rpy,
+    rotation_x,
+    rotation_z,
+    translation,
+)
+from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
+
+ARM = Chain(
+    "arm",
+    (
+        Joint("mount", "fixed", translation(0.0, 0.0, 0.5)),
+        Joint("lift", "prismatic", axis=(0.0, 0.0, -1.0)),
+        Joint("follow", "prismatic", axis=(1.0, 0.0, 0.0), mimic=Mimic("lift", -2.0, 0.25)),
+        Joint("turn", axis=(0.0, 1.0, 0.0)),
+        Joint("flange", "fixed", translation(0.0, 0.0, 0.125)),
+    ),
+    base=translation(1.0, 2.0, 3.0),
+)
+
+
+def test_a_fixed_joint_has_the_value_0_and_a_mimic_follows_its_line() -> None:
+    assert joint_values(ARM, [0.5, 0.75]) == [0.0, 0.5, -2.0 * 0.5 + 0.25, 0.75, 0.0]
+
+
+@pytest.mark.parametrize("q", [[], [0.5], [0.5, 0.75, 1.0]])
+def test_there_is_a_value_for_each_coordinate_no_more_and_no_less(q: list[float]) -> None:
+    with pytest.raises(ValueError, match="zip"):
+        joint_values(ARM, q)
+    with pytest.raises(ValueError, match="zip"):
+        list(iter_frames(ARM, q))
+
+
+def test_frames_are_the_base_and_what_each_joint_moves() -> None:
+    found = list(iter_frames(ARM, [0.5, 0.0]))
+    assert found[0] == ARM.base
+    assert [frame.translation for frame in found] == [
+        (1.0, 2.0, 3.0),
+        (1.0, 2.0, 3.5),
+        (1.0, 2.0, 3.0),
+        (0.25, 2.0, 3.0),
+        (0.25, 2.0, 3.0),
+        (0.25, 2.0, 3.125),
+    ]
+    assert all(frame.rotation == Transform().rotation for frame in found)
+
+
+def test_a_revolute_joint_turns_and_does_not_shift() -> None:
+    *_, turned, flange = iter_frames(ARM, [0.5, math.pi / 2])
+    assert turned.translation == (0.25, 2.0, 3.0)
+    # a joint's value is no constant: cos(pi / 2) is 6e-17, as in a column
+    np.testing.assert_allclose(turned.rotation, [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], rtol=0.0, atol=1e-16)
+    np.testing.assert_allclose(flange.translation, (0.375, 2.0, 3.0), rtol=1e-16)  # its z is x of the world
+
 
 LENGTHS = (0.243215, 0.21243, 0.21243, 0.21243, 0.21243, 0.21243, 0.042215)
 TILT = math.radians(52.0)
@@ -51,9 +112,6 @@ def random_poses(chain: Chain, count: int = 1000, reach: float = math.pi) -> Flo
 
 def matrix(rotation: Any) -> FloatArray:
     return np.array(rotation, dtype=float)
-
-
-# --- what the paper prints -------------------------------------------------------------------------
 
 
 def test_the_calibration_pose_is_the_papers() -> None:
@@ -84,9 +142,6 @@ def test_every_point_of_a_urm_arm_is_equation_7() -> None:
             turned = from_rpy(0.0, TILT, 0.0) @ from_rpy(0.0, 0.0, phi[k + 1])
             rotation = rotation @ matrix(turned.rotation)
             p = p + rotation @ [0.0, 0.0, lengths[k + 1]]
-
-
-# --- Pinocchio -------------------------------------------------------------------------------------
 
 
 class Peer:
@@ -241,9 +296,6 @@ def assert_close(got: Any, expected: Any) -> None:
     np.testing.assert_allclose(np.array(got, dtype=float), expected, rtol=AGREES, atol=30 * AGREES)
 
 
-# --- logs of others --------------------------------------------------------------------------------
-
-
 def test_the_poses_that_pybotics_kept_of_a_ur10(shared: Path) -> None:
     half = math.pi / 2
     rows = [  # modified DH of pybotics' UR10: alpha, a, theta, d
@@ -260,9 +312,6 @@ def test_the_poses_that_pybotics_kept_of_a_ur10(shared: Path) -> None:
     position, rotation = poses_over_log(chain, np.radians(values[:, :6]))
     np.testing.assert_allclose(position, poses[:, :3, 3] / 1000.0, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(rotation, poses[:, :3, :3], rtol=0.0, atol=AGREES)
-
-
-# --- finite differences, mimics included -----------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -314,9 +363,6 @@ def test_a_mimic_moves_with_its_leader_and_has_no_coordinate() -> None:
     for qd, qdd in (([0.0], [0.0, 0.0]), ([0.0, 0.0], [0.0]), ([0.0] * 3, [0.0, 0.0])):
         with pytest.raises(ValueError, match=r"zip\(\) argument 2 is (shorter|longer) than argument 1"):
             point_motions(chain, [0.0, 0.2], qd, qdd)
-
-
-# --- logs: whole arrays are the single poses -------------------------------------------------------
 
 
 @pytest.mark.parametrize("count", [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 5])
@@ -401,3 +447,148 @@ def test_positions_are_those_of_poses_far_from_the_world_and_with_a_tool() -> No
     )
     q = random_poses(chain)
     np.testing.assert_array_equal(positions_over_log(chain, q), poses_over_log(chain, q)[0])
+
+
+SLIDING_ARM = Chain(
+    "arm",
+    (
+        Joint("turn", origin=translation(0.0, 0.0, 0.5)),
+        Joint("flange", "fixed", translation(2.0, 0.0, 0.0)),
+        Joint("slide", "prismatic", rotation_x(math.pi / 2), axis=(0.0, 0.0, -1.0)),
+    ),
+    tip=translation(0.0, 3.0, 0.0),
+    base=Transform(rotation_z(math.pi / 2).rotation, (1.0, 0.0, 0.0)),
+    tool=rotation_x(-math.pi / 2),
+)
+
+IDENTITY = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+
+def test_screws_stand_in_the_world_base_and_tool_included() -> None:
+    found = there(chain_to_screws(SLIDING_ARM))
+    # The base turns x to y and y to -x; the slide's frame lies on its side, so that its -z is y before.
+    np.testing.assert_array_equal(found.direction, [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+    np.testing.assert_array_equal(found.point, [[1.0, 0.0, 0.5], [1.0, 2.0, 0.5]])
+    np.testing.assert_array_equal(found.revolute, [True, False])
+    np.testing.assert_array_equal(found.rotation, [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(found.position, [1.0, 2.0, 3.5])
+    assert found.size == 2.0 + 3.0  # from axis to axis, and to the tip
+
+
+def test_a_joint_that_follows_another_is_no_screw() -> None:
+    assert chain_to_screws(Chain("arm", (Joint("a"), Joint("b", mimic=Mimic("a"))))) is None
+
+
+def test_screws_are_floats_whatever_numbers_describe_the_arm() -> None:
+    whole = Chain("arm", (Joint("a", origin=translation(1, 2, 3), axis=(0, 0, 1)),), base=Transform(IDENTITY))
+    found = there(chain_to_screws(whole))
+    for one in (found.direction, found.point, found.rotation, found.position):
+        assert one.dtype == np.float64
+
+
+def test_each_screw_of_a_chain_has_a_name() -> None:
+    found = there(chain_to_screws(SLIDING_ARM))
+    for names in (("a",), ("a", "b", "c")):
+        with pytest.raises(ValueError, match="zip"):
+            screws_to_chain(found, names)
+
+
+def random_arm(rng: np.random.Generator) -> Chain:
+    """An arm of one to seven joints of each kind, at least one of which moves, in any frames."""
+
+    def frame() -> Transform:
+        return from_offset(rng.uniform(-1.0, 1.0, 6).tolist())
+
+    def joint(k: int) -> Joint:
+        kinds: tuple[JointKind, ...] = ("revolute", "prismatic", "fixed")
+        x, y, z = frame().rotation[0]
+        return Joint(f"j{k}", kinds[rng.integers(3)] if k else "revolute", frame(), (x, y, z))
+
+    joints = tuple(joint(k) for k in range(rng.integers(1, 8)))
+    return Chain("arm", joints, frame(), frame(), frame())
+
+
+def test_a_chain_of_the_screws_is_the_same_arm() -> None:
+    rng = np.random.default_rng(21)
+    for _ in range(30):
+        chain = random_arm(rng)
+        found = there(chain_to_screws(chain))
+        names = tuple(f"n{k}" for k in range(len(chain.coordinates)))
+        again = screws_to_chain(found, names)
+        assert (again.name, again.coordinates) == ("screws", names)
+        q = rng.uniform(-3.0, 3.0, len(names)).tolist()
+        expected, got = tip_pose(chain, q), tip_pose(again, q)
+        # ten frames and more with shifts of up to 1.7 m and slides of up to 3 m: some 30 m, rounded each time
+        np.testing.assert_allclose(got.translation, expected.translation, rtol=0.0, atol=1e-13)
+        np.testing.assert_allclose(got.rotation, expected.rotation, rtol=0.0, atol=1e-14)
+
+
+LED_BY_NONE = [
+    name for name in robot_names() if all(joint.mimic is None for joint in load_robot(name).joints)
+]
+"""The arms of the catalogue whose joints follow no other."""
+
+
+def exponential(direction: FloatArray, point: FloatArray, revolute: bool, q: float) -> FloatArray:
+    """Return exp(xi q) of a screw by the series of its 4x4 matrix."""
+    twist = np.zeros((4, 4))
+    if revolute:
+        x, y, z = direction
+        twist[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+        twist[:3, 3] = -np.cross(direction, point)
+    else:
+        twist[:3, 3] = direction
+    term, total = np.eye(4), np.eye(4)
+    for k in range(1, 40):
+        term = term @ twist * (q / k)
+        total = total + term
+    return total
+
+
+def product_of_exponentials(arm: Screws, q: FloatArray) -> FloatArray:
+    """Return T(q) = exp(xi_1 q_1) ... exp(xi_n q_n) T(0), shape (4, 4)."""
+    pose = np.eye(4)
+    for each in zip(arm.direction, arm.point, arm.revolute, q.tolist(), strict=True):
+        pose = pose @ exponential(*each)
+    zero = np.eye(4)
+    zero[:3, :3], zero[:3, 3] = arm.rotation, arm.position
+    return pose @ zero
+
+
+def assert_kinematics(chain: Chain, arm: Screws) -> None:
+    """Hold the product of exponentials against forward kinematics."""
+    q = np.random.default_rng(8).uniform(-2.0, 2.0, (3, len(chain.coordinates)))
+    for row, position, rotation in zip(q, *poses_over_log(chain, q), strict=True):
+        pose = product_of_exponentials(arm, row)
+        np.testing.assert_allclose(pose[:3, 3], position, rtol=0.0, atol=AGREES)
+        np.testing.assert_allclose(pose[:3, :3], rotation, rtol=0.0, atol=AGREES)
+
+
+@pytest.mark.parametrize("robot", LED_BY_NONE)
+def test_the_product_of_exponentials_is_the_tip(robot: str) -> None:
+    chain = load_robot(robot).placed(
+        from_offset((0.1, -0.2, 0.3, 0.4, 0.5, 0.6)), from_offset((0.0, 0.1, 0.15))
+    )
+    arm = there(chain_to_screws(chain))
+    assert_kinematics(chain, arm)
+
+
+@settings(max_examples=20, deadline=None)
+@given(data=st.data())
+def test_so_it_is_of_any_chain_without_mimics_and_of_the_chain_made_of_its_screws(
+    chains: SearchStrategy[Chain], data: st.DataObject
+) -> None:
+    chain = data.draw(chains)
+    chain = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints), start=())
+    arm = there(chain_to_screws(chain))
+    assert_kinematics(chain, arm)
+    assert_kinematics(screws_to_chain(arm, chain.coordinates), arm)
+
+
+def test_the_size_is_the_way_from_axis_to_axis_to_the_tip_and_never_0() -> None:
+    arm = chain_to_screws(
+        Chain("l", (Joint("a"), Joint("b", origin=translation(0.3, 0.0, 0.4))), translation(0, 2, 0))
+    )
+    assert there(arm).size == 2.5
+    point = there(chain_to_screws(Chain("point", (Joint("a"),))))
+    assert point.size == 1.0
