@@ -417,7 +417,7 @@ def solve_ldl(matrix: Sequence[Sequence[Element]], right: Sequence[Element]) -> 
         matrix: The rows of M, in any units.
         right: b.
     """
-    lower, pivots = factor_ldl(matrix)
+    lower, pivots = _factor_ldl(matrix)
     x: list[Element] = list(right)
     for i in range(len(x)):
         for k in range(i):
@@ -429,7 +429,7 @@ def solve_ldl(matrix: Sequence[Sequence[Element]], right: Sequence[Element]) -> 
     return x
 
 
-def factor_ldl(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]], list[Element]]:
+def _factor_ldl(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]], list[Element]]:
     """Return L below its diagonal of ones, and the pivots D, of a symmetric M = L D L^T."""
     lower: list[list[Element]] = []
     pivots: list[Element] = []
@@ -484,7 +484,7 @@ def _joints_without_inertia(chain: Chain, q: Sequence[FloatArray]) -> Iterator[s
     kept: list[int] = []
     for i, name in enumerate(chain.coordinates):
         indices = [*kept, i]
-        *_, pivot = factor_ldl([[matrix[row][column] for column in indices] for row in indices])[1]
+        *_, pivot = _factor_ldl([[matrix[row][column] for column in indices] for row in indices])[1]
         if np.max(pivot - NEGLIGIBLE_PIVOT * scales[i]) <= 0.0:
             yield name
         else:

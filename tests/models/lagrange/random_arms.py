@@ -31,11 +31,8 @@ def random_arm(rng: np.random.Generator, coordinates: int) -> Chain:
         joints.append(Joint(f"f{k + 1}", "fixed", *_frame(rng)))
         if rng.random() < 0.5:
             mimic = Mimic(f"q{k + 1}", float(rng.choice([-1.0, 0.5, 2.0])), float(rng.normal()))
-            joints.append(
-                Joint(
-                    f"m{k + 1}", "revolute" if rng.random() < 0.7 else "prismatic", *_frame(rng), mimic=mimic
-                )
-            )
+            follower: JointKind = "revolute" if rng.random() < 0.7 else "prismatic"
+            joints.append(Joint(f"m{k + 1}", follower, *_frame(rng), mimic=mimic))
     inertials += [body(one.name, rng) for one in joints]
     frames = [_frame(rng)[0] for _ in range(3)]
     gravity = tuple(rng.normal(0.0, 9.0, 3).tolist())
@@ -54,11 +51,8 @@ def _frame(rng: np.random.Generator) -> tuple[Transform, tuple[float, float, flo
     """Return a frame and an axis: along one of its own axes or not, its neighbours' or not."""
     quarters = (rng.integers(0, 4, 3) * math.pi / 2).tolist()
     turn = rng.uniform(-3.0, 3.0, 3).tolist() if rng.random() < 0.4 else quarters
-    axis = (
-        rng.normal(0.0, 1.0, 3)
-        if rng.random() < 0.2
-        else np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
-    )
+    skew = rng.random() < 0.2
+    axis = rng.normal(0.0, 1.0, 3) if skew else np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
     x, y, z = (axis / np.linalg.norm(axis)).tolist()
     return from_xyz_rpy(rng.uniform(-0.5, 0.5, 3).tolist(), turn, "random"), (x, y, z)
 
@@ -69,19 +63,11 @@ def compiled(code: str, folder: Path) -> ctypes.CDLL:
     source.write_text(code, encoding="utf-8")
     library = source.with_suffix(".so")
     flags = [
-        "-std=c99",
-        "-O1",
-        "-Wall",
-        "-Wextra",
-        "-Wno-unused-parameter",
-        "-Werror",
-        "-pedantic",
-        "-shared",
+        "-std=c99", "-O1", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror", "-pedantic", "-shared",
         "-fPIC",
-    ]
-    done = subprocess.run(
-        ["cc", *flags, str(source), "-o", str(library), "-lm"], capture_output=True, text=True, check=False
-    )
+    ]  # fmt: skip
+    command = ["cc", *flags, str(source), "-o", str(library), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     return ctypes.CDLL(str(library))
 
@@ -91,10 +77,7 @@ def c_terms(
 ) -> dict[str, FloatArray]:
     """Return each term of each coordinate, and the sum as `torque`, as compiled C computes them."""
     given = dict(zip(("q", "qd", "qdd"), motion, strict=True)) | {"force": np.asarray(wrench)}
-    arguments: dict[str, tuple[str, ...]] = {
-        **{str(term): names for term, names in ARGUMENTS.items()},
-        "torque": tuple(given),
-    }
+    arguments: dict[str, tuple[str, ...]] = {**ARGUMENTS, "torque": tuple(given)}
     pointer = ctypes.POINTER(ctypes.c_double)
     found = {}
     for term, names in arguments.items():
@@ -117,9 +100,7 @@ def text_terms(text: str) -> Callable[[Motion, Sequence[float]], dict[str, Float
         """Return the terms."""
         names: dict[str, Any] = {"cos": math.cos, "sin": math.sin}
         for mark, values in zip(("", "_d", "_dd"), motion, strict=True):
-            names |= {
-                f"{name}{mark}": value for name, value in zip(coordinates, values.tolist(), strict=True)
-            }
+            names |= dict(zip((f"{name}{mark}" for name in coordinates), values.tolist(), strict=True))
         names |= dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), wrench, strict=True))
         for cosine, c, sine, s in angles:
             names |= {cosine: eval(c, names), sine: eval(s, names)}

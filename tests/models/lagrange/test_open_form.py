@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import refusal
 from random_arms import Motion, c_terms, compiled, random_arm, random_motion, text_terms
 from urmpipe_models.arm.chain import Chain, Inertial, Joint, Mimic
 from urmpipe_models.dynamics.equations import inverse_dynamics, mass_matrix, torque_terms
@@ -132,39 +133,36 @@ def arm(count: int = 1) -> Chain:
     return Chain("arm", joints, inertials=(Inertial(f"theta{count}", 2.0, (0.5, 0.0, 0.0)),))
 
 
-def test_more_than_four_coordinates_are_refused() -> None:
+TWISTER = tuple(
+    Joint(f"j{k}", axis=[(0, 0, 1.0), (0, 1.0, 0), (1.0, 0, 0)][k % 3], mimic=Mimic("j0", 0.5) if k else None)
+    for k in range(11)
+)
+
+
+@pytest.mark.parametrize(
+    ("chain", "message"),
+    [
+        (arm(5), "robot arm: found 5 coordinates, allowed: up to 4 in the open form"),
+        (
+            Chain("twister", TWISTER, inertials=(Inertial("j10", 1.0, (0.1, 0.2, 0.3)),)),
+            "robot twister: found 1 coordinates and 10 turns about axes that are not parallel to the one"
+            " before, allowed: up to 9 of both in the open form",
+        ),
+        (
+            replace(arm(), inertials=()),
+            "robot arm: key inertials: found none, allowed: the masses of the arm (in a URDF <inertial>)",
+        ),
+    ],
+)
+def test_arms_without_masses_and_too_large_ones_are_refused(chain: Chain, message: str) -> None:
     open_form(arm(4), ("gravity",))
-    with pytest.raises(RobotError) as error:
-        open_form(arm(5))
-    assert str(error.value) == "robot arm: found 5 coordinates, allowed: up to 4 in the open form"
-
-
-def test_too_many_turns_are_refused_those_of_followers_too() -> None:
-    axes = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
-    joints = tuple(Joint(f"j{k}", axis=axes[k % 3], mimic=Mimic("j0", 0.5) if k else None) for k in range(11))
-    with pytest.raises(RobotError) as error:
-        open_form(Chain("twister", joints, inertials=(Inertial("j10", 1.0, (0.1, 0.2, 0.3)),)))
-    assert str(error.value) == (
-        "robot twister: found 1 coordinates and 10 turns about axes that are not parallel to the one before,"
-        " allowed: up to 9 of both in the open form"
-    )
-
-
-def test_an_arm_without_masses_is_refused() -> None:
-    with pytest.raises(RobotError) as error:
-        open_form(replace(arm(), inertials=()))
-    assert str(error.value) == (
-        "robot arm: key inertials: found none, allowed: the masses of the arm (in a URDF <inertial>)"
-    )
+    assert refusal(RobotError, open_form, chain) == message
 
 
 def test_sympy_missing_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sympy", None)
-    with pytest.raises(OptionError) as error:
-        open_form(arm())
-    assert str(error.value) == (
-        'found equations without sympy, allowed: with sympy: pip install "urmpipe[planning]"'
-    )
+    message = 'found equations without sympy, allowed: with sympy: pip install "urmpipe[planning]"'
+    assert refusal(OptionError, open_form, arm()) == message
 
 
 def test_a_mass_that_stands_still_gives_no_term() -> None:

@@ -80,12 +80,8 @@ def test_slopes_are_those_of_the_joint_values(case: str) -> None:
         found = joints.at(s)
         inner = np.flatnonzero(np.abs(s[:, None] - path.bounds).min(axis=1) > 1e-9)
         first, second = differences(found.q, s, inner), differences(found.dq, s, inner)
-        errors.append(
-            [
-                np.abs(first - found.dq[inner]).max(),
-                np.abs(second - found.ddq[inner]).max() * path.radius.min(),
-            ]
-        )
+        bend = np.abs(second - found.ddq[inner]).max() * path.radius.min()
+        errors.append([np.abs(first - found.dq[inner]).max(), bend])
     if case == "poses":
         assert (np.array(errors[1]) < 0.26 * np.array(errors[0])).all()
     assert (np.array(errors[1]) < (2e-3 if case == "poses" else 1.5e-2)).all()
@@ -93,12 +89,15 @@ def test_slopes_are_those_of_the_joint_values(case: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_joints_are_those_of_the_grid_and_go_on_between_its_places(case: str) -> None:
+def test_joints_are_those_of_the_grid_go_on_between_its_places_and_are_on_the_path(case: str) -> None:
     joints = joints_of(case)
     np.testing.assert_allclose(joints.at(joints.s).q, joints.grid.q, atol=1e-9)  # what it is followed to
     h = 1e-9
     steps = np.abs(joints.at(joints.s[1:-1] + h).q - joints.at(joints.s[1:-1] - h).q)
     assert steps.max() < 2.0 * h * np.abs(joints.after.dq).max() * 1.1 + 1e-11
+    s = np.linspace(0.0, joints.path.total, 300)
+    off, _ = pose_errors(joints.chain, joints.at(s).q, targets_at(joints.path, s))
+    assert np.linalg.norm(off, axis=1).max() < 1e-14
 
 
 def differences(values: FloatArray, s: FloatArray, at: IndexArray) -> FloatArray:
@@ -123,15 +122,6 @@ def test_slopes_move_the_tool_along_its_path(case: str) -> None:
     allowed = 10.0 * h**3 / path.radius.min() ** 2  # the third derivative of an arc is 1 / r^2
     assert np.abs(miss).max() < allowed
     assert np.abs(turn).max() < allowed
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
-def test_polished_joints_are_on_the_path(case: str) -> None:
-    joints = joints_of(case)
-    path, s = joints.path, np.linspace(0.0, joints.path.total, 300)
-    found = joints.at(s)
-    assert np.linalg.norm(pose_errors(joints.chain, found.q, targets_at(path, s))[0], axis=1).max() < 1e-14
 
 
 class Sampled:
@@ -189,9 +179,8 @@ def test_the_law_of_limits_is_as_fast_as_toppra(case: str, way: str, limits: tup
         joints = joints_along(joints.chain, rows_to_path(PathRows(path.points(path.stops).position + ends)))
     law = joint_limited_law(joints)
     s = np.append([phase.s for phase in law.phases], joints.path.total)
-    wanted = by_toppra(
-        joints, s, DiscretizationType.Interpolation if way == "line" else DiscretizationType.Collocation
-    )
+    scheme = DiscretizationType.Interpolation if way == "line" else DiscretizationType.Collocation
+    wanted = by_toppra(joints, s, scheme)
     assert 0.999 * wanted <= law.duration <= 1.01 * wanted
 
 
@@ -224,9 +213,8 @@ def test_speed_and_acceleration_of_the_tool_hold_too() -> None:
     found = law.at(np.linspace(0.0, law.duration, 5000))
     assert found.v.max() <= 0.2 * (1.0 + 1e-9)
     assert np.abs(found.a).max() <= 1.0 + 1e-9
-    assert law.duration == pytest.approx(
-        CASES["poses"][1].total / 0.2 + 0.2 / 1.0, rel=1e-3
-    )  # the joints hardly matter
+    alone = CASES["poses"][1].total / 0.2 + 0.2 / 1.0
+    assert law.duration == pytest.approx(alone, rel=1e-3)  # the joints hardly matter
 
 
 def test_it_rests_at_stops_and_where_the_turn_changes_its_rate() -> None:
@@ -271,41 +259,29 @@ def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
     wanted = max(np.abs(rates).max() / 1.0, np.sqrt(np.abs(accelerations).max() / 2.0))
     usage = max_limit_utilisation(joints, law)
     assert usage.share == pytest.approx(wanted, rel=1e-3)  # the square of a fortieth of an arc, and its half
-    assert usage.share == pytest.approx(
-        max_limit_utilisation(joints, law.scaled(0.5)).share / 0.5, rel=1e-6
-    )  # in proportion
-
-
-@cache
-def narrow_panda() -> tuple[PathJoints, TimeLaw]:
-    """Return the joints of panda at positions, its third one from -0.02 to 0.02 rad, and their law."""
-    chain = load_robot("panda")
-    joints = [replace(one, acceleration=10.0) for one in chain.joints]
-    joints[2] = replace(joints[2], lower=-0.02, upper=0.02)
-    found = joints_along(replace(chain, joints=tuple(joints)), square(0.3, 0.4, turned=False))
-    return found, joint_limited_law(found)
+    half = max_limit_utilisation(joints, law.scaled(0.5)).share
+    assert usage.share == pytest.approx(half / 0.5, rel=1e-6)  # in proportion
 
 
 @pytest.mark.slow
 def test_a_joint_that_comes_to_its_limit_makes_the_others_step() -> None:
-    """While the third joint rests on a limit the others move otherwise."""
-    joints, law = narrow_panda()
+    """While the third joint of panda rests on a limit, of 0.02 rad, the others move otherwise.
+
+    The law of limits rests there: by differences no joint accelerates more than it may.
+    """
+    chain = load_robot("panda")
+    moving = [replace(one, acceleration=10.0) for one in chain.joints]
+    moving[2] = replace(moving[2], lower=-0.02, upper=0.02)
+    joints = joints_along(replace(chain, joints=tuple(moving)), square(0.3, 0.4, turned=False))
+    law = joint_limited_law(joints)
     assert joints.reached
     assert len(joints.rate_steps) > 0
-    q = joints.at(np.linspace(0.0, joints.path.total, 3000)).q[:, 2]
-    assert np.abs(q).max() <= 0.02
+    assert np.abs(joints.at(np.linspace(0.0, joints.path.total, 3000)).q[:, 2]).max() <= 0.02
     at = joints.grid.q[joints.rate_steps, 2]
     np.testing.assert_allclose(np.abs(at), 0.02, atol=1e-11)
     np.testing.assert_allclose(law.at(law.time_at(joints.s[joints.rate_steps])).v, 0.0, atol=1e-6)
-    assert not len(joints_along(load_robot("panda"), joints.path).rate_steps)
-
-
-@pytest.mark.slow
-def test_the_contact_with_a_limit_is_found() -> None:
-    """The law of limits rests there: by differences no joint accelerates more than it may."""
-    joints, law = narrow_panda()
-    t = np.arange(0.0, law.duration, 0.001)
-    q = joints.at(law.at(t).s).q
+    assert not len(joints_along(chain, joints.path).rate_steps)
+    q = joints.at(law.at(np.arange(0.0, law.duration, 0.001)).s).q
     assert np.abs(np.diff(q, n=2, axis=0)).max() / 0.001**2 < 1.01 * 10.0  # differences over phases that meet
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +12,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ruckig import InputParameter, Ruckig, Trajectory
 
+from asserting import refusal
 from random_paths import corner_rows
-from test_line_arc import CONTOUR
+from test_path import CONTOUR
 from urmpipe_models.drives import trapezoid
 from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import OptionError
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.laws import (
     ARCS,
@@ -97,9 +100,9 @@ def test_the_contour_by_ruckig_without_a_limit_of_jerk() -> None:
 
 @pytest.mark.slow
 @some
-@given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
-def test_a_law_runs_the_whole_path_from_rest_to_rest(
-    rows: PathRows, v: float, a: float, j: float | None, held: Arcs
+@given(corner_rows(), speeds, rises, st.none() | jerks, arcs, places)
+def test_a_law_runs_the_whole_path_from_rest_to_rest_and_times_of_places_lead_back(
+    rows: PathRows, v: float, a: float, j: float | None, held: Arcs, shares: list[float]
 ) -> None:
     path = rows_to_path(rows)
     law = made(path, v, a, j, held)
@@ -109,6 +112,8 @@ def test_a_law_runs_the_whole_path_from_rest_to_rest(
     np.testing.assert_allclose(ends.v, 0.0, atol=1e-6)
     at_stops = law.at(law.time_at(path.stops))
     np.testing.assert_allclose(at_stops.v, 0.0, atol=1e-3)  # a stop is met to 1e-8 m: sqrt(2 a 1e-8)
+    s = path.total * np.array(shares)
+    np.testing.assert_allclose(law.at(law.time_at(s)).s, s, atol=1e-8)
 
 
 @pytest.mark.slow
@@ -190,18 +195,6 @@ def test_a_slower_law_is_the_same_in_slower_time(
     np.testing.assert_allclose(other.a[away], factor**2 * one.a[away], atol=1e-6)
 
 
-@pytest.mark.slow
-@some
-@given(corner_rows(), speeds, rises, st.none() | jerks, arcs, places)
-def test_times_of_places_lead_back(
-    rows: PathRows, v: float, a: float, j: float | None, held: Arcs, shares: list[float]
-) -> None:
-    path = rows_to_path(rows)
-    law = made(path, v, a, j, held)
-    s = path.total * np.array(shares)
-    np.testing.assert_allclose(law.at(law.time_at(s)).s, s, atol=1e-8)
-
-
 def test_the_pieces_that_no_speed_can_be_constant_on() -> None:
     """A path of arcs alone, from rest to rest: the swing is the fastest law, the law of jerk a slower one."""
     rows = PathRows(np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [1, 1, 0.0]]), 0.5, corner=True)
@@ -214,17 +207,9 @@ def test_the_pieces_that_no_speed_can_be_constant_on() -> None:
 
 
 def test_ruckig_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
-
-    from urmpipe_models.errors import OptionError
-
     monkeypatch.setitem(sys.modules, "ruckig", None)
-    with pytest.raises(OptionError) as raised:
-        jerk_law(contour(), 0.5, 6.0, 60.0, "tangential")
-    assert (
-        str(raised.value)
-        == "law: found jerk without ruckig, allowed: with ruckig: pip install urmpipe[planning]"
-    )
+    message = "law: found jerk without ruckig, allowed: with ruckig: pip install urmpipe[planning]"
+    assert refusal(OptionError, jerk_law, contour(), 0.5, 6.0, 60.0, "tangential") == message
 
 
 def values(law: TimeLaw) -> FloatArray:
