@@ -348,7 +348,7 @@ def solve_recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
     product of its matrices and the sum of its offsets. Only the sections are evaluated one after the other.
 
     Args:
-        matrices: M_k [-], shape (w, m, m), of row_norms of at most about 1: products of them stay small.
+        matrices: M_k [-], shape (w, m, m), of norms of at most about 1: products of them stay small.
         offsets: a_k in any unit, which is that of c_k, shape (w, m).
     """
     count, size = offsets.shape

@@ -1,7 +1,8 @@
+"""Limits of joints, and their whole turns."""
+
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,15 +12,14 @@ from hypothesis import strategies as st
 from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
 from urmpipe_models.ik.limits import (
     LIMIT_ROUNDING,
+    TURN,
     joint_periods,
     limit_solutions,
     shift_towards_limits,
+    unwrap_within_limits,
     wrap_continuous_joints,
 )
 from urmpipe_models.ik.solutions import SingularPoses, Solutions
-from urmpipe_models.robots.catalogue import load_robot
-
-TURN = 2.0 * math.pi
 
 
 def arm(*joints: Joint) -> Chain:
@@ -136,16 +136,6 @@ def test_of_all_turns_within_the_limits_the_nearest_is_taken(
         assert not found.reached.any() or np.abs(turns - found.q[0, 0, 0]).min() < 1e-10
 
 
-def test_limits_of_a_catalogue_arm_take_part() -> None:
-    chain = load_robot("ur5e")
-    tight = replace(chain, joints=tuple(replace(one, lower=-3.0, upper=3.0) for one in chain.joints))
-    raw = one_solution(3.1, 0.0, 0.0, 0.0, 0.0, 0.0)
-    assert limit_solutions(chain, raw).reached.all()
-    assert (
-        limit_solutions(tight, raw).reason(0) == "joint shoulder_pan_joint at 3.1 rad, allowed: -3 to 3 rad"
-    )
-
-
 def test_within_pi_takes_turns_off_joints_without_end_alone_and_minus_pi_is_pi() -> None:
     period = np.array([TURN, np.inf, TURN, TURN])
     q = np.array([[-np.pi, -4.0, 3.5, np.pi], [np.pi, 9.0, -3.5, 7.0]])
@@ -154,3 +144,18 @@ def test_within_pi_takes_turns_off_joints_without_end_alone_and_minus_pi_is_pi()
         np.array([[np.pi, -4.0, 3.5 - TURN, np.pi], [np.pi, 9.0, TURN - 3.5, 7.0 - TURN]]), abs=1e-15
     )
     assert np.array_equal(wrap_continuous_joints(q[:, None], period), found[:, None])
+
+
+def test_each_sample_is_in_the_turn_nearest_to_the_one_before_it_that_there_is() -> None:
+    chain = Chain(
+        "arm", (Joint("free"), Joint("limited", lower=-4.0, upper=4.0), Joint("slide", "prismatic"))
+    )
+    way = np.array([[2.0, 3.0, 9.0], [4.0, 3.5, 9.0], [6.0, 3.9, 0.0], [8.0, 3.9, 0.0], [10.0, 3.9, 0.0]])
+    q = way - TURN * np.round(way / TURN) * [1.0, 1.0, 0.0]
+    q[3] = np.nan
+    found = unwrap_within_limits(chain, q, np.array([2.5 - TURN, 3.0, 0.0]))
+    expected = way - np.array([TURN, 0.0, 0.0])
+    expected[3] = np.nan
+    expected[4, 0] -= TURN  # 4 rad after 6 are nearer by the other way: 2.28 back
+    np.testing.assert_allclose(found, expected, rtol=0, atol=4e-15)
+    assert np.isnan(q[3]).all() and not np.shares_memory(found, q)

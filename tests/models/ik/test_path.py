@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from ik_arms import limited, times
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
+from urmpipe_models.ik.limits import joint_limits
 from urmpipe_models.ik.path import find_jumps, solve_path
 from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets
 from urmpipe_models.ik.solve import solve
@@ -22,26 +22,11 @@ from urmpipe_models.robots.catalogue import load_robot
 ROUNDING = 1e-9
 """rad: what a closed form's 1e-12 become where the Jacobian's least singular value is 1e-3."""
 
-PERIOD = 5_000_000
-"""5 ms in ns."""
-
 UR = np.array([0.3, -1.2, 1.4, -0.8, 1.2, 0.3])
 """A pose in rad of a UR arm, its elbow and wrist bent."""
 
 BENT = np.array([0.3, 0.4, -0.5, 0.7, -0.4, 0.2])
 """One of an arm with a spherical wrist."""
-
-
-def times(count: int) -> NDArray[np.int64]:
-    return PERIOD * np.arange(count, dtype=np.int64)
-
-
-def limited(chain: Chain, joint: int, lower: float, upper: float) -> Chain:
-    """The same arm with other limits of one joint, in rad."""
-    joints = list(chain.joints)
-    place = chain.joints.index(chain.moving[joint])
-    joints[place] = replace(joints[place], lower=lower, upper=upper)
-    return replace(chain, joints=tuple(joints))
 
 
 def line(first: FloatArray, last: FloatArray, count: int) -> FloatArray:
@@ -119,14 +104,15 @@ def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, rob
     rng = np.random.default_rng(seed)
     arm = load_robot(robot)
     for joint in range(6):
-        arm = limited(arm, joint, *sorted(rng.uniform([-9.0, 2.0], [-2.0, 9.0])))
+        lower, upper = sorted(rng.uniform([-9.0, 2.0], [-2.0, 9.0]))
+        arm = limited(arm, lower, upper, joint)
     t = np.linspace(0.0, 1.0, 40)[:, None]
     q = rng.uniform(-2.0, 2.0, 6) + rng.uniform(-2.0, 2.0, 6) * t
     targets = forward_targets(arm, q)
     path = solve_path(arm, targets, times(40), start=q[0])
     every = solve(arm, targets, every=True)
     turns = 2.0 * math.pi * np.arange(-4.0, 5.0)
-    lower, upper = (np.array([getattr(one, side) for one in arm.moving]) for side in ("lower", "upper"))
+    lower, upper = joint_limits(arm)
     last = q[0]
     gaps = np.flatnonzero(~every.reached.any(axis=1))
     for k, solutions in enumerate(every.q[: gaps[0] if len(gaps) else None]):
@@ -179,7 +165,7 @@ def test_after_a_gap_the_branch_of_before_goes_on_though_another_is_nearer() -> 
 
 
 def test_another_branch_after_a_gap_is_told_as_a_jump() -> None:
-    arm = limited(load_robot("ur5e"), 0, -2.0, 2.0)
+    arm = limited(load_robot("ur5e"), -2.0, 2.0, 0)
     q, targets = moved_over_a_gap([2.5, 0.0, 0.0, 0.0, 0.0, 0.0])
     path = solve_path(arm, targets, times(40), start=q[0])
     (jump,) = path.jumps
@@ -240,7 +226,7 @@ def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
 
 def test_a_branch_that_ends_is_left_by_a_jump_that_is_told() -> None:
     free = load_robot("ur5e")
-    arm = limited(free, 0, -3.0, 3.0)
+    arm = limited(free, -3.0, 3.0, 0)
     q = line(
         UR + np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]), UR + np.array([3.2, 0.0, 0.0, 0.0, 0.0, 0.0]), 121
     )
@@ -267,7 +253,7 @@ def test_a_branch_that_ends_is_left_by_a_jump_that_is_told() -> None:
 
 
 def test_a_joint_at_the_end_of_its_turns_starts_anew_and_that_is_told() -> None:
-    arm = limited(limited(load_robot("ur5e"), 0, -1.0, 1.0), 4, 0.1, 3.0)  # no other branch within limits
+    arm = limited(limited(load_robot("ur5e"), -1.0, 1.0, 0), 0.1, 3.0, 4)  # no other branch within limits
     upper = arm.moving[5].upper
     q = line(UR, UR + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4]), 81)
     q[:, 5] += upper - 0.5

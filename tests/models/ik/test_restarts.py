@@ -1,4 +1,4 @@
-"""Several starts: what is solved, how many solutions there are, and why there are none."""
+"""Several starts: which targets are solved, how many solutions there are, and why there are none."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from asserting import there
+from ik_arms import by_shorter_way, joints_within, limited, planar
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.ik.closed import closed_form
 from urmpipe_models.ik.limits import joint_limits, limit_solutions
@@ -34,12 +35,6 @@ MET = 1.01e-10
 """In [m] and [rad]: what is promised, and the rounding of the peer's rotation vector."""
 
 
-def random_targets(chain: Chain, count: int, seed: int = 6) -> Targets:
-    lower, upper = joint_limits(chain)
-    low, high = np.maximum(lower, -math.pi), np.minimum(upper, math.pi)
-    return forward_targets(chain, np.random.default_rng(seed).uniform(low, high, (count, len(low))))
-
-
 def assert_solved(chain: Chain, targets: Targets, solutions: Solutions) -> None:
     for column in range(solutions.q.shape[1]):
         rows = solutions.reached[:, column] & (solutions.shortfall[:, column] == 0.0)
@@ -48,19 +43,11 @@ def assert_solved(chain: Chain, targets: Targets, solutions: Solutions) -> None:
         assert np.linalg.norm(turn, axis=1).max(initial=0.0) < MET
 
 
-def planar() -> Chain:
-    joints = (Joint("q1"), Joint("q2", origin=translation(0.5, 0.0, 0.0)))
-    return Chain("planar", joints, tip=translation(0.4, 0.0, 0.0))
-
-
-# --- what is solved ----------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["urm6", "panda", "ur5e"])
 def test_random_reachable_poses_are_solved(robot: str) -> None:
     chain = load_robot(robot)
-    targets = random_targets(chain, 20)
+    targets = forward_targets(chain, joints_within(chain, 20, 6))
     solutions = solve_iteratively(chain, targets, start=np.zeros(len(chain.coordinates)))
     assert solutions.branches == ("1",)
     assert solutions.reached.all()
@@ -73,7 +60,7 @@ def test_random_reachable_poses_are_solved(robot: str) -> None:
 def test_random_poses_of_urm6_take_no_more_restarts_than_promised() -> None:
     """995 of 1000 within 20 restarts, all within 200; the poses and the starts are uniformly random."""
     chain = load_robot("urm6")
-    targets = random_targets(chain, 1000, seed=2021)
+    targets = forward_targets(chain, joints_within(chain, 1000, 2021))
     start = np.random.default_rng(9).uniform(-math.pi, math.pi, (1000, 6))
     few = solve_iteratively(chain, targets, start=start, search=SearchOptions(restarts=20))
     print(f"within 20 restarts: {few.reached.sum()} of 1000")
@@ -105,7 +92,7 @@ def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
 def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken() -> None:
     """Attempts come one, two, four, ... at a time; here each is made alone."""
     chain = load_robot("urm6")
-    targets, start = random_targets(chain, 40), np.array(chain.start)
+    targets, start = forward_targets(chain, joints_within(chain, 40, 6)), np.array(chain.start)
     found = solve_iteratively(chain, targets).q[:, 0]
     restarts, others = random_starts(chain, 7, 0), 0
     for row in np.flatnonzero(~refine(chain, targets, start).converged):
@@ -114,20 +101,17 @@ def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken
         for some in (slice(0, 1), slice(1, 3), slice(3, 7)):
             if refined.converged[some].any():
                 q = refined.q[some][refined.converged[some]]
-                away = np.square(np.remainder(q - start + math.pi, 2 * math.pi) - math.pi).sum(axis=1)
+                away = np.square(by_shorter_way(q - start)).sum(axis=1)
                 nearest = q[np.argmin(away)]
-                turned = np.remainder(found[row] - nearest + math.pi, 2 * math.pi) - math.pi
+                turned = by_shorter_way(found[row] - nearest)
                 np.testing.assert_allclose(turned, 0.0, atol=1e-9)  # whole turns apart
                 others += int(np.argmin(away) > 0)
                 break
     assert others > 0  # of some the first is not the nearest
 
 
-# --- every solution ----------------------------------------------------------------------------------
-
-
 def test_both_solutions_of_a_planar_arm_are_found_nearest_to_the_start_first() -> None:
-    arm = planar()
+    arm = planar(0.5, 0.4)
     q = np.array([[0.3, 0.8]])
     found = solve_iteratively(arm, Targets(forward_targets(arm, q).position), start=q[0] - 0.1, every=True)
     angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
@@ -137,8 +121,7 @@ def test_both_solutions_of_a_planar_arm_are_found_nearest_to_the_start_first() -
 
 def test_nearest_counts_the_way_that_limits_leave() -> None:
     """From 3.0 rad a joint that ends at +-3.1 gets to -2.9 rad by 5.9 rad, not by 0.38."""
-    arm = planar()
-    arm = replace(arm, joints=tuple(replace(joint, lower=-3.1, upper=3.1) for joint in arm.joints))
+    arm = limited(planar(0.5, 0.4), -3.1, 3.1)
     position = Targets(forward_targets(arm, np.array([[-2.9, 0.8]])).position)
     start = np.array([3.0, 0.8])
     angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
@@ -149,7 +132,7 @@ def test_nearest_counts_the_way_that_limits_leave() -> None:
 def test_every_solution_of_a_closed_form_is_found() -> None:
     """Of the UR5e: as many as the three parallel axes have, the same values."""
     chain = load_robot("ur5e")
-    targets = random_targets(chain, 12)
+    targets = forward_targets(chain, joints_within(chain, 12, 6))
     form = there(closed_form(chain))
     start = np.array(chain.start)
     peer = limit_solutions(chain, form.solve(targets), start)
@@ -159,13 +142,13 @@ def test_every_solution_of_a_closed_form_is_found() -> None:
         theirs = peer.q[row][peer.reached[row]]
         assert len(ours) == len(theirs)
         for q in theirs:
-            away = np.remainder(ours - q + math.pi, 2 * math.pi) - math.pi
+            away = by_shorter_way(ours - q)
             assert np.abs(away).max(axis=1).min() < 1e-6  # a miss of 1e-10, conditions up to 1e4
 
 
 def test_every_solution_is_distinct_ordered_and_met() -> None:
     chain = load_robot("urm6")
-    targets = random_targets(chain, 30)
+    targets = forward_targets(chain, joints_within(chain, 30, 6))
     start = np.array(chain.start)
     found = solve_iteratively(chain, targets, every=True)
     assert_solved(chain, targets, found)
@@ -179,20 +162,17 @@ def test_every_solution_is_distinct_ordered_and_met() -> None:
         assert np.abs(found.q[row, :count] - start).max() <= math.pi + 1e-9
         for a in range(count):
             for b in range(a):
-                apart = np.remainder(found.q[row, a] - found.q[row, b] + math.pi, 2 * math.pi) - math.pi
+                apart = by_shorter_way(found.q[row, a] - found.q[row, b])
                 assert np.abs(apart).max() > DISTINCT_TOLERANCE
         assert set(found.reasons[row, count:]) <= {"no further solution in 20 restarts"}
         assert set(found.reasons[row, :count]) == {""}
-
-
-# --- the same again ----------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["urm6", "urm8"])
 def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: str) -> None:
     chain = load_robot(robot)
-    targets = random_targets(chain, 12)
+    targets = forward_targets(chain, joints_within(chain, 12, 6))
     first, again = (
         solve_iteratively(chain, targets, every=True, search=SearchOptions(restarts=6, seed=4))
         for _ in range(2)
@@ -205,7 +185,7 @@ def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: s
 @pytest.mark.parametrize("every", [False, True])
 def test_what_is_found_for_a_target_does_not_depend_on_the_others(every: bool) -> None:
     chain = load_robot("urm6")
-    targets = random_targets(chain, 15)
+    targets = forward_targets(chain, joints_within(chain, 15, 6))
     together = solve_iteratively(chain, targets, every=every, search=SearchOptions(restarts=8))
     for row in (14, 3):
         alone = solve_iteratively(
@@ -230,11 +210,8 @@ def test_random_starts_lie_within_limits() -> None:
         assert high >= column.max() > high - 0.01 * (high - low)
 
 
-# --- out of reach ------------------------------------------------------------------------------------
-
-
 def test_a_target_out_of_reach_says_how_near_the_tool_comes() -> None:
-    arm = planar()
+    arm = planar(0.5, 0.4)
     found = solve_iteratively(
         arm, Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]])), search=SearchOptions(restarts=3)
     )
@@ -267,7 +244,7 @@ def test_of_all_attempts_the_one_that_came_nearest_counts(every: bool) -> None:
 
 
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
-    arm = planar()
+    arm = planar(0.5, 0.4)
     targets = Targets(np.array([[0.903, 0.0, 0.0], [0.91, 0.0, 0.0], [0.5, 0.1, 0.0]]))
     found = solve_iteratively(
         arm, targets, start=np.array([0.1, 0.2]), search=SearchOptions(tolerance=0.0035)
@@ -281,7 +258,7 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
 
 def test_a_nearest_pose_that_is_turned_too_far_is_none() -> None:
     """The point is met only with another orientation: the arm in the plane cannot tilt its tool."""
-    arm = planar()
+    arm = planar(0.5, 0.4)
     tilted = forward_targets(arm, np.array([[0.3, 0.8]]))
     c, s = math.cos(0.1), math.sin(0.1)
     tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
@@ -293,7 +270,7 @@ def test_a_nearest_pose_that_is_turned_too_far_is_none() -> None:
 
 def test_a_target_that_is_not_finite_has_a_reason_and_stops_no_other() -> None:
     chain = load_robot("urm6")
-    targets = random_targets(chain, 3)
+    targets = forward_targets(chain, joints_within(chain, 3, 6))
     targets.position[1, 2] = np.inf
     found = solve_iteratively(chain, targets)
     assert found.reached[:, 0].tolist() == [True, False, True]

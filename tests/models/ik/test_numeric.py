@@ -1,4 +1,4 @@
-"""The iterative inverse: what it reaches, what it comes nearest to, and where joints may go meanwhile."""
+"""The iterative inverse from one start: targets met, nearest points, limits, least motion."""
 
 from __future__ import annotations
 
@@ -11,16 +11,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from ik_arms import joints_within, limited, planar
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.ik.limits import joint_limits
-from urmpipe_models.ik.numeric import METHODS, Method, refine
+from urmpipe_models.ik.numeric import (
+    AT_LIMIT_TOLERANCE,
+    METHODS,
+    MOTION_TOLERANCE,
+    DescentOptions,
+    Method,
+    minimise_motion,
+    refine,
+)
 from urmpipe_models.ik.solutions import Targets, forward_targets, pose_errors
-from urmpipe_models.ik.task import orientation_length, redundancy, rotation_error
+from urmpipe_models.ik.task import build_task, orientation_length
 from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.kinematics.singularity import characteristic_length
-from urmpipe_models.math3d import from_offset, translation
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
 
 MET = 1e-10
@@ -40,16 +48,8 @@ def test_where_nothing_bends_each_step_is_what_was_foreseen_and_the_next_is_damp
         np.testing.assert_allclose(found.residual, error, rtol=1e-14, atol=1e-15)
 
 
-def within(chain: Chain, count: int, seed: int = 3) -> FloatArray:
-    """Return joint values, uniform within limits and one turn."""
-    lower, upper = joint_limits(chain)
-    low, high = np.maximum(lower, -math.pi), np.minimum(upper, math.pi)
-    return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
-
-
-def beside(chain: Chain, q: FloatArray, noise: float) -> FloatArray:
-    lower, upper = joint_limits(chain)
-    return np.clip(q + np.random.default_rng(5).normal(0.0, noise, q.shape), lower, upper)
+def joints_near(chain: Chain, q: FloatArray, noise: float) -> FloatArray:
+    return np.clip(q + np.random.default_rng(5).normal(0.0, noise, q.shape), *joint_limits(chain))
 
 
 def assert_met(chain: Chain, q: FloatArray, targets: Targets) -> None:
@@ -59,28 +59,14 @@ def assert_met(chain: Chain, q: FloatArray, targets: Targets) -> None:
     np.testing.assert_array_less(np.linalg.norm(turn, axis=1), 1.01 * MET)
 
 
-def planar(*lengths: float) -> Chain:
-    """An arm in the plane, its joints about z."""
-    first = Joint("q1")
-    others = [Joint(f"q{k + 2}", origin=translation(a, 0.0, 0.0)) for k, a in enumerate(lengths[:-1])]
-    return Chain("planar", (first, *others), tip=translation(lengths[-1], 0.0, 0.0))
-
-
-def limited(chain: Chain, lower: float, upper: float) -> Chain:
-    return replace(chain, joints=tuple(replace(one, lower=lower, upper=upper) for one in chain.joints))
-
-
-# --- targets that can be met -------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("robot", ["urm6", "urm8", "ur5e", "panda", "iiwa14", "arm6"])
 @pytest.mark.parametrize("pose", [True, False], ids=["pose", "position"])
 def test_targets_near_the_start_are_met(robot: str, pose: bool) -> None:
     chain = load_robot(robot)
-    q = within(chain, 200)
+    q = joints_within(chain, 200, 3)
     targets = forward_targets(chain, q)
     targets = targets if pose else Targets(targets.position)
-    refined = refine(chain, targets, beside(chain, q, 0.05))
+    refined = refine(chain, targets, joints_near(chain, q, 0.05))
     assert refined.converged.mean() > 0.98  # the others start beyond a singular pose
     assert_met(chain, refined.q[refined.converged], targets.rows(refined.converged))
     lower, upper = joint_limits(chain)
@@ -90,7 +76,7 @@ def test_targets_near_the_start_are_met(robot: str, pose: bool) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_each_method_meets_regular_targets_near_the_start(method: Method) -> None:
     chain = load_robot("urm6")
-    q = within(chain, 300)
+    q = joints_within(chain, 300, 3)
     smallest = np.linalg.svd(jacobian_over_log(chain, q))[1][:, -1]
     q = q[smallest > 0.05]  # damping by 0.05 l slows what moves little
     refined = refine(chain, forward_targets(chain, q), q + 0.01, method=method)
@@ -101,7 +87,7 @@ def test_each_method_meets_regular_targets_near_the_start(method: Method) -> Non
 def test_the_pseudoinverse_and_marquardt_take_quadratic_steps() -> None:
     """From 0.01 rad: 1e-2, 1e-4, 1e-8, 1e-16; damped least squares with its constant is linear."""
     chain = load_robot("urm6")
-    q = within(chain, 300)
+    q = joints_within(chain, 300, 3)
     q = q[np.linalg.svd(jacobian_over_log(chain, q))[1][:, -1] > 0.05]
     steps = {
         name: np.median(refine(chain, forward_targets(chain, q), q + 0.01, method=name).iterations)
@@ -112,18 +98,9 @@ def test_the_pseudoinverse_and_marquardt_take_quadratic_steps() -> None:
     assert steps["dls"] > 2 * steps["pinv"]
 
 
-def test_what_a_radian_counts_as_does_not_depend_on_where_a_description_puts_frames() -> None:
-    chain = load_robot("ur5e")
-    there = Joint("aside", "fixed", translation(0.0, 0.0, 100.0))  # axis 2 of a calibrated arm
-    back = replace(chain.joints[2], origin=translation(0.0, 0.0, -100.0) @ chain.joints[2].origin)
-    other = replace(chain, joints=(*chain.joints[:2], there, back, *chain.joints[3:]), visuals=())
-    assert orientation_length(other) == pytest.approx(orientation_length(chain), rel=1e-12)
-    assert orientation_length(chain) == characteristic_length(chain) / 4.0
-
-
 def test_a_pseudoinverse_step_is_the_moore_penrose_one() -> None:
     chain = load_robot("urm8")
-    q = within(chain, 20)
+    q = joints_within(chain, 20, 3)
     start = q + 1e-3
     targets = forward_targets(chain, q)
     length = orientation_length(chain)
@@ -171,9 +148,6 @@ def test_a_singular_target_is_met_from_beside_and_from_the_singular_pose_it_is_l
     assert from_stretched.converged.all()
 
 
-# --- targets that cannot be met ----------------------------------------------------------------------
-
-
 def test_a_target_beyond_reach_takes_the_nearest_point() -> None:
     arm = planar(0.5, 0.4)
     refined = refine(arm, Targets(np.array([[0.0, 2.0, 0.0], [0.0, 0.6, 0.25]])), np.array([0.4, 0.7]))
@@ -214,7 +188,7 @@ def test_the_nearest_pose_is_that_of_another_solver() -> None:
 
 def test_a_rough_descent_to_a_nearest_point_ends_early_and_not_far_from_it() -> None:
     chain = load_robot("urm6")
-    targets = forward_targets(chain, within(chain, 50))
+    targets = forward_targets(chain, joints_within(chain, 50, 3))
     targets = Targets(targets.position + np.array([0.0, 0.0, 3.0]), targets.rotation)
     fine = refine(chain, targets, np.array(chain.start), iterations=500)
     rough = refine(chain, targets, np.array(chain.start), iterations=500, stationary=1e-2)
@@ -259,12 +233,9 @@ def test_no_step_leads_away_from_the_target() -> None:
         before = now
 
 
-# --- rows beside each other --------------------------------------------------------------------------
-
-
 def test_a_bad_row_stops_no_other() -> None:
     chain = load_robot("urm6")
-    q = within(chain, 3)
+    q = joints_within(chain, 3, 3)
     targets = forward_targets(chain, q)
     alone = refine(chain, targets, q + 0.05)
     targets.position[1] = np.nan
@@ -280,8 +251,8 @@ def test_rows_are_solved_to_the_same_bits_alone_and_in_any_company(
     robot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chain = load_robot(robot)
-    q = within(chain, 40)
-    targets, start = forward_targets(chain, q), beside(chain, q, 0.4)
+    q = joints_within(chain, 40, 3)
+    targets, start = forward_targets(chain, q), joints_near(chain, q, 0.4)
     whole = refine(chain, targets, start)
     for row in range(0, 40, 7):
         alone = refine(chain, targets.rows(slice(row, row + 1)), start[row])
@@ -301,42 +272,131 @@ def test_wrong_options_are_all_told() -> None:
     ]
 
 
-# --- what the miss is --------------------------------------------------------------------------------
-
-
-@settings(max_examples=50, deadline=None)
-@given(
-    angle=st.floats(0.0, math.pi)
-    | st.sampled_from([0.0, 1e-12, 1e-7, math.pi - 1e-7, math.pi - 1e-12, math.pi]),
-    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1),
-)
-def test_the_turn_between_two_frames_is_scipys_rotation_vector(
-    angle: float, axis: tuple[float, float, float]
-) -> None:
-    from scipy.spatial.transform import Rotation
-
-    vector = angle * np.array(axis) / math.hypot(*axis)
-    pose = from_offset((0.0, 0.0, 0.0, 0.4, -1.1, 2.0))
-    wanted = Rotation.from_rotvec(vector).as_matrix() @ np.array(pose.rotation)
-    found = rotation_error(np.array(pose.columns)[..., None], wanted.T[..., None])[:, 0]
-    np.testing.assert_allclose(np.linalg.norm(found), angle, atol=1e-14 + 1e-15 / max(math.sin(angle), 1e-7))
-    again = Rotation.from_rotvec(found).as_matrix() @ np.array(pose.rotation)
-    np.testing.assert_allclose(again, wanted, atol=3e-8)  # within 1e-6 of half a turn the axis has 8 digits
-    if angle < 3.0:
-        np.testing.assert_allclose(found, vector, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("robot", "pose", "free"),
-    [("urm6", True, 0), ("urm6", False, 3), ("urm8", True, 2), ("panda", True, 1), ("iiwa14", False, 4)],
-)
-def test_the_freedoms_that_a_target_leaves_are_counted(robot: str, pose: bool, free: int) -> None:
+def posed(robot: str, pose: bool, count: int, noise: float) -> tuple[Chain, Targets, FloatArray]:
+    """Return an arm, targets within its reach, and starts beside the joint values that they come from."""
     chain = load_robot(robot)
-    targets = forward_targets(chain, np.zeros((1, len(chain.coordinates))))
-    assert redundancy(chain, targets if pose else Targets(targets.position)) == free
+    rng = np.random.default_rng(8)
+    q = joints_within(chain, count, rng)
+    targets = forward_targets(chain, q)
+    home = np.clip(q + rng.normal(0.0, noise, q.shape), *joint_limits(chain))
+    return chain, targets if pose else Targets(targets.position), home
 
 
-def test_the_freedoms_of_a_planar_arm_are_those_of_the_plane() -> None:
-    arm = planar(0.5, 0.4, 0.3)
-    assert redundancy(arm, forward_targets(arm, np.zeros((1, 3)))) == 0
-    assert redundancy(arm, Targets(np.zeros((1, 3)))) == 1
+def weighted_jacobian(chain: Chain, q: FloatArray, pose: bool) -> FloatArray:
+    J = jacobian_over_log(chain, q)
+    J[:, 3:] *= orientation_length(chain)
+    return J if pose else J[:, :3]
+
+
+def assert_least_motion(chain: Chain, q: FloatArray, home: FloatArray, pose: bool) -> None:
+    """Hold the conditions of Karush, Kuhn and Tucker: home - q is J^T lambda and pulls against limits."""
+    from scipy.optimize import lsq_linear
+
+    lower, upper = joint_limits(chain)
+    for row, J in enumerate(weighted_jacobian(chain, q, pose)):
+        wish = home[row] - q[row]
+        low, high = q[row] <= lower + AT_LIMIT_TOLERANCE, q[row] >= upper - AT_LIMIT_TOLERANCE
+        free = ~(low | high)
+        # the joints that are held pull outwards or not at all: least squares over lambda and those pulls
+        pulls = np.diag(np.where(low, -1.0, 1.0))[:, ~free]
+        bounds = np.r_[np.full(len(J), -np.inf), np.zeros(pulls.shape[1])], np.inf
+        left = lsq_linear(np.hstack([J.T, pulls]), wish, bounds, tol=1e-14)
+        # t is a projection of what is left; released one at a time, each joint may leave LEAST_MOTION
+        assert np.abs(left.fun).max() < 10.0 * MOTION_TOLERANCE, (row, free, left.fun)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robot", "pose"),
+    [("urm8", True), ("urm8", False), ("urm6", False), ("panda", True), ("panda", False), ("iiwa14", True)],
+)
+@pytest.mark.parametrize("noise", [0.1, 0.6])
+def test_a_target_that_leaves_freedoms_is_met_with_least_motion(robot: str, pose: bool, noise: float) -> None:
+    chain, targets, home = posed(robot, pose, 40, noise)
+    refined = refine(chain, targets, home)
+    met = refined.converged
+    assert met.mean() > 0.9
+    assert (refined.slack[met] <= MOTION_TOLERANCE).all()
+    assert_least_motion(chain, refined.q[met], home[met], pose)
+
+
+def test_joints_at_limits_take_part_in_the_rule() -> None:
+    """Some solutions of the panda stand at a limit, others have come off one that they started at."""
+    chain, targets, home = posed("panda", False, 300, 0.6)
+    lower, upper = joint_limits(chain)
+    home[::2, 3] = upper[3]
+    refined = refine(chain, targets, home)
+    at_limit = (refined.q <= lower + AT_LIMIT_TOLERANCE) | (refined.q >= upper - AT_LIMIT_TOLERANCE)
+    assert (at_limit.any(axis=1) & refined.converged).sum() > 20
+    assert ((refined.q[::2, 3] < upper[3] - 0.01) & refined.converged[::2]).sum() > 20
+    assert_least_motion(chain, refined.q[refined.converged], home[refined.converged], False)
+
+
+def test_the_least_motion_of_a_planar_arm_is_that_of_a_search_over_its_freedom() -> None:
+    """Three joints, a position in the plane: one freedom, q1, tried at 20001 values."""
+    arm = planar(0.4, 0.4, 0.4)
+    target, home = np.array([0.5, 0.4, 0.0]), np.array([0.3, 0.4, 0.5])
+    refined = refine(arm, Targets(target[None]), home)
+    q1 = np.linspace(-math.pi, math.pi, 20001)
+    x, y = target[0] - 0.4 * np.cos(q1), target[1] - 0.4 * np.sin(q1)
+    cosine = (x * x + y * y) / (2 * 0.4 * 0.4) - 1.0
+    q3 = np.arccos(np.where(np.abs(cosine) <= 1.0, cosine, np.nan))
+    distances = []
+    for sign in (1.0, -1.0):
+        q2 = np.arctan2(y, x) - sign * q3 / 2 - q1
+        away = np.stack([q1, q2, sign * q3]) - home[:, None]
+        away -= 2 * math.pi * np.round(away / (2 * math.pi))
+        distances.append(np.nanmin(np.square(away).sum(axis=0)))
+    found = np.square(refined.q[0] - home).sum()
+    np.testing.assert_allclose(found, min(distances), atol=1e-6)  # steps of 3e-4: their square
+
+
+@pytest.mark.parametrize(("robot", "pose"), [("urm6", False), ("urm8", True)])
+def test_no_solution_is_left_for_one_that_is_farther_from_home(robot: str, pose: bool) -> None:
+    """Homes anywhere: a step that has overshot may meet the target farther away, turns away even."""
+    chain, targets, home = posed(robot, pose, 200, 2.0)
+    q = posed(robot, pose, 200, 0.0)[2]
+    settings = DescentOptions(*joint_limits(chain))
+    after, _ = minimise_motion(build_task(chain, targets), q.T.copy(), home.T.copy(), settings)
+    before = np.square(q - home).sum(axis=1)
+    assert (np.square(after.T - home).sum(axis=1) <= before + 1e-12).all()  # rounding of a row at rest
+
+
+def test_least_motion_counts_from_home_wherever_the_search_begins() -> None:
+    chain, targets, home = posed("urm8", True, 20, 0.02)
+    direct = refine(chain, targets, home)
+    around = refine(chain, targets, direct.q + 0.02, home=home)
+    assert around.converged.all()
+    # both end within LEAST_MOTION of where the gradient is 0; its slope is about 1
+    np.testing.assert_allclose(around.q, direct.q, atol=100 * MOTION_TOLERANCE)
+
+
+def test_a_whole_turn_is_no_motion_of_a_joint_that_turns_without_end() -> None:
+    chain, targets, home = posed("urm8", True, 10, 0.02)
+    plain, turned = refine(chain, targets, home), refine(chain, targets, home + 2 * math.pi, home=home)
+    np.testing.assert_allclose(turned.q, plain.q, atol=100 * MOTION_TOLERANCE)
+
+
+def test_a_radian_counts_as_a_metre() -> None:
+    """Slides along x and y beside a turn of an arm of 0.5 m: at least motion home - q is J^T lambda.
+
+    The turn moves the tool by 0.5 m a radian square to the arm, a slide by 1 m a metre.
+    """
+    slides = [Joint("x", "prismatic", axis=(1.0, 0.0, 0.0)), Joint("y", "prismatic", axis=(0.0, 1.0, 0.0))]
+    arm = Chain("mixed", (*slides, Joint("turn")), tip=translation(0.5, 0.0, 0.0))
+    found = refine(arm, Targets(np.array([[0.7, 0.4, 0.0]])), np.array([0.0, 0.0, 0.0]))
+    x, y, turn = -found.q[0]
+    assert abs(turn) > 0.05
+    lever = 0.5 * np.array([math.sin(turn), math.cos(turn)])  # of -turn: what turns back by 1 rad moves
+    np.testing.assert_allclose(turn, lever @ [x, y], atol=10 * MOTION_TOLERANCE)
+    both = Chain("slides", (slides[0], replace(slides[0], name="x2")))
+    shared = refine(both, Targets(np.array([[1.0, 0.0, 0.0]])), np.array([0.2, 0.0]))
+    np.testing.assert_allclose(shared.q, [[0.6, 0.4]], atol=MOTION_TOLERANCE)  # 0.8 m shared by halves
+
+
+def test_what_is_left_of_a_miss_does_not_grow_with_the_motion_along_the_null_space() -> None:
+    chain, targets, home = posed("panda", True, 60, 0.8)
+    refined = refine(chain, targets, home)
+    distance, turn = pose_errors(chain, refined.q[refined.converged], targets.rows(refined.converged))
+    assert np.linalg.norm(distance, axis=1).max() <= 1.01e-10
+    assert np.linalg.norm(turn, axis=1).max() <= 1.01e-10

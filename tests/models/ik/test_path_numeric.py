@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from ik_arms import planar, times
 from urmpipe_datasets import LOGS
-from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik import path_numeric as sliding_window
 from urmpipe_models.ik.path import JointPath, solve_path
-from urmpipe_models.ik.path_numeric import LeastMotionPath, SlidingWindow
+from urmpipe_models.ik.path_numeric import (
+    DAMPING,
+    LeastMotionPath,
+    SlidingWindow,
+    find_out_of_reach,
+    max_reach,
+    newton_sweep,
+    solve_recurrence,
+)
 from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
+from urmpipe_models.ik.task import build_task
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import Transform, translation
 from urmpipe_models.robots.catalogue import load_robot
@@ -22,13 +32,6 @@ from urmpipe_models.wraps import repolarize
 
 NANOMETRE = 1e-9
 """What the solver promises: targets are met within it."""
-
-PERIOD = 5_000_000
-"""5 ms in ns."""
-
-
-def times(count: int) -> NDArray[np.int64]:
-    return PERIOD * np.arange(count, dtype=np.int64)
 
 
 @pytest.fixture(scope="module")
@@ -40,13 +43,6 @@ def demo_path() -> FloatArray:
 @pytest.fixture(scope="module")
 def followed(demo_path: FloatArray) -> JointPath:
     return solve_path(load_robot("urm6"), Targets(demo_path), times(len(demo_path)))
-
-
-def planar(count: int, lower: float = -math.inf, upper: float = math.inf) -> Chain:
-    """An arm of links of 1 m in a plane, limits of its first joint in rad."""
-    first = Joint("a1", lower=lower, upper=upper)
-    others = [Joint(f"a{k}", origin=translation(1.0, 0.0, 0.0)) for k in range(2, count + 1)]
-    return Chain("planar", (first, *others), tip=translation(1.0, 0.0, 0.0))
 
 
 def assert_met(path: JointPath, targets: Targets) -> None:
@@ -169,7 +165,7 @@ def test_a_redundant_arm_follows_poses_within_its_limits() -> None:
 
 
 def test_a_joint_is_held_on_its_limit_and_let_go_again() -> None:
-    free, limited = planar(3), planar(3, upper=0.5)
+    free, limited = planar(1.0, 1.0, 1.0), planar(1.0, 1.0, 1.0, upper=0.5)
     start = np.array([0.2, -0.6, 0.3])
     t = np.linspace(0.0, 2.0 * math.pi, 400)
     circle = forward_targets(free, start[None]).position + 0.6 * np.column_stack(
@@ -195,7 +191,7 @@ def test_a_joint_is_held_on_its_limit_and_let_go_again() -> None:
 
 
 def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> None:
-    arm = planar(3)
+    arm = planar(1.0, 1.0, 1.0)
     t = np.linspace(0.0, 1.0, 301)
     reach = 2.5 + 1.2 * np.sin(math.pi * t)
     line = np.column_stack((reach, np.zeros((301, 2))))
@@ -212,7 +208,7 @@ def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> No
 
 
 def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
-    free, arm = planar(2), planar(2, upper=1.0)
+    free, arm = planar(1.0, 1.0), planar(1.0, 1.0, upper=1.0)
     q = np.array([0.9, -1.0]) + np.linspace(0.0, 0.2, 41)[:, None] * np.array([1.0, 0.0])
     targets = Targets(forward_targets(free, q).position)
     targets.position[18:22] *= 2.0
@@ -225,7 +221,7 @@ def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
 
 
 def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
-    arm = planar(3)
+    arm = planar(1.0, 1.0, 1.0)
     reach = 2.9 + 0.102 * np.sin(np.linspace(0.0, math.pi, 101))
     line = np.column_stack((reach, np.zeros((101, 2))))
     path = solve_path(
@@ -256,7 +252,7 @@ def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
 
 
 def test_a_sample_that_is_none_stops_no_other() -> None:
-    arm = planar(3)
+    arm = planar(1.0, 1.0, 1.0)
     line = np.column_stack((np.linspace(2.0, 2.2, 21), np.zeros((21, 2))))
     whole = solve_path(arm, Targets(line), times(21), start=np.array([0.6, -1.0, 0.1]))
     broken = line.copy()
@@ -318,7 +314,7 @@ def test_prismatic_joints_follow_too() -> None:
 
 
 def test_far_apart_samples_are_followed_one_by_one() -> None:
-    arm = planar(3)
+    arm = planar(1.0, 1.0, 1.0)
     angles = np.linspace(0.0, 3.0, 7)
     circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(7)))
     path = solve_path(arm, Targets(circle), times(7), start=np.array([0.8, -0.9, -0.9]))
@@ -329,14 +325,14 @@ def test_far_apart_samples_are_followed_one_by_one() -> None:
 def test_from_a_nearly_singular_start_no_large_correction_is_trusted() -> None:
     start = np.array([0.1, 0.02, 0.0])
     target = Targets(np.array([[0.0, 1.2, 0.0]]))
-    path = solve_path(planar(3), target, times(1), start=start)
+    path = solve_path(planar(1.0, 1.0, 1.0), target, times(1), start=start)
     assert_met(path, target)
     # rad: 2.07 by steps of 0.1; the whole first correction ends 8.03 away, after a turn in vain
     assert np.linalg.norm(path.q[0] - start) < 2.5
 
 
 def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
-    free, limited = planar(3), planar(3, upper=0.5)
+    free, limited = planar(1.0, 1.0, 1.0), planar(1.0, 1.0, 1.0, upper=0.5)
     q = np.array([0.45, -0.6, 0.3]) + np.linspace(0.0, 0.3, 40)[:, None] * np.array([1.0, 0.3, 0.0])
     elsewhere = np.array([-1.8, 0.4, 0.3])  # out of reach with joint 1 at 0.5 rad
     targets = forward_targets(free, np.vstack((q, elsewhere + np.linspace(0.0, 0.02, 20)[:, None])))
@@ -371,7 +367,7 @@ def test_the_share_that_is_done_rises_to_the_whole(robot: str) -> None:
 
 
 def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
-    arm = planar(3)
+    arm = planar(1.0, 1.0, 1.0)
     angles = np.append(np.linspace(0.0, 9.0, 400), [10.5, 12.0])
     circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(402)))
     start = np.array([0.8, -0.9, -0.9])
@@ -382,10 +378,76 @@ def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
 
 
 def test_the_same_seed_gives_the_same_motion_bit_for_bit() -> None:
-    arm = planar(3)
+    arm = planar(1.0, 1.0, 1.0)
     rng = np.random.default_rng(5)
     targets = Targets(np.column_stack((rng.uniform(-2.5, 2.5, (8, 2)), np.zeros(8))))
     one, other = (
         solve_path(arm, targets, times(8), search=SearchOptions(seed=3, restarts=5)) for _ in range(2)
     )
     assert np.array_equal(one.q, other.q, equal_nan=True)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 15, 16, 17, 100, 384])
+def test_a_recurrence_in_sections_is_the_one_in_turn(count: int) -> None:
+    rng = np.random.default_rng(count)
+    J = rng.normal(size=(count, 3, 6))
+    matrices, offsets = np.eye(6) - np.linalg.pinv(J) @ J, rng.normal(size=(count, 6))
+    expected = [np.zeros(6)]
+    for matrix, offset in zip(matrices, offsets, strict=True):
+        expected.append(matrix @ expected[-1] + offset)
+    # projections make nothing longer, so that 384 steps add up 384 roundings of numbers below 100 at most
+    np.testing.assert_allclose(solve_recurrence(matrices, offsets), expected[1:], rtol=0.0, atol=1e-11)
+
+
+def test_a_sweep_solves_the_linearised_path_exactly() -> None:
+    """Each q least in |q - q_{k-1}|^2 + |e_k - J_k (q - p_k)|^2 / lambda^2: normal equations, in turn."""
+    arm = load_robot("urm6")
+    q = np.array([0.3, 2.0, 0.4, 2.5, 0.2, 1.0]) + 0.01 * np.arange(30)[:, None]
+    targets = Targets(forward_targets(arm, q).position)
+    guess = q + 0.002 * np.random.default_rng(1).normal(size=q.shape)
+    held = np.full(6, np.nan)
+    held[2] = guess[0, 2]
+    guess[:, 2] = held[2]
+    swept = newton_sweep(build_task(arm, targets), guess, q[0], held, np.full(30, DAMPING))
+    free = np.isnan(held)
+    J = jacobian_over_log(arm, guess)[:, :3] * free
+    error = targets.position - forward_targets(arm, guess).position
+    last = np.where(free, q[0], held)
+    for k in range(30):
+        A = np.eye(6) + J[k].T @ J[k] / DAMPING
+        b = last - guess[k] + J[k].T @ error[k] / DAMPING
+        last = guess[k] + np.linalg.solve(A, b)
+        # rad: the normal equations lose the digits of 1 / DAMPING
+        np.testing.assert_allclose(swept.q[k], last, rtol=0.0, atol=1e-7)
+        last = swept.q[k]
+    np.testing.assert_allclose(swept.error, np.linalg.norm(error, axis=1), rtol=1e-9)
+
+
+@pytest.mark.parametrize("robot", ["urm6", "panda", "iiwa14", "ur5e", "arm6"])
+def test_no_posture_is_too_far(robot: str) -> None:
+    arm = load_robot(robot).placed(base=translation(5.0, -3.0, 1.0), tool=translation(0.1, 0.0, 0.2))
+    q = np.random.default_rng(0).uniform(-math.pi, math.pi, (5000, len(arm.coordinates)))
+    assert not any(find_out_of_reach(arm, forward_targets(arm, q), None))
+
+
+def test_a_stretched_planar_arm_reaches_the_bound_and_no_farther() -> None:
+    arm = planar(1.0, 0.5)
+    assert max_reach(arm) == 1.5
+    assert forward_targets(arm, np.zeros((1, 2))).position[0, 0] == 1.5
+    away = Targets(np.array([[1.5, 0.0, 0.0], [0.0, 1.502, 0.0], [math.nan, 0.0, 0.0]]))
+    assert find_out_of_reach(arm, away, None) == [
+        "", "the target is 1.502 m from the first joint, allowed: 1.500 m at most", ""
+    ]  # fmt: skip
+    assert find_out_of_reach(arm, away, 0.002) == ["", "", ""]
+
+
+def test_prismatic_joints_add_their_strokes() -> None:
+    slide = Joint("x", "prismatic", lower=-0.7, upper=0.5)
+    arm = Chain("slide", (slide, Joint("a")), tip=translation(0.2, 0.0, 0.0))
+    assert max_reach(arm) == pytest.approx(0.9, abs=1e-15)
+    follower = Joint("y", "prismatic", mimic=Mimic("x", -2.0, 0.1))
+    both = replace(arm, joints=(slide, follower), tip=Transform(), start=())
+    assert max_reach(both) == pytest.approx(0.7 + 1.5, abs=1e-15)
+    endless = replace(arm, joints=(Joint("x", "prismatic"), Joint("a")))
+    assert max_reach(endless) == math.inf
+    assert find_out_of_reach(endless, Targets(np.array([[1e9, 0.0, 0.0]])), None) == [""]

@@ -1,0 +1,178 @@
+"""Small linear systems, and pose and Jacobian of the tool, against LAPACK, the kinematics and SciPy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+from scipy.spatial.transform import Rotation
+
+from ik_arms import planar
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets, forward_targets
+from urmpipe_models.ik.task import (
+    column_squares,
+    dot_product,
+    factor,
+    gram,
+    orientation_length,
+    outer_sum,
+    prepare_chain,
+    product,
+    redundancy,
+    rotation_error,
+    take_rows,
+    tool_motion,
+    transposed_product,
+)
+from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log
+from urmpipe_models.kinematics.singularity import characteristic_length
+from urmpipe_models.math3d import from_offset, translation
+from urmpipe_models.robots.catalogue import load_robot
+
+SIZES = (1, 2, 3, 6, 8)
+
+
+def matrices(k: int, p: int, n: int = 50) -> FloatArray:
+    return np.random.default_rng(k * 10 + p).normal(size=(k, p, n))
+
+
+@pytest.mark.parametrize("k", SIZES)
+def test_a_positive_definite_system_is_solved_as_lapack_solves_it(k: int) -> None:
+    A, b = gram(matrices(k, k + 3)), matrices(k, 1)[:, 0]
+    peer = np.linalg.solve(A.transpose(2, 0, 1), b.T[..., None])[..., 0].T
+    # normal random matrices k x (k + 3) have conditions up to 1e3 squared: 1e-16 * 1e6, with room
+    np.testing.assert_allclose(factor(A).solve(b), peer, rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.parametrize("k", SIZES)
+def test_a_damped_system_is_that_with_the_damping_on_the_diagonal(k: int) -> None:
+    A, b = gram(matrices(k, 2)), matrices(k, 1)[:, 0]
+    damping = np.random.default_rng(1).uniform(0.1, 1.0, (b.shape[1],))
+    damped = A.transpose(2, 0, 1) + damping[:, None, None] * np.eye(k)
+    peer = np.linalg.solve(damped, b.T[..., None])[..., 0].T
+    np.testing.assert_allclose(factor(A, damping).solve(b), peer, rtol=1e-10, atol=1e-12)  # condition < 1e3
+
+
+def test_a_singular_system_has_a_finite_damped_solution() -> None:
+    """Rank 1 of 6, damped by 1e-13 of its trace: rounding alone would make pivots negative."""
+    rows = matrices(6, 1, 2000)
+    A = gram(rows)
+    trace = np.einsum("iin->n", A)
+    least = 1e-18 * trace  # less than the rounding of the pivots
+    assert (factor(A, least).inverse <= 1.0001 / least).all()
+    assert (factor(A, least).inverse > 0.0).all()
+    step = transposed_product(rows, factor(A, 1e-13 * trace).solve(product(rows, np.ones((1, 2000)))))
+    np.testing.assert_allclose(step, 1.0, atol=1e-2)  # rounding 1e-16 beside a damping of 1e-13
+
+
+def test_products_are_those_of_matrices() -> None:
+    M, x, y = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0]
+    each = M.transpose(2, 0, 1)
+    np.testing.assert_allclose(product(M, x), np.einsum("nij,jn->in", each, x), atol=1e-13)
+    np.testing.assert_allclose(transposed_product(M, y), np.einsum("nij,in->jn", each, y), atol=1e-13)
+    np.testing.assert_allclose(gram(M), np.einsum("nij,nkj->ikn", each, each), atol=1e-13)
+    np.testing.assert_allclose(column_squares(M), np.square(each).sum(axis=1).T, atol=1e-13)
+    np.testing.assert_allclose(dot_product(y, y), np.square(y).sum(axis=0), atol=1e-13)
+    other = matrices(6, 2)
+    peer = each.transpose(0, 2, 1) @ other.transpose(2, 0, 1)
+    np.testing.assert_allclose(outer_sum(M, other).transpose(2, 0, 1), peer, atol=1e-13)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7])
+def test_a_system_has_the_same_solution_to_the_last_bit_beside_any_others(n: int) -> None:
+    A, b = gram(matrices(6, 7, 100)), matrices(6, 1, 100)[:, 0]
+    whole, part = factor(A, 0.01).solve(b), factor(A[..., :n], 0.01).solve(b[:, :n])
+    np.testing.assert_array_equal(whole[:, :n], part)
+
+
+@pytest.mark.parametrize("rows", [[5], [5, 6], [9, 2, 40], list(range(31))], ids=len)
+def test_a_sum_has_the_same_bits_beside_any_others_however_its_rows_are_stored(rows: list[int]) -> None:
+    M, x, y = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0]
+    for form, a, b in ((product, M, x), (transposed_product, M, y), (outer_sum, M, M), (dot_product, x, x)):
+        whole = form(a, b)[..., rows]
+        np.testing.assert_array_equal(form(take_rows(a, np.array(rows)), take_rows(b, np.array(rows))), whole)
+        np.testing.assert_array_equal(form(a[..., rows], b[..., rows]), whole)  # a matrix apart
+
+
+def test_some_rows_stand_side_by_side() -> None:
+    M = matrices(6, 8)
+    some = take_rows(M, np.array([3, 1, 7]))
+    np.testing.assert_array_equal(some, M[..., [3, 1, 7]])
+    assert some.flags.c_contiguous
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data(), rows=st.integers(1, 4))
+def test_any_chain_has_the_pose_and_the_jacobian_of_its_kinematics(
+    chains: SearchStrategy[Chain], data: st.DataObject, rows: int
+) -> None:
+    """Fixed frames, slides, mimics, any axis; entries of some metres at most, some products: 1e-12."""
+    chain = data.draw(chains)
+    q = np.random.default_rng(rows).uniform(-3.0, 3.0, (rows, len(chain.coordinates)))
+    tool = tool_motion(prepare_chain(chain), np.ascontiguousarray(q.T))
+    position, rotation = poses_over_log(chain, q)
+    np.testing.assert_allclose(tool.position.T, position, atol=1e-12)
+    np.testing.assert_allclose(tool.columns.transpose(2, 1, 0), rotation, atol=1e-12)
+    np.testing.assert_allclose(tool.jacobian.transpose(2, 0, 1), jacobian_over_log(chain, q), atol=1e-12)
+
+
+@pytest.mark.parametrize("robot", ["urm6", "urm8", "panda", "ur5e"])
+def test_a_row_has_the_same_bits_alone_and_beside_others(robot: str) -> None:
+    arm = prepare_chain(load_robot(robot))
+    q = np.random.default_rng(0).uniform(-3.0, 3.0, (len(arm.chain.coordinates), 50))
+    whole = tool_motion(arm, q)
+    for rows in ([0], [7, 9], list(range(13, 50))):
+        for part, all_rows in zip(tool_motion(arm, q[:, rows].copy()), whole, strict=True):
+            np.testing.assert_array_equal(part, all_rows[..., rows])
+
+
+def test_what_a_radian_counts_as_does_not_depend_on_where_a_description_puts_frames() -> None:
+    chain = load_robot("ur5e")
+    there = Joint("aside", "fixed", translation(0.0, 0.0, 100.0))  # axis 2 of a calibrated arm
+    back = replace(chain.joints[2], origin=translation(0.0, 0.0, -100.0) @ chain.joints[2].origin)
+    other = replace(chain, joints=(*chain.joints[:2], there, back, *chain.joints[3:]), visuals=())
+    assert orientation_length(other) == pytest.approx(orientation_length(chain), rel=1e-12)
+    assert orientation_length(chain) == characteristic_length(chain) / 4.0
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    angle=st.floats(0.0, math.pi)
+    | st.sampled_from([0.0, 1e-12, 1e-7, math.pi - 1e-7, math.pi - 1e-12, math.pi]),
+    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1),
+)
+def test_the_turn_between_two_frames_is_scipys_rotation_vector(
+    angle: float, axis: tuple[float, float, float]
+) -> None:
+    vector = angle * np.array(axis) / math.hypot(*axis)
+    pose = from_offset((0.0, 0.0, 0.0, 0.4, -1.1, 2.0))
+    wanted = Rotation.from_rotvec(vector).as_matrix() @ np.array(pose.rotation)
+    found = rotation_error(np.array(pose.columns)[..., None], wanted.T[..., None])[:, 0]
+    np.testing.assert_allclose(np.linalg.norm(found), angle, atol=1e-14 + 1e-15 / max(math.sin(angle), 1e-7))
+    again = Rotation.from_rotvec(found).as_matrix() @ np.array(pose.rotation)
+    np.testing.assert_allclose(again, wanted, atol=3e-8)  # within 1e-6 of half a turn the axis has 8 digits
+    if angle < 3.0:
+        np.testing.assert_allclose(found, vector, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("robot", "pose", "free"),
+    [("urm6", True, 0), ("urm6", False, 3), ("urm8", True, 2), ("panda", True, 1), ("iiwa14", False, 4)],
+)
+def test_the_freedoms_that_a_target_leaves_are_counted(robot: str, pose: bool, free: int) -> None:
+    chain = load_robot(robot)
+    targets = forward_targets(chain, np.zeros((1, len(chain.coordinates))))
+    assert redundancy(chain, targets if pose else Targets(targets.position)) == free
+
+
+def test_the_freedoms_of_a_planar_arm_are_those_of_the_plane() -> None:
+    arm = planar(0.5, 0.4, 0.3)
+    assert redundancy(arm, forward_targets(arm, np.zeros((1, 3)))) == 0
+    assert redundancy(arm, Targets(np.zeros((1, 3)))) == 1
