@@ -1,8 +1,9 @@
-"""FMI's names of platforms, and where in an FMU the binary for this one is.
+"""FMUs as files: where the binary of a platform is, how an FMU is written, and how any FMU is opened.
 
-An FMU as a file: a zip that is the same bytes for the same content, and a GUID of that content.
-
-An FMU of any tool as it is opened: its zip and description are checked before anything is unpacked.
+1. FMI's names of platforms, and the path of the binary for this one.
+2. `content_guid` and `write_fmu`: a zip that has the same bytes for the same content, written atomically.
+3. `open_fmu`: an FMU of any tool. Before anything is unpacked, the archive is checked against limits of size
+   and for paths outside its folder, and the description for its size, depth and a document type.
 """
 
 from __future__ import annotations
@@ -26,65 +27,80 @@ from xml.parsers import expat
 from urmpipe_models.errors import Finding, FmuError, format_value
 from urmpipe_models.files import keep_permissions, suggest_path
 
-X86 = ("x86_64", "amd64", "i386", "i486", "i586", "i686", "x86")
-"""What processors call themselves that FMI 2.0's linux64, win64 and their like stand for."""
+X86 = ("x86_64", "amd64", "i386", "i486", "i586", "i686", "x86")  # processors that FMI 2.0's linux64, .. mean
+
+DESCRIPTION = "modelDescription.xml"
+ZIP_TIME = (1980, 1, 1, 0, 0, 0)  # of every entry: the earliest that zip can store
+ZIP_UNIX = 3  # system of an entry whose permissions are those of a file
+
+# Limits of an FMU. A runtime of Python or Java inside it takes a tenth of bytes and entries. Code is three
+# times its packed size, XML twenty. A description of 130,000 variables, each of 250 bytes with twelve elements
+# and attributes, takes 0.7 GB when it is read and validated. FMI 2.0 nests six elements, annotations more.
+MAX_UNPACKED_BYTES = 4e9
+MAX_RATIO, RATIO_FROM_BYTES = 200.0, 1e8  # unpacked / packed size; from this unpacked size on
+MAX_ENTRIES = 100_000
+MAX_XML_BYTES, MAX_XML_PARTS = 3.2e7, 1_600_000  # of a description; parts: elements and attributes
+MAX_XML_DEPTH = 100
+
+PACKING = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # FMI 2.0.4, section 2.3
+ENCRYPTED = 0x1  # bit of an entry's flags (APPNOTE 6.3.10, section 4.4.4)
+MAX_LISTED = 5  # entries with the same error in a message
+AN_FMU = "an FMU, such as urmpipe fmu build makes of a unit"
+
+# Exceptions of zipfile for a zip that it cannot read.
+ZIP_ERRORS = (
+    zipfile.BadZipFile, zlib.error, struct.error, EOFError, ValueError, NotImplementedError, RuntimeError,
+)  # fmt: skip
 
 
 def this_platform() -> str:
-    """Return FMI's name of the platform that this runs on: linux64, or aarch64-linux.
+    """Return FMI's name of this platform, such as linux64 or aarch64-linux.
 
     FMI 2.0's short names are those of x86; FMI 2.0.4 takes the names of FMI 3.0 for all others.
     """
     system, processor = platform.system(), platform.machine().lower()
     if processor in X86:
-        return _short(system)
+        return _short_name(system)
     long = {"Windows": "windows", "Darwin": "darwin"}.get(system, "linux")
     return f"{'aarch64' if processor == 'arm64' else processor}-{long}"
 
 
-def is_windows(name: str) -> bool:
-    """Return whether a platform's name is one of Windows."""
-    return name.startswith("win") or name.endswith("-windows")
-
-
-def binary_suffix(name: str) -> str:
-    """Return how a binary's name ends on a platform."""
-    return ".dll" if is_windows(name) else ".dylib" if "darwin" in name else ".so"
-
-
-def host_platforms() -> tuple[str, ...]:
-    """Return the names under which a binary for this platform may be, the better first.
-
-    The second of an ARM processor is the short name, which other tools of FMI 2.0 still give it.
-    """
-    return tuple(dict.fromkeys((this_platform(), _short(platform.system()))))
-
-
-def host_binaries(identifier: str) -> tuple[str, ...]:
-    """Return the paths in an FMU at which its binary for this platform may be, the better first."""
-    return tuple(f"binaries/{one}/{identifier}{binary_suffix(one)}" for one in host_platforms())
-
-
-def find_binary(folder: Path, identifier: str) -> Path:
-    """Return the binary for this platform in the folder of an FMU; the better path, if there is none."""
-    paths = [folder / one for one in host_binaries(identifier)]
-    return next((one for one in paths if one.is_file()), paths[0])
-
-
-def _short(system: str) -> str:
+def _short_name(system: str) -> str:
     bits = "64" if sys.maxsize > 2**32 else "32"
     return {"Windows": "win", "Darwin": "darwin"}.get(system, "linux") + bits
 
 
-EARLIEST = (1980, 1, 1, 0, 0, 0)
-"""The time of every entry: zip knows none before."""
+def is_windows(name: str) -> bool:
+    """Return whether a name of a platform is one of Windows."""
+    return name.startswith("win") or name.endswith("-windows")
 
-UNIX = 3
-"""Who made the entry, so that its permissions are read as those of a file."""
+
+def binary_suffix(name: str) -> str:
+    """Return the suffix of binaries on a platform."""
+    return ".dll" if is_windows(name) else ".dylib" if "darwin" in name else ".so"
+
+
+def host_platforms() -> tuple[str, ...]:
+    """Return the names under which a binary for this platform may be found, the preferred one first.
+
+    The second of an ARM processor is the short name, which other tools of FMI 2.0 still give it.
+    """
+    return tuple(dict.fromkeys((this_platform(), _short_name(platform.system()))))
+
+
+def host_binaries(identifier: str) -> tuple[str, ...]:
+    """Return the paths in an FMU at which its binary for this platform may be, the preferred one first."""
+    return tuple(f"binaries/{name}/{identifier}{binary_suffix(name)}" for name in host_platforms())
+
+
+def find_binary(folder: Path, identifier: str) -> Path:
+    """Return the binary for this platform in the folder of an FMU; the preferred path if there is none."""
+    paths = [folder / name for name in host_binaries(identifier)]
+    return next((path for path in paths if path.is_file()), paths[0])
 
 
 def content_guid(files: Mapping[str, bytes]) -> str:
-    """Return the GUID of some files: the first 128 bits of the SHA-256 of their names and contents."""
+    """Return the GUID of files: the first 128 bits of the SHA-256 of their names and contents."""
     digest = hashlib.sha256()
     for name in sorted(files):
         for part in (name.encode(), files[name]):
@@ -93,10 +109,10 @@ def content_guid(files: Mapping[str, bytes]) -> str:
 
 
 def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
-    """Write an FMU, beside its place first, then renamed: it is whole or not there.
+    """Write an FMU atomically: to a temporary file, which is then renamed.
 
     Args:
-        path: Where it shall stand; what stands there is replaced.
+        path: The file; an existing one is replaced.
         files: Contents by their path in the FMU.
 
     Raises:
@@ -106,63 +122,16 @@ def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
     try:
         with zipfile.ZipFile(part, "x") as archive:
             for name in sorted(files):
-                archive.writestr(_entry(name), files[name])
+                entry = zipfile.ZipInfo(name, ZIP_TIME)  # no trace of when, where and by whom it was made
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.create_system = ZIP_UNIX
+                entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+                archive.writestr(entry, files[name])
         keep_permissions(part, path)
         part.replace(path)
     finally:
-        with suppress(OSError):  # why it cannot be written is told
+        with suppress(OSError):  # the original error is already raised
             part.unlink()
-
-
-def _entry(name: str) -> zipfile.ZipInfo:
-    """Return an entry without a trace of when, where and by whom it was made."""
-    entry = zipfile.ZipInfo(name, EARLIEST)
-    entry.compress_type = zipfile.ZIP_DEFLATED
-    entry.create_system = UNIX
-    entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-    return entry
-
-
-DESCRIPTION = "modelDescription.xml"
-
-UNPACKED = 4e9
-"""Bytes that an FMU may unpack to: with a runtime of Python or Java inside it takes a tenth of them."""
-
-RATIO, RATIO_FROM = 200.0, 1e8
-"""So many times its own size an FMU may unpack to, where that is more than so many bytes: code is three times
-its packed size, XML twenty."""
-
-MAX_ENTRIES = 100_000
-"""Entries of an FMU: those with a runtime of Python or Java inside have some ten thousand."""
-
-XML_BYTES, XML_PARTS = 3.2e7, 1_600_000
-"""Bytes of a model description, and elements and attributes in it: 130,000 variables, of which each takes
-250 bytes with twelve. Read and validated they take 0.7 GB."""
-
-XML_DEPTH = 100
-"""How deep elements of a model description may stand in each other: FMI 2.0 needs six, annotations more."""
-
-PACKING = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""How entries may be packed (FMI 2.0.4, section 2.3)."""
-
-ENCRYPTED = 0x1
-"""The bit of an entry's flags that says so (APPNOTE 6.3.10, section 4.4.4)."""
-
-LISTED = 5
-"""So many entries are named of those that are wrong in one way."""
-
-AN_FMU = "an FMU, such as urmpipe fmu build makes of a unit"
-
-ZIP_ERRORS = (
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-    EOFError,
-    ValueError,
-    NotImplementedError,
-    RuntimeError,
-)
-"""What zipfile raises for a zip that it cannot read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +151,7 @@ class FmuFile:
     kinds: tuple[str, ...]
 
     def read_description(self) -> Any:
-        """Return FMPy's reading of the description, which is not validated.
+        """Return the description as FMPy reads it, not validated.
 
         Raises:
             FmuError: If FMPy cannot read it.
@@ -191,17 +160,16 @@ class FmuFile:
 
         try:
             return read_model_description(self.path, validate=False)
-        except Exception as error:  # what FMPy raises for a description it does not expect is of any kind
-            raise _refused(
-                self.path, f"{DESCRIPTION} cannot be read: {type(error).__name__}: {error}"
-            ) from error
+        except Exception as error:  # FMPy raises errors of any kind for an unexpected description
+            message = f"{DESCRIPTION} cannot be read: {type(error).__name__}: {error}"
+            raise _error(self.path, message) from error
 
     def unpack(self, folder: Path, *, skip: str | None = None) -> None:
         """Unpack it into a folder.
 
         Args:
-            folder: Where; it is made if it is not there.
-            skip: How the paths of the entries begin that are left out.
+            folder: The folder; it is made if it does not exist.
+            skip: Entries whose paths begin so are left out.
 
         Raises:
             FmuError: If an entry is damaged, or there is no room.
@@ -211,114 +179,111 @@ class FmuFile:
             with zipfile.ZipFile(self.path) as archive:
                 archive.extractall(folder, names)
         except OSError as error:
-            raise _refused(self.path, f"cannot be unpacked: {error.strerror or error}") from error
+            raise _error(self.path, f"cannot be unpacked: {error.strerror or error}") from error
         except (*ZIP_ERRORS, KeyError) as error:
-            raise _refused(self.path, f"cannot be unpacked: {error}") from error
+            raise _error(self.path, f"cannot be unpacked: {error}") from error
 
 
 def open_fmu(path: Path) -> FmuFile:
     """Check the archive of an FMU and its description; nothing is unpacked.
 
     Raises:
-        FmuError: With all that is wrong with the archive, or else with its description.
+        FmuError: With all errors of the archive, or else of its description.
     """
-    content = _description(path)
-    found = _Description(path)
-    found.read(content[0])
-    return FmuFile(path, content[1], found.version, tuple(found.kinds))
+    content, names = _read_archive(path)
+    check = _DescriptionCheck(path)
+    check.parse(content)
+    return FmuFile(path, names, check.version, tuple(check.kinds))
 
 
-def _description(path: Path) -> tuple[bytes, tuple[str, ...]]:
-    """Return the description of an FMU, and the paths of its entries, all checked."""
+def _read_archive(path: Path) -> tuple[bytes, tuple[str, ...]]:
+    """Return the description of an FMU and the paths of its entries, after the checks of the archive."""
     if "\0" in str(path):
         raise FmuError(f"found {format_value(str(path))}, allowed: the name of a file")
     try:
-        kind = path.stat().st_mode
+        mode = path.stat().st_mode
         if not stat.S_ISREG(
-            kind
-        ):  # a pipe would be waited for, and Windows only says that folders may not be read
-            raise _refused(
-                path, f"found a {'folder' if stat.S_ISDIR(kind) else 'pipe or device'}, allowed: {AN_FMU}"
-            )
+            mode
+        ):  # reading a pipe would wait; Windows only reports that folders cannot be read
+            kind = "folder" if stat.S_ISDIR(mode) else "pipe or device"
+            raise _error(path, f"found a {kind}, allowed: {AN_FMU}")
         with zipfile.ZipFile(path) as archive:
             faults = [*_size_faults(path, archive.infolist()), *_entry_faults(archive.infolist())]
             if faults:
                 raise FmuError(*(Finding(fault, file=str(path)) for fault in faults))
             names = tuple(archive.namelist())
             if DESCRIPTION not in names:
-                raise _refused(path, f"found a zip without {DESCRIPTION}, allowed: {AN_FMU}")
+                raise _error(path, f"found a zip without {DESCRIPTION}, allowed: {AN_FMU}")
             return archive.read(DESCRIPTION), names
     except FileNotFoundError as error:
-        raise _refused(
-            path, f"found no such file{suggest_path(path, ('.fmu',))}, allowed: {AN_FMU}"
-        ) from error
+        raise _error(path, f"found no such file{suggest_path(path, ('.fmu',))}, allowed: {AN_FMU}") from error
     except OSError as error:
-        raise _refused(path, f"cannot be read: {error.strerror or error}") from error
+        raise _error(path, f"cannot be read: {error.strerror or error}") from error
     except ZIP_ERRORS as error:
-        raise _refused(path, f"found {_no_zip(path)}, allowed: {AN_FMU}") from error
-
-
-def _no_zip(path: Path) -> str:
-    """Return what a file is that cannot be opened as the zip that an FMU is."""
-    with path.open("rb") as file:
-        head = file.read(2)
-    if not head:
-        return "an empty file"
-    return "a zip that is cut off or damaged" if head == b"PK" else "no zip, as an FMU is one"
+        with path.open("rb") as file:
+            head = file.read(2)
+        content = "a zip that is cut off or damaged" if head == b"PK" else "no zip, as an FMU is one"
+        raise _error(path, f"found {content if head else 'an empty file'}, allowed: {AN_FMU}") from error
 
 
 def _size_faults(path: Path, entries: Sequence[zipfile.ZipInfo]) -> Iterator[str]:
-    """Yield what is too much: entries, bytes, bytes of the description.
-
-    zipfile unpacks no more of an entry than the size that the entry tells.
-    """
-    unpacked, packed = sum(one.file_size for one in entries), path.stat().st_size
+    """Yield what exceeds the limits: zipfile unpacks no more of an entry than the size in its header."""
+    unpacked, packed = sum(entry.file_size for entry in entries), path.stat().st_size
     if len(entries) > MAX_ENTRIES:
         yield f"found {len(entries)} entries, allowed: {MAX_ENTRIES}"
-    if unpacked > UNPACKED:
-        yield f"found {unpacked / 1e6:.6g} MB when unpacked, allowed: {UNPACKED / 1e6:g} MB"
-    elif unpacked > max(RATIO_FROM, RATIO * packed):
+    if unpacked > MAX_UNPACKED_BYTES:
+        yield f"found {unpacked / 1e6:.6g} MB when unpacked, allowed: {MAX_UNPACKED_BYTES / 1e6:g} MB"
+    elif unpacked > max(RATIO_FROM_BYTES, MAX_RATIO * packed):
         yield (
             f"found {unpacked / 1e6:.4g} MB when unpacked, {unpacked / packed:.0f} times the file, allowed:"
-            f" {RATIO:g} times, from {RATIO_FROM / 1e6:g} MB on"
+            f" {MAX_RATIO:g} times, from {RATIO_FROM_BYTES / 1e6:g} MB on"
         )
-    for one in entries:
-        if one.filename == DESCRIPTION and one.file_size > XML_BYTES:
-            yield f"{DESCRIPTION}: found {one.file_size / 1e6:.4g} MB, allowed: {XML_BYTES / 1e6:g} MB"
+    for entry in entries:
+        if entry.filename == DESCRIPTION and entry.file_size > MAX_XML_BYTES:
+            yield f"{DESCRIPTION}: found {entry.file_size / 1e6:.4g} MB, allowed: {MAX_XML_BYTES / 1e6:g} MB"
 
 
 def _entry_faults(entries: Sequence[zipfile.ZipInfo]) -> Iterator[str]:
-    """Yield which entries would not be unpacked, or outside the folder of the FMU, or over each other."""
-    odd = [one.orig_filename for one in entries if _leads_elsewhere(one.orig_filename)]
-    yield from _listed(odd, "the path", "paths below the FMU's folder, with / between their parts")
-    links = [one.orig_filename for one in entries if stat.S_ISLNK(one.external_attr >> 16)]
-    yield from _listed(links, "the symbolic link", "files and folders")
-    secret = [one.orig_filename for one in entries if one.flag_bits & ENCRYPTED]
-    yield from _listed(secret, "the encrypted", "files without a password")
-    packed = [
-        f"{one.orig_filename} (method {one.compress_type})"
-        for one in entries
-        if one.compress_type not in PACKING
-    ]
-    yield from _listed(packed, "the packing of", "stored or deflated (methods 0, 8)")
-    twice = [name for name, count in Counter(one.filename for one in entries).items() if count > 1]
-    yield from _listed(twice, "twice", "each path once")
+    """Yield the entries that cannot be unpacked, or would be outside the FMU's folder or over each other."""
+    counts = Counter(entry.filename for entry in entries)
+    for names, what, allowed in (
+        (
+            [entry.orig_filename for entry in entries if _may_lead_elsewhere(entry.orig_filename)],
+            "the path",
+            "paths below the FMU's folder, with / between their parts",
+        ),
+        (
+            [entry.orig_filename for entry in entries if stat.S_ISLNK(entry.external_attr >> 16)],
+            "the symbolic link",
+            "files and folders",
+        ),
+        (
+            [entry.orig_filename for entry in entries if entry.flag_bits & ENCRYPTED],
+            "the encrypted",
+            "files without a password",
+        ),
+        (
+            [
+                f"{entry.orig_filename} (method {entry.compress_type})"
+                for entry in entries
+                if entry.compress_type not in PACKING
+            ],
+            "the packing of",
+            "stored or deflated (methods 0, 8)",
+        ),
+        ([name for name, count in counts.items() if count > 1], "twice", "each path once"),
+    ):
+        if names:
+            listed = [
+                name if name.isprintable() and len(name) <= 60 else format_value(name)
+                for name in names[:MAX_LISTED]
+            ]
+            more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+            yield f"found {what} {', '.join(listed)}{more}, allowed: {allowed}"
 
 
-def _listed(names: Sequence[str], what: str, allowed: str) -> Iterator[str]:
-    """Yield a line with the first of some names, if there are any."""
-    if names:
-        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-        yield f"found {what} {', '.join(map(_written, names[:LISTED]))}{more}, allowed: {allowed}"
-
-
-def _written(name: str) -> str:
-    """Return a path as a message shows it."""
-    return name if name.isprintable() and len(name) <= 60 else format_value(name)
-
-
-def _leads_elsewhere(name: str) -> bool:
-    """Return whether a path might be another one when it is unpacked here, or on another system."""
+def _may_lead_elsewhere(name: str) -> bool:
+    """Return whether a path may be another one when it is unpacked, here or on another system."""
     return (
         name.startswith("/")
         or ".." in name.split("/")
@@ -327,11 +292,11 @@ def _leads_elsewhere(name: str) -> bool:
     )
 
 
-class _Description:
-    """What is asked of a description before a library reads it.
+class _DescriptionCheck:
+    """Check of a description before a library reads it.
 
     Attributes:
-        version: The version of FMI that it tells.
+        version: Its version of FMI.
         kinds: Its elements with a modelIdentifier.
     """
 
@@ -341,51 +306,51 @@ class _Description:
         self.version = ""
         self.kinds: list[str] = []
 
-    def read(self, content: bytes) -> None:
-        """Read a description.
+    def parse(self, content: bytes) -> None:
+        """Parse a description.
 
         Raises:
-            FmuError: If it is no XML, has a document type, is nested too deep, or tells binaries elsewhere.
+            FmuError: If it is no XML, has a document type, is nested too deep, or names binaries elsewhere.
         """
         parser = expat.ParserCreate()
         parser.StartElementHandler, parser.EndElementHandler = self._begin, self._end
-        parser.StartDoctypeDeclHandler = self._doctype
+        parser.StartDoctypeDeclHandler = self._reject_doctype
         try:
             parser.Parse(content, True)
         except (expat.ExpatError, LookupError, ValueError) as error:
-            said = f"{DESCRIPTION} cannot be read: {error}; allowed: XML as FMI 2.0 has it"
-            raise _refused(self._path, said) from error
+            message = f"{DESCRIPTION} cannot be read: {error}; allowed: XML as FMI 2.0 has it"
+            raise _error(self._path, message) from error
         if self._faults:
             raise FmuError(*(Finding(fault, file=str(self._path)) for fault in self._faults))
 
     def _begin(self, tag: str, attributes: dict[str, str]) -> None:
         self._depth += 1
         self._parts += 1 + len(attributes)
-        if self._depth > XML_DEPTH:
-            self._refuse(f"found more than {XML_DEPTH} elements in each other, allowed: {XML_DEPTH}")
-        if self._parts > XML_PARTS:
-            self._refuse(f"found more than {XML_PARTS} elements and attributes, allowed: {XML_PARTS}")
+        if self._depth > MAX_XML_DEPTH:
+            self._reject(f"found more than {MAX_XML_DEPTH} elements in each other, allowed: {MAX_XML_DEPTH}")
+        if self._parts > MAX_XML_PARTS:
+            self._reject(f"found more than {MAX_XML_PARTS} elements and attributes, allowed: {MAX_XML_PARTS}")
         if self._depth == 1:
             self.version = attributes.get("fmiVersion", "")
         name = attributes.get("modelIdentifier")
         if self._depth == 2 and name is not None:
             self.kinds.append(tag)
-            if not name or name == "." or "/" in name or _leads_elsewhere(name):
+            if not name or name == "." or "/" in name or _may_lead_elsewhere(name):
                 allowed = "the name of its binaries, without / \\ and :"
                 self._faults[f"modelIdentifier: found {format_value(name)}, allowed: {allowed}"] = None
 
     def _end(self, _: str) -> None:
         self._depth -= 1
 
-    def _doctype(self, *_: object) -> None:
-        """Refuse what could declare entities, of which few bytes become many."""
-        self._refuse(
+    def _reject_doctype(self, *_: object) -> None:
+        """Reject declarations of entities, which expand few bytes to many."""
+        self._reject(
             "found a document type (<!DOCTYPE ...>), allowed: XML without document type and entities"
         )
 
-    def _refuse(self, said: str) -> None:
-        raise _refused(self._path, f"{DESCRIPTION}: {said}")
+    def _reject(self, message: str) -> None:
+        raise _error(self._path, f"{DESCRIPTION}: {message}")
 
 
-def _refused(path: Path, said: str) -> FmuError:
-    return FmuError(Finding(said, file=str(path)))
+def _error(path: Path, message: str) -> FmuError:
+    return FmuError(Finding(message, file=str(path)))
