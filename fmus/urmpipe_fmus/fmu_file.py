@@ -34,8 +34,9 @@ ZIP_TIME = (1980, 1, 1, 0, 0, 0)  # of every entry: the earliest that zip can st
 ZIP_UNIX = 3  # system of an entry whose permissions are those of a file
 
 # Limits of an FMU. A runtime of Python or Java inside it takes a tenth of bytes and entries. Code is three
-# times its packed size, XML twenty. A description of 130,000 variables, each of 250 bytes with twelve elements
-# and attributes, takes 0.7 GB when it is read and validated. FMI 2.0 nests six elements, annotations more.
+# times its packed size, XML twenty. A description of 130,000 variables, each of 250 bytes with twelve
+# elements and attributes, takes 0.7 GB to be read and validated. FMI 2.0 nests six elements, annotations
+# more.
 MAX_UNPACKED_BYTES = 4e9
 MAX_RATIO, RATIO_FROM_BYTES = 200.0, 1e8  # unpacked / packed size; from this unpacked size on
 MAX_ENTRIES = 100_000

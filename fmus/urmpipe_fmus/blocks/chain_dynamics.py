@@ -15,13 +15,13 @@ from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, State, Valu
 from urmpipe_fmus.blocks.coordinates import (
     KINDS,
     acceleration_outputs,
-    arm_recipe,
     check_robot,
     coordinate_kinds,
     format_joints,
     gather,
     motion_states,
     read_coordinates,
+    robot_recipe,
     scatter,
 )
 from urmpipe_models.arm.chain import Chain
@@ -204,7 +204,7 @@ def chain_dynamics(robot: Chain) -> BlockModel:
             "q'' by M = L D L^T. q: phi of joints that turn, s of joints that slide; tau: tau, f.",
         ),
         source="Simulative investigation of robot's accuracy and running speed (2005), eq. 8-13",
-        recipe=arm_recipe(__name__, robot),
+        recipe=robot_recipe(__name__, robot),
     )
 
 

@@ -1,6 +1,8 @@
-"""Checks of the options that a unit is made with: they come from a file or a command line.
+"""Options of the blocks, and the coordinates of a robot as variables.
 
-The coordinates of an arm as variables: those that turn and those that slide apart, as their units are.
+Options come from a file or a command line, so each `check_` function reports a value that does not fit. The
+coordinates are two arrays, as their units differ: `phi` of the revolute joints and `s` of the prismatic ones,
+each from the base outwards. `read_coordinates` and `scatter` convert between these arrays and joint order.
 """
 
 from __future__ import annotations
@@ -15,77 +17,64 @@ from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError, format_value
 from urmpipe_models.robots.toml import robot_toml
 
-MAX_COUNT = 1000
-"""Most of what an option counts: as many as the links of a robot; each adds variables, equations and C."""
+MAX_COUNT = 1000  # as the links of a robot; each adds variables, equations and C
 
 
-def check_robot(unit: str, value: Any) -> None:
-    """Check the option of a robot.
+def option_error(block: str, option: str, value: Any, allowed: str) -> UnitError:
+    """Return the error of a value that an option cannot have."""
+    return UnitError(f"unit {block}: option {option}: found {format_value(value)}, allowed: {allowed}")
 
-    Raises:
-        UnitError: If it is none.
-    """
+
+def check_robot(block: str, value: Any) -> None:
+    """Raise `UnitError` if the option `robot` is not a robot."""
     if not isinstance(value, Chain):
-        raise UnitError(f"unit {unit}: option robot: found {format_value(value)}, allowed: a robot (Chain)")
+        raise option_error(block, "robot", value, "a robot (Chain)")
 
 
-def check_count(unit: str, option: str, value: Any) -> int:
-    """Return an option that counts something.
-
-    Raises:
-        UnitError: If it is no integer from 1 to `MAX_COUNT`.
-    """
+def check_count(block: str, option: str, value: Any) -> int:
+    """Return an option that is a count; `UnitError` if it is no integer from 1 to `MAX_COUNT`."""
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_COUNT:
-        too_many = isinstance(value, int) and value > MAX_COUNT
-        allowed = f"{MAX_COUNT} at most" if too_many else "an integer, 1 or more"
-        raise UnitError(f"unit {unit}: option {option}: found {format_value(value)}, allowed: {allowed}")
+        is_above = isinstance(value, int) and value > MAX_COUNT
+        allowed = f"{MAX_COUNT} at most" if is_above else "an integer, 1 or more"
+        raise option_error(block, option, value, allowed)
     return value
 
 
-def check_flag(unit: str, option: str, value: Any) -> bool:
-    """Return an option that is true or false.
-
-    Raises:
-        UnitError: If it is neither.
-    """
+def check_flag(block: str, option: str, value: Any) -> bool:
+    """Return an option that is true or false; `UnitError` if it is neither."""
     if not isinstance(value, bool):
-        raise UnitError(f"unit {unit}: option {option}: found {format_value(value)}, allowed: true or false")
+        raise option_error(block, option, value, "true or false")
     return value
 
 
-def check_choices(unit: str, option: str, value: Any, allowed: tuple[str, ...]) -> tuple[str, ...]:
-    """Return an option that names one or some of what there is, in the order in which that stands.
+def check_choices(block: str, option: str, value: Any, allowed: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names that an option selects, in the order of the allowed ones.
 
     Raises:
-        UnitError: If it is neither a name nor a list, or with every name that there is not.
+        UnitError: If it is neither a name nor a list, or with every unknown name.
     """
+    names = ", ".join(allowed)
     if isinstance(value, str):
         value = [value]
     if not isinstance(value, (list, tuple)):
-        found = f"found {format_value(value)}, allowed: a list of {', '.join(allowed)}"
-        raise UnitError(f"unit {unit}: option {option}: {found}")
-    wrong = [one for one in value if one not in allowed]
-    if wrong:
-        raise UnitError(
-            *(
-                f"unit {unit}: option {option}: found {format_value(one)}, allowed: {', '.join(allowed)}"
-                for one in wrong
-            )
-        )
-    return tuple(one for one in allowed if one in value)
+        raise option_error(block, option, value, f"a list of {names}")
+    errors = [option_error(block, option, name, names) for name in value if name not in allowed]
+    if errors:
+        raise UnitError(*(finding for error in errors for finding in error.findings))
+    return tuple(name for name in allowed if name in value)
 
 
 @dataclass(frozen=True, slots=True)
 class CoordinateKind:
-    """How the coordinates of a kind are named and measured.
+    """Names and units of the coordinates of a kind of joint.
 
     Attributes:
-        kind: Of the joints.
-        name: Of the variable; with d its rate, with dd its second derivative.
-        word: One coordinate in words.
-        unit: Of a value.
-        display_unit: What people like to see.
-        effort: Name of the variable that drives them.
+        kind: The kind of joint.
+        name: Name of the variable; with d its velocity, with dd its acceleration.
+        word: The name of one coordinate in descriptions.
+        unit: Unit of a value.
+        display_unit: The unit that tools display.
+        effort: Name of the variable of the torques or forces.
         effort_unit: Its unit.
     """
 
@@ -108,76 +97,76 @@ KINDS = (REVOLUTE, PRISMATIC)
 
 
 def coordinate_kinds(robot: Chain) -> list[CoordinateKind]:
-    """Return the kinds that an arm has."""
-    return [one for one in KINDS if one.indices(robot)]
+    """Return the kinds of coordinates that a robot has."""
+    return [kind for kind in KINDS if kind.indices(robot)]
 
 
 def gather(robot: Chain, v: Values, names: Mapping[CoordinateKind, str]) -> list[Element]:
-    """Return the elements of the variables of each kind in the arm's order.
+    """Return the elements of one variable per kind, in joint order.
 
     Args:
-        robot: The arm.
-        v: The values of its unit.
+        robot: The robot.
+        v: The values of its block model.
         names: The variable of each kind.
     """
-    found: dict[int, Element] = {}
-    for one in coordinate_kinds(robot):
-        found |= zip(one.indices(robot), getattr(v, names[one]), strict=True)
-    return [found[k] for k in range(len(robot.coordinates))]
+    elements: dict[int, Element] = {}
+    for kind in coordinate_kinds(robot):
+        elements |= zip(kind.indices(robot), getattr(v, names[kind]), strict=True)
+    return [elements[k] for k in range(len(robot.coordinates))]
 
 
 def read_coordinates(robot: Chain, v: Values, suffix: str = "") -> list[Element]:
-    """Return the coordinates in the arm's order; with suffix "d" their rates, "dd" their accelerations."""
-    return gather(robot, v, {one: one.name + suffix for one in KINDS})
+    """Return the coordinates in joint order; with suffix "d" their velocities, "dd" their accelerations."""
+    return gather(robot, v, {kind: kind.name + suffix for kind in KINDS})
 
 
 def scatter(robot: Chain, elements: Sequence[Element], suffix: str = "") -> dict[str, tuple[Element, ...]]:
     """Return elements in joint order by the variables of their kinds: inverse of `read_coordinates`."""
-    return {
-        one.name + suffix: tuple(elements[k] for k in one.indices(robot)) for one in coordinate_kinds(robot)
-    }
+    kinds = coordinate_kinds(robot)
+    return {kind.name + suffix: tuple(elements[k] for k in kind.indices(robot)) for kind in kinds}
 
 
 def format_joints(robot: Chain, indices: Iterable[int]) -> str:
-    """Return which joints a variable is of, from the base outwards."""
+    """Return the end of a description that names the joints of a variable."""
     return f"of the joints {', '.join(robot.coordinates[k] for k in indices)}"
 
 
 def motion_states(robot: Chain) -> Iterator[State]:
-    """Yield the coordinates and their rates; they start at the start pose at rest."""
+    """Yield the coordinates and their velocities as states; they start at rest at the start pose."""
     for kind in coordinate_kinds(robot):
-        at = kind.indices(robot)
+        indices = kind.indices(robot)
+        joints = format_joints(robot, indices)
         yield State(
             name=kind.name,
-            description=f"{kind.word}s {format_joints(robot, at)}",
+            description=f"{kind.word}s {joints}",
             unit=kind.unit,
             display_unit=kind.display_unit,
-            start=tuple(float(robot.start[k]) for k in at),
-            size=len(at),
+            start=tuple(float(robot.start[k]) for k in indices),
+            size=len(indices),
             output=True,
         )
         yield State(
             name=f"{kind.name}d",
-            description=f"Velocities {format_joints(robot, at)}",
+            description=f"Velocities {joints}",
             unit=f"{kind.unit}/s",
             display_unit=f"{kind.display_unit}/s",
-            size=len(at),
+            size=len(indices),
             output=True,
         )
 
 
 def acceleration_outputs(robot: Chain) -> Iterator[Output]:
-    """Yield the accelerations of the coordinates."""
+    """Yield the accelerations of the coordinates as outputs."""
     for kind in coordinate_kinds(robot):
-        at = kind.indices(robot)
+        indices = kind.indices(robot)
         yield Output(
             name=f"{kind.name}dd",
-            description=f"Accelerations {format_joints(robot, at)}",
+            description=f"Accelerations {format_joints(robot, indices)}",
             unit=f"{kind.unit}/s2",
-            size=len(at),
+            size=len(indices),
         )
 
 
-def arm_recipe(module: str, robot: Chain, **options: Any) -> Recipe:
-    """Return how to make a unit of an arm again: by the arm as text, without its looks, which name files."""
+def robot_recipe(module: str, robot: Chain, **options: Any) -> Recipe:
+    """Return the recipe of a block of a robot: the robot as text, without meshes of other files."""
     return Recipe(module, "from_robot_toml", {"robot": robot_toml(replace(robot, visuals=())), **options})

@@ -17,12 +17,12 @@ from urmpipe_fmus.blocks.chain_dynamics import Masses, chain_to_masses, read_wre
 from urmpipe_fmus.blocks.coordinates import (
     CoordinateKind,
     acceleration_outputs,
-    arm_recipe,
     check_robot,
     coordinate_kinds,
     format_joints,
     motion_states,
     read_coordinates,
+    robot_recipe,
     scatter,
 )
 from urmpipe_fmus.blocks.drives import NO_SAMPLE
@@ -367,7 +367,7 @@ def driven_arm(robot: Chain) -> BlockModel:
             "energy_stored' = energy_in' - energy_lost'",
         ),
         source="Simulative investigation of robot's accuracy and running speed (2005), eq. 8-20",
-        recipe=arm_recipe(__name__, robot),
+        recipe=robot_recipe(__name__, robot),
     )
 
 

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, Values, Variable
 from urmpipe_fmus.blocks.coordinates import (
-    arm_recipe,
     check_choices,
     check_flag,
     check_robot,
     coordinate_kinds,
     format_joints,
     read_coordinates,
+    robot_recipe,
 )
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.chain import Parameter as ArmParameter
@@ -207,7 +207,7 @@ def kinematic_chain(
         outputs=outputs,
         equations=_equations(rates),
         source="UrmArm2021, eq. 1-14, with atan2 in eq. 10 and 13",
-        recipe=arm_recipe(__name__, robot, points=list(chosen), sensors=list(sensed), rates=rates),
+        recipe=robot_recipe(__name__, robot, points=list(chosen), sensors=list(sensed), rates=rates),
     )
 
 
