@@ -59,20 +59,6 @@ SOLVABILITY_POSES = 3  # a pivot of M that is 0 in this number of random poses i
 NEGLIGIBLE_PIVOT = 1e-12  # share of the scale of M (`mass_matrix_scales`); below it a pivot is rounding
 
 
-class LinkPoses(NamedTuple):
-    """The moving links of an arm in a pose.
-
-    Attributes:
-        chain: The arm.
-        arm: Its moving links.
-        frames: The moving frame of each link in that of the previous one, the first one's in the base.
-    """
-
-    chain: Chain
-    arm: Links
-    frames: Sequence[Transform]
-
-
 def inverse_dynamics(
     chain: Chain,
     q: Sequence[Element],
@@ -105,15 +91,23 @@ def inverse_dynamics(
     return _inverse_dynamics_at(_link_poses(chain, q), qd, qdd, wrench)
 
 
-def _link_poses(chain: Chain, q: Sequence[Element], arm: Links | None = None) -> LinkPoses:
+class _LinkPoses(NamedTuple):
+    """An arm in a pose: the moving frame of each link in that of the previous one, the first in the base."""
+
+    chain: Chain
+    arm: Links
+    frames: Sequence[Transform]
+
+
+def _link_poses(chain: Chain, q: Sequence[Element], arm: Links | None = None) -> _LinkPoses:
     arm = arm or chain_to_links(chain)
     values = dict(zip((joint.name for joint in chain.joints), joint_values(chain, q), strict=True))
     frames = [apply_joint(link.joint.origin, link.joint, values[link.joint.name]) for link in arm.links]
-    return LinkPoses(chain, arm, frames)
+    return _LinkPoses(chain, arm, frames)
 
 
 def _inverse_dynamics_at(
-    poses: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element], wrench: Wrench | None
+    poses: _LinkPoses, qd: Sequence[Element], qdd: Sequence[Element], wrench: Wrench | None
 ) -> list[Element]:
     chain, arm, frames = poses
     loads = _link_loads(poses, qd, qdd)
@@ -134,7 +128,7 @@ def _inverse_dynamics_at(
 
 
 def _link_loads(
-    poses: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element]
+    poses: _LinkPoses, qd: Sequence[Element], qdd: Sequence[Element]
 ) -> list[tuple[Vector, Vector]]:
     """Return the force that each link's motion needs, and its moment about the origin of the link's frame."""
     chain, arm, frames = poses
@@ -164,7 +158,7 @@ def _rigid_acceleration(omega: Vector, alpha: Vector, d: Vector) -> Vector:
     return add(cross(alpha, d), cross(omega, cross(omega, d)))
 
 
-def _subtract_wrench(poses: LinkPoses, load: tuple[Vector, Vector], wrench: Wrench) -> tuple[Vector, Vector]:
+def _subtract_wrench(poses: _LinkPoses, load: tuple[Vector, Vector], wrench: Wrench) -> tuple[Vector, Vector]:
     """Return the load of the last link without the part that an external wrench on the tool provides."""
     chain, arm, frames = poses
     force, moment = wrench
@@ -176,96 +170,77 @@ def _subtract_wrench(poses: LinkPoses, load: tuple[Vector, Vector], wrench: Wren
 
 
 @dataclass(frozen=True, slots=True)
-class SpatialField:
-    """Velocities or accelerations of a rigid body at all points r: G r + b.
-
-    Attributes:
-        gradient: The rows of G, in [1/s] or [1/s2].
-        offset: b, in [m/s] or [m/s2].
-    """
+class _Field:
+    """Velocities [m/s] or accelerations [m/s2] of a rigid body at all points r: G r + b."""
 
     gradient: tuple[Vector, Vector, Vector] = (ZERO, ZERO, ZERO)
     offset: Vector = ZERO
 
-    def __add__(self, other: SpatialField) -> SpatialField:
-        """Return the sum of two fields."""
+    def __add__(self, other: _Field) -> _Field:
         rows = zip(self.gradient, other.gradient, strict=True)
         x, y, z = (add(*pair) for pair in rows)
-        return SpatialField((x, y, z), add(self.offset, other.offset))
+        return _Field((x, y, z), add(self.offset, other.offset))
 
-    def scaled(self, factor: Element) -> SpatialField:
-        """Return the field times a factor."""
+    def scaled(self, factor: Element) -> _Field:
         x, y, z = (scale(factor, row) for row in self.gradient)
-        return SpatialField((x, y, z), scale(factor, self.offset))
+        return _Field((x, y, z), scale(factor, self.offset))
 
-    def after(self, other: SpatialField) -> SpatialField:
+    def after(self, other: _Field) -> _Field:
         """Return G (G' r + b'): the accelerations by which this motion changes the velocities of another."""
         gradient = Transform(self.gradient)
-        return SpatialField((gradient @ Transform(other.gradient)).rotation, gradient.rotate(other.offset))
+        return _Field((gradient @ Transform(other.gradient)).rotation, gradient.rotate(other.offset))
 
 
 @dataclass(frozen=True, slots=True)
-class SpatialInertia:
-    """Masses, about the common origin in world axes.
-
-    Attributes:
-        mass: m in [kg].
-        moment: h = sum m r in [kg.m].
-        second: S = sum m r r^T in [kg.m2].
-    """
+class _Inertia:
+    """Masses about the common origin, world axes: m [kg], h = sum m r [kg.m], S = sum m r r^T [kg.m2]."""
 
     mass: Element = 0.0
     moment: Vector = ZERO
     second: Symmetric = (ZERO, ZERO, ZERO)
 
-    def __add__(self, other: SpatialInertia) -> SpatialInertia:
-        """Return both bodies as one."""
+    def __add__(self, other: _Inertia) -> _Inertia:
         mass, moment = plus(self.mass, other.mass), add(self.moment, other.moment)
-        return SpatialInertia(mass, moment, sum_symmetric(self.second, other.second))
+        return _Inertia(mass, moment, sum_symmetric(self.second, other.second))
 
 
 @dataclass(frozen=True, slots=True)
-class SpatialForce:
+class _Force:
     """A force in [N] and its moment about the common origin in [N.m], in world axes."""
 
     force: Vector = ZERO
     moment: Vector = ZERO
 
-    def __add__(self, other: SpatialForce) -> SpatialForce:
-        """Return the sum of two forces."""
-        return SpatialForce(add(self.force, other.force), add(self.moment, other.moment))
+    def __add__(self, other: _Force) -> _Force:
+        return _Force(add(self.force, other.force), add(self.moment, other.moment))
 
 
 @dataclass(frozen=True, slots=True)
-class MovingLink:
+class _MovingLink:
     """A joint and the body that it carries, about the common origin.
 
-    Attributes:
-        coordinate: Index of the coordinate that the joint follows.
-        is_revolute: Whether the joint is revolute; else it is prismatic.
-        axis: z of a revolute joint times its multiplier, 0 of a prismatic one [-].
-        slide: v, the velocity at the common origin per unit rate of the coordinate, in [m] or [-].
-        body: The carried body.
+    axis is z of a revolute joint times its multiplier [-], 0 of a prismatic one; slide is v, the velocity at
+    the common origin per unit rate of the coordinate, in [m] or [-].
     """
 
     coordinate: int
     is_revolute: bool
     axis: Vector
     slide: Vector
-    body: SpatialInertia
+    body: _Inertia
 
-    def field(self, rate: Element) -> SpatialField:
+    def field(self, rate: Element) -> _Field:
         """Return the velocities of all that the joint carries, for a rate of the coordinate."""
         x, y, z = scale(rate, self.axis)
         skew = ((0.0, minus(0.0, z), y), (z, 0.0, minus(0.0, x)), (minus(0.0, y), x, 0.0))
-        return SpatialField(skew, scale(rate, self.slide))
+        return _Field(skew, scale(rate, self.slide))
 
-    def torque(self, force: SpatialForce) -> Element:
+    def torque(self, force: _Force) -> Element:
         """Return the torque of the coordinate, in [N.m] or [N], for a force on all that the joint carries."""
         return plus(dot(self.axis, force.moment), dot(self.slide, force.force))
 
 
-def _moving_links(poses: LinkPoses) -> tuple[list[MovingLink], Vector]:
+def _moving_links(poses: _LinkPoses) -> tuple[list[_MovingLink], Vector]:
     """Return joints and bodies of an arm from the base outwards, and its tool centre point [m]."""
     chain, arm, (first, *following) = poses
     links, pose = [], Transform(chain.base.rotation)
@@ -275,7 +250,7 @@ def _moving_links(poses: LinkPoses) -> tuple[list[MovingLink], Vector]:
         is_revolute = link.joint.kind == "revolute"
         axis, slide = (along, cross(pose.translation, along)) if is_revolute else (ZERO, along)
         body = _transform_inertia(pose, link.mass, link.moment, _second_moments(link.inertia))
-        links.append(MovingLink(link.coordinate, is_revolute, axis, slide, body))
+        links.append(_MovingLink(link.coordinate, is_revolute, axis, slide, body))
     return links, pose.point(arm.tool.translation)
 
 
@@ -287,7 +262,7 @@ def _second_moments(inertia: Symmetric) -> Symmetric:
     return (half[0], xy, xz), (xy, half[1], yz), (xz, yz, half[2])
 
 
-def _transform_inertia(pose: Transform, mass: Element, moment: Vector, second: Symmetric) -> SpatialInertia:
+def _transform_inertia(pose: Transform, mass: Element, moment: Vector, second: Symmetric) -> _Inertia:
     """Return a body that is given in a frame: S' = R S R^T + R h p^T + p (R h)^T + m p p^T."""
     p, rotated = pose.translation, pose.rotate(moment)
     moment = add(rotated, scale(mass, p))  # R h + m p
@@ -299,10 +274,10 @@ def _transform_inertia(pose: Transform, mass: Element, moment: Vector, second: S
 
     xy, xz, yz = shift(xy, 0, 1), shift(xz, 0, 2), shift(yz, 1, 2)
     rows = (shift(xx, 0, 0), xy, xz), (xy, shift(yy, 1, 1), yz), (xz, yz, shift(zz, 2, 2))
-    return SpatialInertia(mass, moment, rows)
+    return _Inertia(mass, moment, rows)
 
 
-def _inertial_force(body: SpatialInertia, field: SpatialField) -> SpatialForce:
+def _inertial_force(body: _Inertia, field: _Field) -> _Force:
     """Return the force and moment that a body needs for accelerations G r + b (module docstring, 2)."""
     b, (hx, hy, hz) = field.offset, body.moment
     gradient = Transform(field.gradient)
@@ -311,7 +286,7 @@ def _inertial_force(body: SpatialInertia, field: SpatialField) -> SpatialForce:
         add(row, (times(b[k], hx), times(b[k], hy), times(b[k], hz))) for k, row in enumerate(rows)
     )
     force = add(gradient.rotate(body.moment), scale(body.mass, b))
-    return SpatialForce(force, (minus(zy, yz), minus(xz, zx), minus(yx, xy)))
+    return _Force(force, (minus(zy, yz), minus(xz, zx), minus(yx, xy)))
 
 
 def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
@@ -337,11 +312,11 @@ def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
     return _mass_matrix_at(_link_poses(chain, q))
 
 
-def _mass_matrix_at(poses: LinkPoses) -> list[list[Element]]:
+def _mass_matrix_at(poses: _LinkPoses) -> list[list[Element]]:
     links, _ = _moving_links(poses)
     count = len(poses.chain.coordinates)
     matrix: list[list[Element]] = [[0.0] * count for _ in range(count)]
-    beyond = SpatialInertia()
+    beyond = _Inertia()
     for j in reversed(range(len(links))):
         beyond += links[j].body
         force = _inertial_force(beyond, links[j].field(1.0))
@@ -368,7 +343,7 @@ def mass_matrix_scales(chain: Chain, q: Sequence[Element]) -> list[Element]:
     """
     links, _ = _moving_links(_link_poses(chain, q))
     scales: list[Element] = [0.0] * len(chain.coordinates)
-    beyond = SpatialInertia()
+    beyond = _Inertia()
     for link in reversed(links):
         beyond += link.body
         (xx, _, _), (_, yy, _), (_, _, zz) = beyond.second
@@ -536,10 +511,10 @@ def torque_terms(
     Source: [Iso9283]_ eq. 13: D_1, D_2, D_(1+k), E and J^T F, the last with the sign of a force from outside.
     """
     links, tool_point = _moving_links(_link_poses(chain, q))
-    inertia, centrifugal, coriolis = SpatialField(), SpatialField(), SpatialField()
-    rates = [SpatialField() for _ in chain.coordinates]
-    weight = SpatialField(offset=scale(-1.0, chain.gravity))
-    forces: list[tuple[SpatialForce, ...]] = []
+    inertia, centrifugal, coriolis = _Field(), _Field(), _Field()
+    rates = [_Field() for _ in chain.coordinates]
+    weight = _Field(offset=scale(-1.0, chain.gravity))
+    forces: list[tuple[_Force, ...]] = []
     for link in links:
         velocity, c = link.field(qd[link.coordinate]), link.coordinate
         inertia += link.field(qdd[c])
@@ -550,20 +525,18 @@ def torque_terms(
         rates[c] += velocity
         fields = (inertia, centrifugal, coriolis, weight)
         forces.append(tuple(_inertial_force(link.body, field) for field in fields))
-    tool = [SpatialForce()] * len(links)
+    tool = [_Force()] * len(links)
     if wrench is not None:
         moment = add(wrench.moment, cross(tool_point, wrench.force))
-        tool[-1] = SpatialForce(scale(-1.0, wrench.force), scale(-1.0, moment))
+        tool[-1] = _Force(scale(-1.0, wrench.force), scale(-1.0, moment))
     terms = [*zip(*forces, strict=True), tool]
     return TorqueTerms(*(_forces_to_torques(links, term, len(chain.coordinates)) for term in terms))
 
 
-def _forces_to_torques(
-    links: Sequence[MovingLink], forces: Sequence[SpatialForce], count: int
-) -> list[Element]:
+def _forces_to_torques(links: Sequence[_MovingLink], forces: Sequence[_Force], count: int) -> list[Element]:
     """Return the torque of each coordinate that provides the forces on the links."""
     torques: list[Element] = [0.0] * count
-    beyond = SpatialForce()
+    beyond = _Force()
     for link, force in zip(reversed(links), reversed(forces), strict=True):
         beyond += force
         torques[link.coordinate] = plus(torques[link.coordinate], link.torque(beyond))

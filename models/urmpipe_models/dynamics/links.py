@@ -125,7 +125,7 @@ def _merge_bodies(bodies: Sequence[tuple[Transform, Inertial]]) -> tuple[Element
     for frame, inertial in bodies:
         centre = frame.point(inertial.centre)
         mass, moment = plus(mass, inertial.mass), add(moment, scale(inertial.mass, centre))
-        offset = point_mass_inertia(inertial.mass, centre)
+        offset = _point_mass_inertia(inertial.mass, centre)
         inertia = sum_symmetric(inertia, rotate_inertia(frame, inertial.matrix), offset)
     return mass, moment, inertia
 
@@ -138,7 +138,7 @@ def rotate_inertia(frame: Transform, matrix: Symmetric) -> Symmetric:
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
-def point_mass_inertia(mass: Element, centre: Vector) -> Symmetric:
+def _point_mass_inertia(mass: Element, centre: Vector) -> Symmetric:
     """Return m (c^2 1 - c c^T) in [kg.m2], the inertia about the origin of a mass in [kg] at c in [m]."""
     x, y, z = centre
     mx, my, mz = scale(mass, centre)

@@ -2,7 +2,7 @@
 
 1. `iter_joint_steps`: consecutive joints with parallel axes rotate their bodies by one angle, a sum.
 2. `Variables`: cosine and sine of each angle, prismatic coordinates, q', q'' and the wrench on the tool.
-3. `iter_bodies`: pose and angular velocity of each joint's body ([Iso9283]_ eq. 8 and 12).
+3. `_iter_bodies`: pose and angular velocity of each joint's body ([Iso9283]_ eq. 8 and 12).
 4. `energies`: T = sum 1/2 m v^2 + 1/2 omega^T I omega, U = -sum m g^T r, and P of the wrench (eq. 8-12).
 5. `equations`: tau_i = d/dt dT/dq_i' - dT/dq_i + dU/dq_i - dP/dq_i', by terms (eq. 13).
 6. `simplify_polynomial`: fewer monomials by c^2 + s^2 = 1 and the addition theorems.
@@ -54,7 +54,7 @@ class AxisRotation(NamedTuple):
 
     def __matmul__(self, rotation: Transform) -> AxisRotation:
         """Return the product with a constant rotation."""
-        return self._replace(inner=round_rotation(self.inner @ Transform(rotation.rotation)))
+        return self._replace(inner=_round_rotation(self.inner @ Transform(rotation.rotation)))
 
 
 class JointStep(NamedTuple):
@@ -95,7 +95,9 @@ def iter_joint_steps(chain: Chain) -> Iterator[JointStep]:
             sign = _parallel_sign(at, joint)
             begins = sign == 0
             if begins:
-                rotation = AxisRotation(joint.axis, value, round_rotation(rotation_about(joint.axis, offset)))
+                rotation = AxisRotation(
+                    joint.axis, value, _round_rotation(rotation_about(joint.axis, offset))
+                )
             else:
                 angle = tuple(_snap(a + sign * b) for a, b in zip(at.angle, value, strict=True))
                 rotation = at._replace(angle=angle) @ rotation_about(joint.axis, offset)
@@ -110,7 +112,7 @@ def _parallel_sign(rotation: AxisRotation, joint: Joint) -> int:
     return 0 if across > PARALLEL_TOLERANCE else round(cosine)
 
 
-def round_rotation(rotation: Transform) -> Transform:
+def _round_rotation(rotation: Transform) -> Transform:
     """Return a constant rotation with entries of exactly 0 or 1 where they are within rounding of these."""
     x, y, z = (tuple(map(_snap, row)) for row in rotation.rotation)
     return Transform((x, y, z))  # type: ignore[arg-type]
@@ -175,7 +177,7 @@ class Variables:
         """Return cos and sin of an angle; of an angle without coordinates the constants 1 and 0."""
         if not any(angle):
             return self.constant(1.0), self.constant(0.0)
-        sign, known = normalise_sign(angle)
+        sign, known = _normalise_sign(angle)
         k = 2 * self.angles.index(known)
         return self.ring.gens[k], self.constant(sign) * self.ring.gens[k + 1]
 
@@ -241,13 +243,13 @@ class Variables:
         return {motion: self.ring.from_dict(part) for motion, part in parts.items()}
 
 
-def normalise_sign(angle: Angle) -> tuple[float, Angle]:
+def _normalise_sign(angle: Angle) -> tuple[float, Angle]:
     """Return the sign of the first factor that is not 0, and the angle times it."""
     sign = 1.0 if next(filter(None, angle)) > 0.0 else -1.0
     return sign, tuple(sign * factor + 0.0 for factor in angle)  # + 0.0: no -0.0
 
 
-def subtract_angles(first: Angle, second: Angle) -> Angle:
+def _subtract_angles(first: Angle, second: Angle) -> Angle:
     """Return the second angle minus the first."""
     return tuple(b - a for a, b in zip(first, second, strict=True))
 
@@ -266,8 +268,8 @@ def chain_to_variables(chain: Chain) -> Variables:
         raise OptionError(Finding(found="equations without sympy", allowed=needs)) from None
     steps = [*iter_joint_steps(chain)]
     pairs = [*dict.fromkeys(_parallel_angles(steps))]
-    rotations = [step.after.angle for step in steps] + [subtract_angles(*pair) for pair in pairs]
-    angles = dict.fromkeys(normalise_sign(angle)[1] for angle in rotations if any(angle))
+    rotations = [step.after.angle for step in steps] + [_subtract_angles(*pair) for pair in pairs]
+    angles = dict.fromkeys(_normalise_sign(angle)[1] for angle in rotations if any(angle))
     sliding = {k for step in steps if step.joint.kind == "prismatic" for k, f in enumerate(step.value) if f}
     slides, count = tuple(sorted(sliding)), len(chain.coordinates)
     names = [f"{kind}{k}" for k in range(len(angles)) for kind in ("c", "s")]
@@ -287,15 +289,8 @@ def _parallel_angles(steps: Sequence[JointStep]) -> Iterator[tuple[Angle, Angle]
             group.append(angle)
 
 
-class MovingBody(NamedTuple):
-    """The body that a joint moves.
-
-    Attributes:
-        step: The joint.
-        rotation: From the joint's moving frame to the base.
-        origin: The origin of that frame, in the base [m].
-        omega: The angular velocity in the axes of the moving frame, in [rad/s].
-    """
+class _Body(NamedTuple):
+    """Body that a joint moves: rotation and origin [m] in the base, omega [rad/s] in its axes."""
 
     step: JointStep
     rotation: Matrix
@@ -303,7 +298,7 @@ class MovingBody(NamedTuple):
     omega: Triple
 
 
-def iter_bodies(chain: Chain, variables: Variables) -> Iterator[MovingBody]:
+def _iter_bodies(chain: Chain, variables: Variables) -> Iterator[_Body]:
     """Yield the body that each joint moves, from the base outwards.
 
     T_1i = A_1 A_2 ... A_i, and omega_i = B_i^T (omega_(i-1) + (0, 0, theta_i')^T), here about any axis.
@@ -326,7 +321,7 @@ def iter_bodies(chain: Chain, variables: Variables) -> Iterator[MovingBody]:
             value = variables.value(step.value, step.offset)
             slide = [variables.constant(x) * value for x in step.joint.axis]
             origin = _shift(origin, rotation, slide, variables)
-        yield MovingBody(
+        yield _Body(
             step,
             _matrix_product(base, rotation, variables),
             _shift(base_origin, base, origin, variables),
@@ -394,8 +389,8 @@ def energies(chain: Chain, variables: Variables) -> Energies:
 
     Source: [Iso9283]_ eq. 8-12.
     """
-    world = round_rotation(Transform(chain.base.columns))  # from the world's axes to the base's
-    bodies = {body.step.joint.name: body for body in iter_bodies(chain, variables)}
+    world = _round_rotation(Transform(chain.base.columns))  # from the world's axes to the base's
+    bodies = {body.step.joint.name: body for body in _iter_bodies(chain, variables)}
     masses = [
         (bodies[inertial.joint], inertial) for inertial in chain.inertials if inertial.joint is not None
     ]
@@ -411,7 +406,7 @@ def energies(chain: Chain, variables: Variables) -> Energies:
     return Energies(kinetic, potential, variables.dot([*force, *moment], motion))
 
 
-def _kinetic(body: MovingBody, inertial: Inertial, variables: Variables) -> Polynomial:
+def _kinetic(body: _Body, inertial: Inertial, variables: Variables) -> Polynomial:
     """Return 1/2 m v^2 + 1/2 omega^T I omega of a mass, in [J]."""
     velocity = _velocity(_point(body, inertial.centre, variables), variables)
     spin = variables.multiply(variables.matrix(inertial.matrix), body.omega)
@@ -419,13 +414,13 @@ def _kinetic(body: MovingBody, inertial: Inertial, variables: Variables) -> Poly
     return variables.constant(0.5) * variables.dot(momenta, [*velocity, *body.omega])
 
 
-def _potential(body: MovingBody, inertial: Inertial, gravity: Vector, variables: Variables) -> Polynomial:
+def _potential(body: _Body, inertial: Inertial, gravity: Vector, variables: Variables) -> Polynomial:
     """Return -m g^T r of a mass, in [J]."""
     weight = [variables.constant(-inertial.mass * x) for x in gravity]
     return variables.dot(weight, _point(body, inertial.centre, variables))
 
 
-def _point(body: MovingBody, point: Vector, variables: Variables) -> Triple:
+def _point(body: _Body, point: Vector, variables: Variables) -> Triple:
     """Return a point in [m] of a body, in the base [m]."""
     return _shift(body.origin, body.rotation, variables.vector(point), variables)
 
@@ -440,7 +435,7 @@ def _velocity(point: Triple, variables: Variables) -> Triple:
     ]
 
 
-def _tool_omega(bodies: Sequence[MovingBody], variables: Variables) -> Triple:
+def _tool_omega(bodies: Sequence[_Body], variables: Variables) -> Triple:
     """Return the angular velocity of the last body, in the base: the sum of each joint's rate on its axis."""
     revolute = [body for body in bodies if body.step.joint.kind == "revolute"]
     axes = [variables.multiply(body.rotation, variables.vector(body.step.joint.axis)) for body in revolute]
@@ -480,7 +475,7 @@ def _equation(energies: Energies, variables: Variables, i: int) -> Equation:
     }
 
 
-class Identity(NamedTuple):
+class _Identity(NamedTuple):
     """A product of two variables, by their indices, and a polynomial equal to it."""
 
     first: int
@@ -504,7 +499,7 @@ def simplify_polynomial(polynomial: Polynomial, variables: Variables) -> Polynom
     return variables.sum(_shorten(part, identities, variables) for part in parts)
 
 
-def _shorten(polynomial: Polynomial, identities: Sequence[Identity], variables: Variables) -> Polynomial:
+def _shorten(polynomial: Polynomial, identities: Sequence[_Identity], variables: Variables) -> Polynomial:
     """Return a polynomial after substitutions until no identity leaves fewer monomials."""
     length = len(polynomial) + 1
     while len(polynomial) < length:
@@ -514,7 +509,7 @@ def _shorten(polynomial: Polynomial, identities: Sequence[Identity], variables: 
     return polynomial
 
 
-def _substitute(polynomial: Polynomial, identity: Identity) -> Iterator[Polynomial]:
+def _substitute(polynomial: Polynomial, identity: _Identity) -> Iterator[Polynomial]:
     """Yield the parts of a polynomial with the product of an identity replaced."""
     i, j, equal = identity
     for key, coefficient in polynomial.items():
@@ -525,19 +520,19 @@ def _substitute(polynomial: Polynomial, identity: Identity) -> Iterator[Polynomi
         yield (equal**times).mul_term((tuple(rest), coefficient))
 
 
-def _square_identities(variables: Variables) -> Iterator[Identity]:
+def _square_identities(variables: Variables) -> Iterator[_Identity]:
     for k in range(0, 2 * len(variables.angles), 2):
         c, s = variables.ring.gens[k : k + 2]
-        yield Identity(k + 1, k + 1, 1 - c**2)
-        yield Identity(k, k, 1 - s**2)
+        yield _Identity(k + 1, k + 1, 1 - c**2)
+        yield _Identity(k, k, 1 - s**2)
 
 
-def _difference_identities(variables: Variables) -> Iterator[Identity]:
+def _difference_identities(variables: Variables) -> Iterator[_Identity]:
     for a, b in variables.parallel:
-        (ca, sa), (cb, sb), (c, s) = map(variables.cosine_sine, (a, b, subtract_angles(a, b)))
-        (sign_a, known_a), (sign_b, known_b) = normalise_sign(a), normalise_sign(b)
+        (ca, sa), (cb, sb), (c, s) = map(variables.cosine_sine, (a, b, _subtract_angles(a, b)))
+        (sign_a, known_a), (sign_b, known_b) = _normalise_sign(a), _normalise_sign(b)
         i, j = (2 * variables.angles.index(known) for known in (known_a, known_b))
-        yield Identity(j + 1, i + 1, (c - cb * ca) * (sign_a * sign_b))
-        yield Identity(j, i, c - sb * sa)
-        yield Identity(j + 1, i, (s + cb * sa) * sign_b)
-        yield Identity(j, i + 1, (sb * ca - s) * sign_a)
+        yield _Identity(j + 1, i + 1, (c - cb * ca) * (sign_a * sign_b))
+        yield _Identity(j, i, c - sb * sa)
+        yield _Identity(j + 1, i, (s + cb * sa) * sign_b)
+        yield _Identity(j, i + 1, (sb * ca - s) * sign_a)

@@ -1,6 +1,6 @@
 """Joints along a planned path: derivatives by arc length, the time-optimal law, utilisation of joint limits.
 
-1. `joint_path_derivatives`: q' = J+ x' and q'' by arc length, least motion, exactly; `refine_on_path`.
+1. `_joint_path_derivatives`: q' = J+ x' and q'' by arc length, least motion, exactly; `_refine_on_path`.
 2. `joints_along`: `PathJoints`, joints followed on a grid of arc lengths that is refined where they are
    unknown between its points. They do not depend on the law of time.
 3. `time_optimal_law`: with x = s'^2 and u = s'' the joints accelerate by q'' = (dq/ds) u + (d2q/ds2) x: their
@@ -86,22 +86,15 @@ def targets_at(path: LineArcPath, s: FloatArray) -> Targets:
     return Targets(path.points(s).position, rotation)
 
 
-def joint_path_derivatives(
+def _joint_path_derivatives(
     chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray, *, before: bool = False
 ) -> JointPathDerivatives:
     """Return the derivatives of joint values that lead the tool along a path with the least motion.
 
     With x' = (t, rate of rotation) and x'' = (curvature, 0): q' = J+ x', and differentiated once more, with
     y = J+^T q', q'' = J+ (x'' - J' q') + (1 - J+ J) J'^T y; the last term is 0 where J is square. Joints
-    that do not move have no column in J.
-
-    Args:
-        chain: The arm.
-        path: The path.
-        q: Joint values along it in [rad] or [m], shape (n, joints); a row of NaN has derivatives of NaN.
-        s: Arc lengths in [m], shape (n,).
-        moves: Which joints move, shape (n, joints).
-        before: Whether derivatives that step at a bound of segments are those before it; else after it.
+    that do not move have no column in J. A row of NaN has derivatives of NaN. At a bound of segments, where
+    derivatives step, they are those after it, or before it.
     """
     points = path.points(s, before=before)
     first, second = points.tangent, points.curvature
@@ -134,23 +127,13 @@ def _derivatives(
     return dq, ddq
 
 
-def refine_on_path(
+def _refine_on_path(
     chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray
 ) -> FloatArray:
     """Return joint values with the tool on the path to the last digits, by Newton steps q + J+ (x - FK(q)).
 
     Each step squares the error. Rows within `PATH_TOLERANCE` stay, and so does, in a singular pose, the error
-    that no step removes.
-
-    Args:
-        chain: The arm.
-        path: The path.
-        q: Joint values near it in [rad] or [m], shape (n, joints), or NaN.
-        s: Arc lengths in [m], shape (n,).
-        moves: Which joints move, shape (n, joints).
-
-    Returns:
-        In [rad] or [m], shape (n, joints).
+    that no step removes; a row of NaN stays.
     """
     refined, remaining = q.copy(), np.flatnonzero(np.isfinite(q).all(axis=1))
     for _ in range(MAX_NEWTON_STEPS):
@@ -178,11 +161,8 @@ def _pseudo_inverses(J: FloatArray, cutoff: float) -> FloatArray:
     """Return pseudo-inverses, shape (n, k, j), of matrices, shape (n, j, k).
 
     A tall matrix is Q R, and its pseudo-inverse R^-1 Q^T. Only those that are nearly singular, as the
-    pivots of R show, need their singular values, which cost three times as much.
-
-    Args:
-        J: In any unit.
-        cutoff: Singular values below this share of the largest count as 0.
+    pivots of R show, need their singular values, which cost three times as much: those below a share of the
+    largest, the cutoff, count as 0.
     """
     tall = J if J.shape[1] > J.shape[2] else J.transpose(0, 2, 1)
     Q, R = np.linalg.qr(tall)
@@ -275,9 +255,9 @@ class PathJoints:
         distance, length = s - self.s[k], np.diff(self.s)[k]
         q = _extrapolate(self.after, k, distance) + (distance / length)[:, None] * self._gaps()[k]
         lower, upper = joint_limits(self.chain)
-        q = refine_on_path(self.chain, self.path, np.clip(q, lower, upper), s, self.moves[k])
+        q = _refine_on_path(self.chain, self.path, np.clip(q, lower, upper), s, self.moves[k])
         q = np.clip(q, lower, upper)  # the last digits of a joint that comes to a limit
-        return joint_path_derivatives(self.chain, self.path, q, s, self.moves[k])
+        return _joint_path_derivatives(self.chain, self.path, q, s, self.moves[k])
 
     def _gaps(self) -> FloatArray:
         """Return the end of each interval minus its extrapolated begin, shape (n, joints).
@@ -344,7 +324,7 @@ def _follow_grid(
     """Return the joints on a grid of arc lengths in [m], shape (n + 1,)."""
     grid = solve_path(chain, targets_at(path, s), np.arange(len(s)), start=start, progress=progress)
     moves, limit_contacts = _moving_joints(chain, grid.q)
-    after = joint_path_derivatives(chain, path, grid.q[:-1], s[:-1], moves)
+    after = _joint_path_derivatives(chain, path, grid.q[:-1], s[:-1], moves)
     before = _derivatives_before(chain, path, s, grid.q, moves, after)
     return PathJoints(chain, path, s, grid, moves, limit_contacts, after, before)
 
@@ -353,10 +333,6 @@ def _moving_joints(chain: Chain, q: FloatArray) -> tuple[BoolArray, BoolArray]:
     """Return which joints move in each interval, shape (n, joints), and where one touches a limit, (n,).
 
     A joint with the same value on a limit at both ends of an interval rests on it.
-
-    Args:
-        chain: The arm.
-        q: Joint values in [rad] or [m], shape (n + 1, joints).
     """
     lower, upper = joint_limits(chain)
     free = lower < upper
@@ -376,7 +352,7 @@ def _derivatives_before(
     """Return the derivatives at the end of each interval: those after it, unless they may step there."""
     steps = np.append((moves[1:] != moves[:-1]).any(axis=1), True)
     steps |= np.isin(s[1:], np.append(path.bounds, path.at))
-    stepped = joint_path_derivatives(chain, path, q[1:][steps], s[1:][steps], moves[steps], before=True)
+    stepped = _joint_path_derivatives(chain, path, q[1:][steps], s[1:][steps], moves[steps], before=True)
     dq, ddq = np.roll(after.dq, -1, axis=0), np.roll(after.ddq, -1, axis=0)
     dq[steps], ddq[steps] = stepped.dq, stepped.ddq
     return JointPathDerivatives(q[1:], dq, ddq)
@@ -399,14 +375,8 @@ class JointLimits:
     tangential: float = np.inf
 
 
-class PhasePlaneBounds(NamedTuple):
-    """Limits of n intervals of a grid: |u + slope x| <= max_u, and x <= max_x at their begin.
-
-    Attributes:
-        slope: In [m/m2], shape (n, k).
-        max_u: In [m/s2], shape (n, k).
-        max_x: In [m2/s2], shape (n + 1,); the last one at the end of the last interval.
-    """
+class _Bounds(NamedTuple):
+    """Limits of n intervals: |u + slope x| <= max_u, shape (n, k), and x <= max_x at their ends, (n + 1,)."""
 
     slope: FloatArray
     max_u: FloatArray
@@ -447,7 +417,7 @@ def time_optimal_law(
 
 def _interval_bounds(
     step: FloatArray, after: JointPathDerivatives, before: JointPathDerivatives, limits: JointLimits
-) -> PhasePlaneBounds:
+) -> _Bounds:
     """Return the bounds that limits set at both ends of each interval, of lengths in [m], shape (n,).
 
     At its end x + 2 step u replaces x: |(dq + 2 step ddq) u + ddq x| <= a.
@@ -466,10 +436,10 @@ def _interval_bounds(
         max_u = np.where(moves, limit / np.abs(along), np.inf)
     max_x[:-1] = np.minimum(max_x[:-1], curved)
     tool = np.zeros((len(step), 1))
-    return PhasePlaneBounds(np.hstack((slope, tool)), np.hstack((max_u, tool + limits.tangential)), max_x)
+    return _Bounds(np.hstack((slope, tool)), np.hstack((max_u, tool + limits.tangential)), max_x)
 
 
-def _two_passes(step: FloatArray, bounds: PhasePlaneBounds, stop: BoolArray) -> FloatArray:
+def _two_passes(step: FloatArray, bounds: _Bounds, stop: BoolArray) -> FloatArray:
     """Return x in [m2/s2] on the grid, shape (n + 1,); 0 at stops."""
     half = 0.5 / step
     limit = np.where(stop, 0.0, bounds.max_x)
@@ -486,7 +456,7 @@ def _two_passes(step: FloatArray, bounds: PhasePlaneBounds, stop: BoolArray) -> 
     return x
 
 
-def _max_feasible_x(bounds: PhasePlaneBounds, half: FloatArray) -> FloatArray:
+def _max_feasible_x(bounds: _Bounds, half: FloatArray) -> FloatArray:
     """Return the largest x at which some u is allowed that leaves x + 2 step u at 0 or above, shape (n,).
 
     Each pair of bounds has to leave room: -max_u_j - slope_j x <= max_u_k - slope_k x.
@@ -499,7 +469,7 @@ def _max_feasible_x(bounds: PhasePlaneBounds, half: FloatArray) -> FloatArray:
     return np.asarray(np.where(difference > 0.0, room, np.inf).min(axis=(1, 2)))
 
 
-def _rest_to_rest(bounds: PhasePlaneBounds, i: int, s: float, step: float) -> list[Phase]:
+def _rest_to_rest(bounds: _Bounds, i: int, s: float, step: float) -> list[Phase]:
     """Return the phases of an interval from s in [m], at rest at both ends: up to its middle, then down.
 
     With u constant x rises to u step: |u + slope x| <= max_u holds where u (1 + |slope| step) <= max_u.

@@ -2,7 +2,7 @@
 
 1. `Phase`, `TimeLaw`: s = s0 + v t + a t^2 / 2 + j t^3 / 6, or a swing on an arc, where
    s''^2 + (s'^2 / r)^2 = a^2 is the equation of a pendulum ([Dlmf]_ 22.19(i)).
-2. `split_at_stops`, `max_boundary_speeds`: segments from stop to stop, each with its maximum speed, and the
+2. `_split_at_stops`, `_max_boundary_speeds`: segments from stop to stop, each with its maximum speed, and the
    maximum speeds at their boundaries, by one pass forward and one pass back.
 3. `trapezoid_law`: a maximum acceleration ([Iso9283]_ section 2, section 4 steps 11 to 13).
 4. `jerk_law`: a maximum jerk too, by Ruckig ([BerscheidKroger2021]_, extra `planning`).
@@ -196,19 +196,13 @@ class SpeedSegment(NamedTuple):
     max_speed: float
 
 
-def split_at_stops(
+def _split_at_stops(
     path: LineArcPath, velocity: float, acceleration: float, arcs: Arcs
 ) -> Iterator[list[SpeedSegment]]:
     """Yield the segments from each stop to the next.
 
     If s'' alone is limited, there is one from stop to stop; else each segment of the path is one, an arc with
     the maximum speed min(v, sqrt(a r)).
-
-    Args:
-        path: The path.
-        velocity: v in [m/s].
-        acceleration: a in [m/s2].
-        arcs: "tangential" or "total".
     """
     bounds = np.searchsorted(path.bounds, path.stops).tolist()  # a stop is a bound, to the last bit
     for first, last in pairwise(bounds):
@@ -219,14 +213,13 @@ def split_at_stops(
             yield [SpeedSegment(length, r, min(velocity, math.sqrt(acceleration * r))) for length, r in pairs]
 
 
-def max_boundary_speeds(max_speeds: Sequence[float], reachable: Callable[[int, float], float]) -> list[float]:
-    """Return the maximum speeds at the boundaries of n segments in [m/s], n + 1 of them, 0 at both ends.
+def _max_boundary_speeds(
+    max_speeds: Sequence[float], reachable: Callable[[int, float], float]
+) -> list[float]:
+    """Return the maximum speeds at the boundaries of segments from stop to stop in [m/s], 0 at both ends.
 
-    By one pass forward and one pass back.
-
-    Args:
-        max_speeds: Of the segments from one stop to the next, in [m/s].
-        reachable: Maximum speed at one end of a segment, by its index and the speed at the other end.
+    By one pass forward and one pass back: `reachable` gives the maximum speed at one end of a segment for its
+    index and the speed at the other end.
     """
     speeds = [0.0, *(min(pair) for pair in pairwise(max_speeds)), 0.0]
     for k in range(1, len(max_speeds)):
@@ -256,12 +249,12 @@ def trapezoid_law(
     """
     phases: list[Phase] = []
     begin = 0.0
-    for segments in split_at_stops(path, velocity, acceleration, arcs):
+    for segments in _split_at_stops(path, velocity, acceleration, arcs):
 
         def reachable(k: int, speed: float, segments: Sequence[SpeedSegment] = segments) -> float:
             return _reachable_speed(segments[k], speed, acceleration)
 
-        speeds = max_boundary_speeds([segment.max_speed for segment in segments], reachable)
+        speeds = _max_boundary_speeds([segment.max_speed for segment in segments], reachable)
         for segment, (entry, leave) in zip(segments, pairwise(speeds), strict=True):
             phases += segment_phases(segment, begin, entry, leave, acceleration)
             begin += segment.length
@@ -341,13 +334,13 @@ def jerk_law(path: LineArcPath, velocity: float, acceleration: float, jerk: floa
     """
     phases: list[Phase] = []
     begin = 0.0
-    for stretch in split_at_stops(path, velocity, acceleration, arcs):
+    for stretch in _split_at_stops(path, velocity, acceleration, arcs):
         segments = [*_limit_accelerations(stretch, acceleration)]
 
         def reachable(k: int, speed: float, segments: Sequence[_JerkSegment] = segments) -> float:
             return _reachable_speed_with_jerk(segments[k], speed, jerk)
 
-        speeds = max_boundary_speeds([segment.max_speed for segment in segments], reachable)
+        speeds = _max_boundary_speeds([segment.max_speed for segment in segments], reachable)
         for segment, (entry, leave) in zip(segments, pairwise(speeds), strict=True):
             phases += _ruckig_phases(segment, entry, leave, jerk, begin)
             begin += segment.length

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -260,8 +261,9 @@ def test_an_arm_without_masses_says_which_key_is_missing() -> None:
     chain = load_robot("urm6")
     still = [0.0] * 6
     message = "robot urm6: key inertials: found none, allowed: the masses of the arm (in a URDF <inertial>)"
-    for function, count in (
+    functions: list[tuple[Callable[..., object], int]] = [
         (inverse_dynamics, 3), (mass_matrix, 1), (forward_dynamics, 3), (torque_terms, 3),
         (kinetic_energy, 2), (check_solvable, 0),
-    ):  # fmt: skip
+    ]  # fmt: skip
+    for function, count in functions:
         assert refusal(RobotError, function, chain, *[still] * count) == message

@@ -77,7 +77,8 @@ def c_terms(
 ) -> dict[str, FloatArray]:
     """Return each term of each coordinate, and the sum as `torque`, as compiled C computes them."""
     given = dict(zip(("q", "qd", "qdd"), motion, strict=True)) | {"force": np.asarray(wrench)}
-    arguments: dict[str, tuple[str, ...]] = {**ARGUMENTS, "torque": tuple(given)}
+    arguments: dict[str, tuple[str, ...]] = {str(term): ARGUMENTS[term] for term in ARGUMENTS}
+    arguments["torque"] = tuple(given)
     pointer = ctypes.POINTER(ctypes.c_double)
     found = {}
     for term, names in arguments.items():
