@@ -12,7 +12,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.hand_eye import HARDLY, TURN_LENGTH, HandEye, rotation_residual, solve_hand_eye
+from urmpipe_models.hand_eye import (
+    RADIAN_LENGTH,
+    WEAK_SENSITIVITY,
+    HandEye,
+    rotation_residual,
+    solve_hand_eye,
+)
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import FORMS, RotationForm, to_matrices, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
@@ -156,11 +162,11 @@ def test_orientations_tell_what_positions_on_a_line_leave_open() -> None:
         base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
         tool = truth.tool @ Rotation.from_rotvec(x[9:]).as_matrix()
         moved = (truth.position + truth.rotation @ (truth.offset + x[3:6])) @ base.T
-        apart = TURN_LENGTH / np.sqrt(2) * (turns - base @ truth.rotation @ tool)
+        apart = RADIAN_LENGTH / np.sqrt(2) * (turns - base @ truth.rotation @ tool)
         return np.concatenate(((measured - moved - truth.shift - x[6:9]).ravel(), apart.ravel()))
 
     best = least_squares(miss, np.zeros(12), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    apart = TURN_LENGTH / np.sqrt(2) * (turns - found.base_rotation @ truth.rotation @ found.tool_rotation)
+    apart = RADIAN_LENGTH / np.sqrt(2) * (turns - found.base_rotation @ truth.rotation @ found.tool_rotation)
     left = (misses(found, truth, measured) ** 2).sum() + (apart**2).sum()
     assert left == pytest.approx(2 * best.cost, rel=1e-9)
     assert [one.part for one in found.untold] == ["tool offset"]  # along the one axis of all turns
@@ -229,7 +235,7 @@ def test_a_tool_that_hardly_turns_is_found_and_said_to_be_hardly_told() -> None:
     for one in found.untold:
         spun = truth.rotation @ one.axis
         assert one.seen == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)
-        assert one.seen < HARDLY
+        assert one.seen < WEAK_SENSITIVITY
 
 
 @pytest.mark.slow

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.wraps import (
-    AROUND,
-    FAR,
     FULL_TURN,
-    PERCEPTIBLE,
+    MIN_DISTANCE,
+    MIN_DISTANCE_RATIO,
+    STEPS_AROUND,
     find_interpolated_samples,
     reinterpolate,
     repolarize,
@@ -82,9 +82,9 @@ def test_k_is_right_after_the_pair_whatever_the_fraction(
 def test_an_in_between_sample_is_told_where_it_stands_out_of_the_motion(
     max_speed: float, direction: float
 ) -> None:
-    """By FAR times the motion, from either end of the jump: 4 x 0.01 rad of 6.28, 0.7 % of it."""
+    """By `MIN_DISTANCE_RATIO`, from either end of the jump: 4 x 0.01 rad of 6.28, 0.7 % of it."""
     seen = found_in_each(with_in_between(FRACTIONS, direction)[1], max_speed)[1]
-    share = FAR * MOVE / FULL_TURN
+    share = MIN_DISTANCE_RATIO * MOVE / FULL_TURN
     clear = np.minimum(FRACTIONS, 1.0 - FRACTIONS) > share + 0.002
     assert all(told == [10] for told, is_clear in zip(seen, clear, strict=True) if is_clear)
     assert sum(not told for told in seen) <= 2 * round(len(FRACTIONS) * share + 2)
@@ -155,9 +155,9 @@ def test_noise_about_the_limit_is_hardly_ever_told() -> None:
 def test_a_deviation_too_small_to_matter_is_not_told() -> None:
     q = np.full(20, np.pi - 1e-9)
     q[10:] = -np.pi + 1e-9
-    q[10] += 0.9 * PERCEPTIBLE * FULL_TURN  # lies between, and nothing moves around it
+    q[10] += 0.9 * MIN_DISTANCE * FULL_TURN  # lies between, and nothing moves around it
     assert found_by_all(q)[1] == []
-    q[10] += 0.2 * PERCEPTIBLE * FULL_TURN
+    q[10] += 0.2 * MIN_DISTANCE * FULL_TURN
     assert found_by_all(q)[1] == [10]
 
 
@@ -181,26 +181,26 @@ def beside_a_wrap(deviation: float, t: FloatArray, moves: dict[int, float] | Non
 
 def test_a_sample_is_off_the_line_beyond_four_times_half_the_way_of_its_neighbours() -> None:
     even = np.ldexp(np.arange(2.0 * STILL), -8)
-    assert beside_a_wrap(FAR * 8.0 / 2.0, even) == []
-    assert beside_a_wrap(FAR * 8.0 / 2.0 + 2.0**-40, even) == [STILL]
+    assert beside_a_wrap(MIN_DISTANCE_RATIO * 8.0 / 2.0, even) == []
+    assert beside_a_wrap(MIN_DISTANCE_RATIO * 8.0 / 2.0 + 2.0**-40, even) == [STILL]
 
 
 @pytest.mark.parametrize("offset", [*range(-6, 0), *range(2, 8)])
 def test_four_steps_on_either_side_tell_how_fast_the_joint_moves(offset: int) -> None:
     """A step of 32 is eight times the speed over the wrap, where it counts; each takes its own time."""
     even = np.ldexp(np.arange(2.0 * STILL), -8)
-    counts = offset in AROUND
+    counts = offset in STEPS_AROUND
     assert counts == (-4 <= offset <= 5)
     for deviation, told in (
-        (FAR * 8.0 / 2.0 + 1.0, not counts),
-        (FAR * 32.0, not counts),
-        (FAR * 32.0 + 1.0, True),
+        (MIN_DISTANCE_RATIO * 8.0 / 2.0 + 1.0, not counts),
+        (MIN_DISTANCE_RATIO * 32.0, not counts),
+        (MIN_DISTANCE_RATIO * 32.0 + 1.0, True),
     ):
         assert beside_a_wrap(deviation, even, {STILL + offset: 32.0}) == [STILL] * told
     slower = even.copy()
     slower[STILL + offset :] += 2.0**-8  # twice the time for that step
-    assert beside_a_wrap(FAR * 16.0 + 1.0, slower, {STILL + offset: 32.0}) == [STILL]
-    assert beside_a_wrap(FAR * 16.0, slower, {STILL + offset: 32.0}) == [STILL] * (not counts)
+    assert beside_a_wrap(MIN_DISTANCE_RATIO * 16.0 + 1.0, slower, {STILL + offset: 32.0}) == [STILL]
+    assert beside_a_wrap(MIN_DISTANCE_RATIO * 16.0, slower, {STILL + offset: 32.0}) == [STILL] * (not counts)
 
 
 def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
@@ -254,7 +254,7 @@ def test_the_first_and_the_last_sample_have_no_neighbours_at_the_other_end() -> 
 
 
 def test_what_can_be_perceived_is_more_than_a_share_of_the_period() -> None:
-    period = 1.0 / PERCEPTIBLE  # 2000, of which the share is 1
+    period = 1.0 / MIN_DISTANCE  # 2000, of which the share is 1
     for off, told in ((1.0, []), (1.0 + 2.0**-40, [3])):
         q = np.array([1000.0, 1000.0, 1000.0, 1000.0 - off, -1000.0, -1000.0, -1000.0])
         x = q + period * np.array([0, 0, 0, 0, 1, 1, 1])

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from urmpipe_models.errors import Hint
-from urmpipe_models.hand_eye import OPEN, Part, Untold
+from urmpipe_models.hand_eye import MIN_SENSITIVITY, Part, Untold
 from urmpipe_models.measure_units import USUAL_UNITS
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
@@ -74,7 +74,7 @@ def _beyond(one: Deviation, reference: Trajectory) -> int:
 def open_frames(one: Deviation) -> Iterator[LogWarning]:
     """Yield what the compared poses of a log do not tell of the base and the tool that were fitted."""
     untold = one.alignment.untold
-    nothing, little = ([it for it in untold if (it.seen < OPEN) is told] for told in (True, False))
+    nothing, little = ([it for it in untold if (it.seen < MIN_SENSITIVITY) is told] for told in (True, False))
     said = []
     if nothing:
         said.append(f"do not determine {_parts(nothing)}, so the smallest values are used")
