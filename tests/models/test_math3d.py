@@ -1,30 +1,43 @@
-"""Rigid transforms against SciPy, and the laws that they keep."""
+"""Transforms, Euler angles and forms of orientations: SciPy, and the laws of their groups."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import (
+    FORMS,
+    RotationForm,
     Transform,
+    angle_between,
+    column_count,
+    conjugate,
     euler_zxz,
     euler_zyx,
     from_offset,
     from_rpy,
     from_zxz,
+    is_angular,
     matrix_to_rpy,
+    quaternion_product,
     rotation_about,
     rotation_x,
     rotation_y,
     rotation_z,
+    slerp,
+    to_matrices,
+    to_quaternions,
+    to_rotation_vectors,
     translation,
 )
 
@@ -37,8 +50,15 @@ def matrix(rotation: Any) -> NDArray[np.float64]:
     return np.array(rotation, dtype=float)
 
 
-def rows(values: NDArray[np.float64]) -> Any:
-    return tuple(tuple(row) for row in values.tolist())
+def homogeneous(frame: Transform) -> FloatArray:
+    """Return a pose as a matrix, shape (4, 4)."""
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = frame.rotation, frame.translation
+    return result
+
+
+def half_angle_errors(got: Any, expected: tuple[float, float, float]) -> list[float]:
+    return [np.sin(np.subtract(a, b) / 2.0) for a, b in zip(got[:3], expected, strict=True)]
 
 
 @pytest.mark.slow
@@ -64,15 +84,7 @@ def test_rotation_about_is_scipys_and_orthogonal(angle: float, polar: float, azi
 @pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), angles)
 @pytest.mark.parametrize(
-    "axis",
-    [
-        (1.0, 0.0, 0.0),
-        (0.0, -1.0, 0.0),
-        (0.0, 0.0, 1.0),
-        (0.6, 0.0, -0.8),
-        (1e-8, 0.0, 1.0),
-        (0.0, 1.0, -1e-9),
-    ],
+    "axis", [(1.0, 0, 0), (0, -1.0, 0), (0, 0, 1.0), (0.6, 0.0, -0.8), (1e-8, 0.0, 1.0), (0.0, 1.0, -1e-9)]
 )
 def test_turned_is_the_product_with_rotation_about(
     axis: tuple[float, float, float], seed: int, angle: float
@@ -109,12 +121,6 @@ def test_a_point_is_that_of_the_4x4_matrix(values: list[float]) -> None:
     np.testing.assert_allclose(a.point(point), seen[:3], atol=ROUNDING)
 
 
-def homogeneous(frame: Transform) -> NDArray[np.float64]:
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = frame.rotation, frame.translation
-    return result
-
-
 def test_constants_fold_away() -> None:
     q = np.linspace(-1.0, 1.0, 5)
     turned = translation(0.0, 0.0, 0.3) @ rotation_y(math.pi / 2) @ rotation_z(q)
@@ -127,8 +133,7 @@ def test_constants_fold_away() -> None:
 def test_euler_angles_come_back_away_from_the_singular_ones(rz: float, ry: float, rx: float) -> None:
     got = euler_zyx(from_rpy(rx, ry, rz).rotation)
     # the sine of the angle between is ill-conditioned by 1 / cos(ry) <= 15
-    turned = [np.sin(np.subtract(a, b) / 2.0) for a, b in zip(got[:3], (rz, ry, rx), strict=True)]
-    np.testing.assert_allclose(turned, 0.0, atol=15 * ROUNDING)
+    np.testing.assert_allclose(half_angle_errors(got, (rz, ry, rx)), 0.0, atol=15 * ROUNDING)
     assert not got[3]
 
 
@@ -172,8 +177,8 @@ def test_from_zxz_is_scipys_moving_z_x_z(z1: float, x: float, z2: float) -> None
 @given(angles, st.floats(0.07, 3.07), angles)
 def test_zxz_angles_come_back_away_from_the_singular_ones(z1: float, x: float, z2: float) -> None:
     got = euler_zxz(from_zxz(z1, x, z2).rotation)
-    turned = [np.sin(np.subtract(a, b) / 2.0) for a, b in zip(got[:3], (z1, x, z2), strict=True)]
-    np.testing.assert_allclose(turned, 0.0, atol=15 * ROUNDING)  # ill-conditioned by 1 / sin(x) <= 15
+    # ill-conditioned by 1 / sin(x) <= 15
+    np.testing.assert_allclose(half_angle_errors(got, (z1, x, z2)), 0.0, atol=15 * ROUNDING)
     assert not got[3]
 
 
@@ -226,9 +231,8 @@ def test_both_conventions_tell_the_same_rotation(rz: float, ry: float, rx: float
     z1, x, z2, singular = euler_zxz(rotation)
     assume(not singular and np.sin(x) > 0.07)
     back = euler_zyx(from_zxz(float(z1), float(x), float(z2)).rotation)
-    turned = [np.sin(np.subtract(a, b) / 2.0) for a, b in zip(back[:3], (rz, ry, rx), strict=True)]
     # ill-conditioned by 1 / sin(x) <= 15 there and by 1 / cos(ry) <= 15 back
-    np.testing.assert_allclose(turned, 0.0, atol=225 * ROUNDING)
+    np.testing.assert_allclose(half_angle_errors(back, (rz, ry, rx)), 0.0, atol=225 * ROUNDING)
 
 
 def test_a_zero_of_either_sign_gives_the_angle_pi() -> None:
@@ -271,3 +275,182 @@ def test_offsets_come_back(values: list[float]) -> None:
     np.testing.assert_allclose(matrix_to_rpy(frame.rotation), values[3:], atol=2 * ROUNDING)  # 1 / cos(1) < 2
     shift = from_offset(values[:3])
     assert (shift.translation, matrix_to_rpy(shift.rotation)) == (tuple(values[:3]), (0.0, 0.0, 0.0))
+
+
+SMALL = 1e-14  # of numbers up to 1; or three products of entries up to 4, a dozen roundings each
+
+
+class Group(NamedTuple):
+    """A group: its elements from six numbers, its operations, and the matrices of its elements."""
+
+    element: Callable[[list[float]], Any]
+    product: Callable[[Any, Any], Any]
+    inverse: Callable[[Any], Any]
+    identity: Any
+    matrix: Callable[[Any], FloatArray]
+
+
+def unit_quaternion(values: list[float]) -> FloatArray:
+    quaternion = np.array([values[:4]]) + np.array([[0.0, 0.0, 0.0, 4.0]])  # never of length 0
+    return np.asarray(quaternion / np.linalg.norm(quaternion))
+
+
+GROUPS = {
+    "poses": Group(from_offset, lambda a, b: a @ b, Transform.inverse, Transform(), homogeneous),
+    "quaternions": Group(
+        unit_quaternion, quaternion_product, conjugate, np.array([[0.0, 0.0, 0.0, 1.0]]),
+        lambda a: to_matrices(a)[0],
+    ),
+}  # fmt: skip
+elements = st.lists(st.floats(-3.0, 3.0, allow_subnormal=False), min_size=6, max_size=6)
+
+
+@pytest.mark.parametrize("name", GROUPS)
+@settings(max_examples=30, deadline=None)
+@given(first=elements, second=elements, third=elements)
+def test_poses_and_quaternions_are_groups_and_multiply_as_their_matrices(
+    name: str, first: list[float], second: list[float], third: list[float]
+) -> None:
+    element, product, inverse, identity, as_matrix = GROUPS[name]
+    a, b, c = map(element, (first, second, third))
+    ab = product(a, b)
+    for left, right in (
+        (product(ab, c), product(a, product(b, c))),
+        (product(a, inverse(a)), identity),
+        (product(inverse(a), a), identity),
+        (inverse(inverse(a)), a),
+        (inverse(ab), product(inverse(b), inverse(a))),
+        (product(a, identity), a),
+        (product(identity, a), a),
+    ):
+        np.testing.assert_allclose(as_matrix(left), as_matrix(right), rtol=0.0, atol=SMALL)
+    expected = as_matrix(a) @ as_matrix(b) @ as_matrix(c)
+    np.testing.assert_allclose(as_matrix(product(ab, c)), expected, rtol=0.0, atol=SMALL)
+
+
+def recorded(rotation: Rotation, form: RotationForm) -> FloatArray:
+    """SciPy's columns of a form; capital letters are axes that move along."""
+    match form:
+        case "vector":
+            return rotation.as_rotvec()
+        case "rpy":
+            return rotation.as_euler("xyz")
+        case "quat_xyzw":
+            return rotation.as_quat()
+        case "quat_wxyz":
+            return rotation.as_quat()[:, [3, 0, 1, 2]]
+        case "matrix":
+            return rotation.as_matrix().reshape(-1, 9)
+    return rotation.as_euler(form.upper())  # type: ignore[call-overload,no-any-return]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_gives_the_rotation_that_scipy_wrote(form: RotationForm) -> None:
+    rotation = Rotation.random(500, rng=np.random.default_rng(3))
+    columns = recorded(rotation, form)
+    assert columns.shape == (500, column_count(form))
+    found = to_quaternions(columns, form)
+    np.testing.assert_allclose(angle_between(found, rotation.as_quat()), 0.0, atol=SMALL)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=SMALL)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_missing_sample_stays_missing(form: RotationForm) -> None:
+    columns = recorded(Rotation.random(3, rng=np.random.default_rng(4)), form)
+    columns[1, -1] = np.nan
+    found = to_quaternions(columns, form)
+    assert np.isnan(found[1]).any()
+    assert np.isfinite(found[[0, 2]]).all()
+
+
+def test_half_turns_as_matrices() -> None:
+    """1 + trace R is 0: only another component can be divided by."""
+    half_turns = Rotation.from_rotvec(np.pi * np.eye(3))
+    found = to_quaternions(half_turns.as_matrix().reshape(-1, 9), "matrix")
+    np.testing.assert_allclose(np.abs(found), np.eye(3, 4), atol=SMALL)
+
+
+def test_a_quaternion_is_brought_to_unit_length() -> None:
+    found = to_quaternions(np.array([[0.0, 0.0, 0.0, 2.0]]), "quat_xyzw")
+    assert found.tolist() == [[0.0, 0.0, 0.0, 1.0]]
+
+
+def test_quaternions_of_rotation_vectors() -> None:
+    half = np.sqrt(0.5)
+    found = to_quaternions(
+        np.array([[0, 0, 0], [0, 0, np.pi / 2], [np.pi, 0, 0], [0, -np.pi / 2, 0], [1e-9, 0, 0]]), "vector"
+    )
+    expected = [[0, 0, 0, 1], [0, 0, half, half], [1, 0, 0, 0], [0, -half, 0, half], [5e-10, 0, 0, 1]]
+    np.testing.assert_allclose(found, expected, atol=1e-15)  # a few rounding errors of numbers up to 1
+
+
+def test_the_angle_between_an_orientation_and_its_negative_is_none() -> None:
+    first = Rotation.random(10, rng=np.random.default_rng(5))
+    turned = first * Rotation.from_rotvec([0.0, 0.0, 0.25])
+    np.testing.assert_allclose(angle_between(first.as_quat(), -turned.as_quat()), 0.25, atol=SMALL)
+    np.testing.assert_allclose(angle_between(first.as_quat(), -first.as_quat()), 0.0, atol=SMALL)
+
+
+def test_matrices_are_those_of_scipy() -> None:
+    rotation = Rotation.random(500, rng=np.random.default_rng(6))
+    np.testing.assert_allclose(to_matrices(rotation.as_quat()), rotation.as_matrix(), atol=SMALL)
+    np.testing.assert_array_equal(to_matrices(np.array([[0.0, 0.0, 0.0, 1.0]])), np.eye(3)[np.newaxis])
+
+
+def test_a_product_is_the_second_rotation_followed_by_the_first() -> None:
+    first, second = (Rotation.random(200, rng=np.random.default_rng(seed)) for seed in (7, 8))
+    found = quaternion_product(first.as_quat(), second.as_quat())
+    np.testing.assert_allclose(to_matrices(found), (first * second).as_matrix(), atol=SMALL)
+    undone = quaternion_product(conjugate(first.as_quat()), found)
+    np.testing.assert_allclose(to_matrices(undone), second.as_matrix(), atol=SMALL)
+
+
+def test_angles_are_exact_from_nothing_to_half_a_turn() -> None:
+    """The cosine of an angle near 0 or pi has half of its digits: arccos would be off by 1e-8."""
+    first = Rotation.random(1, rng=np.random.default_rng(9))
+    near = np.concatenate(([0.0], np.logspace(-15, -1, 57)))
+    for angle in (*near, *(np.pi - near)):
+        turned = first * Rotation.from_rotvec([0.0, angle, 0.0])
+        found = float(angle_between(first.as_quat(), turned.as_quat())[0])
+        assert found == pytest.approx(angle, rel=0.0, abs=2e-15)  # some rounding errors of numbers up to pi
+
+
+unit_quaternions = arrays(np.float64, (3, 4), elements=st.floats(-1, 1)).filter(
+    lambda quat: bool((np.linalg.norm(quat, axis=1) > 1e-3).all())
+)
+
+
+@settings(max_examples=50, deadline=None)
+@given(unit_quaternions, unit_quaternions, st.floats(0, 1))
+def test_orientations_between_two_are_those_of_scipy(
+    first: FloatArray, second: FloatArray, share: float
+) -> None:
+    one, other = (quat / np.linalg.norm(quat, axis=1, keepdims=True) for quat in (first, second))
+    # Half a turn apart both ways round are as short, and either may be taken.
+    assume(bool((angle_between(one, other) < np.pi - 1e-6).all()))
+    found = slerp(one, other, np.full(3, share))
+    for k in range(3):
+        ends = Rotation.from_quat(np.vstack((one[k], other[k])))
+        expected = Slerp([0.0, 1.0], ends)([share]).as_quat()
+        assert angle_between(found[[k]], expected)[0] < SMALL
+        passed = angle_between(one[[k]], found[[k]])[0]
+        assert passed == pytest.approx(share * angle_between(one[[k]], other[[k]])[0], rel=0, abs=SMALL)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=SMALL)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_only_angles_are_in_radians(form: RotationForm) -> None:
+    assert is_angular(form) == (form not in ("quat_xyzw", "quat_wxyz", "matrix"))
+
+
+def test_rotation_vectors_are_those_of_scipy_for_either_sign() -> None:
+    rotation = Rotation.random(200, rng=np.random.default_rng(10))
+    for quaternions in (rotation.as_quat(), -rotation.as_quat()):
+        np.testing.assert_allclose(to_rotation_vectors(quaternions), rotation.as_rotvec(), atol=SMALL)
+
+
+def test_at_an_end_of_the_way_stands_that_end() -> None:
+    there, missing = np.array([[0.5, 0.5, 0.5, 0.5]]), np.full((1, 4), np.nan)
+    np.testing.assert_array_equal(slerp(there, missing, np.array([0.0])), there)
+    np.testing.assert_array_equal(slerp(missing, there, np.array([1.0])), there)
+    assert np.isnan(slerp(there, missing, np.array([0.5]))).all()
