@@ -6,6 +6,9 @@
    tool.
 3. `read_pair`: gears, racks and cams between the variables of two joints, with the profile of a cam from a
    CSV file.
+
+Errors go to the table that is read. `units` are those of the file, `folder` is that of the network: files of
+robots and profiles are relative to it. The place in the file of each part is added to `places`.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.chain import Joint as ChainJoint
@@ -41,6 +44,7 @@ from urmpipe_models.networks.parts import (
     Expression,
     Joint,
     JointKind,
+    Parts,
     Profile,
     frame_from_axes,
     pair_bodies,
@@ -107,11 +111,8 @@ def element_to_joint(element: DHElement, ends: tuple[str, str]) -> Joint:
     """Return the joint of an element: A_1 T A_2^-1 is the frame of eq. 3-5 to 3-7.
 
     With P = (e2, e1, -e3) as columns, P Ry(theta) P^-1 = Rx(theta) and P Ty(s) P^-1 = Tx(s), so that
-    A_1 = Ty(a) Ry(alpha) P and A_2 = P; constants s and theta go to A_1 and A_2.
-
-    Args:
-        element: The element.
-        ends: The bodies before and after it.
+    A_1 = Ty(a) Ry(alpha) P and A_2 = P; constants s and theta go to A_1 and A_2. The ends are the bodies
+    before and after it.
 
     Source: [KinematicSystems]_ section 3.2.5, with its errata.
     """
@@ -132,14 +133,7 @@ def element_to_joint(element: DHElement, ends: tuple[str, str]) -> Joint:
 def read_dh(
     table: CheckedTable, units: Units, ground: str, places: dict[str, str]
 ) -> Iterator[tuple[Joint, Body | None]]:
-    """Yield the joint of each element and the body that it carries; None of one that closes the chain.
-
-    Args:
-        table: `[dh]` with `closed` and `elements`.
-        units: The units of the file.
-        ground: The body before the first element, and after the last of a closed chain.
-        places: The place in the file of each joint and body, to which these are added.
-    """
+    """Yield the joint of each element of `[dh]` and the body that it carries; None if it closes the chain."""
     is_closed = table.flag("closed")
     rows = table.named_tables("elements")
     table.report_unknown_keys()
@@ -179,33 +173,10 @@ def _read_dh_joint(name: str, row: CheckedTable, units: Units, ends: tuple[str, 
 # --- robots
 
 
-class ChainParts(NamedTuple):
-    """Parts that a chain adds to a network.
-
-    Attributes:
-        bodies: NAME.JOINT with the moving frame of each joint, and NAME.tool.
-        joints: NAME.JOINT of each joint, and NAME.tool, which cannot move.
-        controls: NAME_JOINT of each joint that others follow.
-    """
-
-    bodies: list[Body]
-    joints: list[Joint]
-    controls: list[Control]
-
-
 def read_chain(
     name: str, table: CheckedTable, units: Units, folder: Path, ground: str, places: dict[str, str]
-) -> ChainParts | None:
-    """Return the parts of a robot; None if it cannot be read.
-
-    Args:
-        name: Its name in the network.
-        table: Its table, with `robot`, `base_link`, `tip_link`, `body`, `start` and `value`.
-        units: The units of the file.
-        folder: The folder to which files of robots are relative.
-        ground: The body that carries it if its table has none.
-        places: The place in the file of each joint, body and control, to which these are added.
-    """
+) -> Parts | None:
+    """Return the parts of a robot; None if it cannot be read. The ground carries it without a `body`."""
     place = f"chains.{name}"
     chain, carrier = _load_chain(table, folder), table.text("body", ground)
     if chain is None:  # then its start and its drives cannot be checked
@@ -270,8 +241,11 @@ def _read_chain_values(table: CheckedTable, chain: Chain, units: Units) -> dict[
 
 def chain_to_parts(
     name: str, chain: Chain, carrier: str, start: Sequence[float], values: Mapping[str, Expression]
-) -> ChainParts:
-    """Return a chain as parts of a network: its bodies are the moving frames of `kinematics.frames.frames`.
+) -> Parts:
+    """Return a chain as parts of a network.
+
+    The bodies NAME.JOINT are the moving frames of `kinematics.forward.iter_frames`, NAME.tool is the tool.
+    Joints have the names of the bodies that they carry. A control NAME_JOINT drives a joint with followers.
 
     Args:
         name: Its name in the network.
@@ -280,23 +254,19 @@ def chain_to_parts(
         start: The start of its coordinates, in [rad] and [m].
         values: The functions that drive coordinates, in [rad] and [m]; the others are free.
     """
-    parts = ChainParts([], [], [])
     starts = dict(zip(chain.coordinates, start, strict=True))
-    drives: dict[str, Expression] = dict(values)
+    drives, controls, joints = dict(values), [], []
     for coordinate in dict.fromkeys(joint.mimic.joint for joint in chain.joints if joint.mimic):
         control = control_name(name, coordinate)
-        parts.controls.append(Control(control, starts[coordinate], value=values.get(coordinate)))
+        controls.append(Control(control, starts[coordinate], value=values.get(coordinate)))
         drives[coordinate] = Expression(control)
     body, at = carrier, chain.base
     for joint in chain.joints:
         ends = (body, f"{name}.{joint.name}")
-        parts.joints.append(_chain_joint_to_joint(joint, ends, at @ joint.origin, starts, drives))
-        parts.bodies.append(Body(ends[1]))
+        joints.append(_chain_joint_to_joint(joint, ends, at @ joint.origin, starts, drives))
         body, at = ends[1], Transform()
-    tool = (body, f"{name}.tool")
-    parts.joints.append(_fixed_joint(tool, at @ chain.tip @ chain.tool))
-    parts.bodies.append(Body(tool[1]))
-    return parts
+    joints.append(_fixed_joint((body, f"{name}.tool"), at @ chain.tip @ chain.tool))
+    return Parts(name, tuple(Body(joint.name) for joint in joints), tuple(joints), (), tuple(controls))
 
 
 def control_name(name: str, coordinate: str) -> str:
@@ -354,16 +324,7 @@ def _fixed_joint(ends: tuple[str, str], frame: Transform) -> Joint:
 def read_pair(
     name: str, kind: ElementKind, table: CheckedTable, joints: Mapping[str, Joint], units: Units, folder: Path
 ) -> ConstraintElement:
-    """Return a gear, rack or cam from its table; errors are noted there.
-
-    Args:
-        name: Its name.
-        kind: gear, rack or cam.
-        table: Its table, with `joints`, `offset`, and `teeth`, `radius` or `profile`.
-        joints: The joints of the network by name.
-        units: The units of the file.
-        folder: The folder to which a file of a profile is relative.
-    """
+    """Return a gear, rack or cam from its table."""
     names = table.texts("joints")
     first, second = (joints.get(joint) for joint in (*names, "", "")[:2])
     unit = "rad" if kind == "gear" or (kind == "cam" and second and second.kind == "revolute") else "m"

@@ -238,7 +238,11 @@ def _validate_element(where: str, element: ConstraintElement) -> Iterator[Findin
 def _validate_pair(where: str, element: ConstraintElement, parts: Parts) -> Iterator[Finding]:
     yield from _validate_coupled(where, element, parts)
     if element.kind == "gear":
-        yield from _validate_teeth(f"{where}.teeth", element.teeth)
+        teeth = element.teeth
+        if len(teeth) != 2 or not all(0.0 < abs(count) <= MAX_VALUE for count in teeth) or max(teeth) < 0.0:
+            counts = ", ".join(f"{count:g}" for count in teeth)
+            allowed = "two numbers other than 0, at most one of them negative: that of an internal wheel"
+            yield Finding(f"found {counts}, allowed: {allowed}", about=f"{where}.teeth")
     elif element.kind == "rack" and not 0.0 < abs(element.radius) <= MAX_VALUE:
         allowed = f"a radius other than 0, {MAX_VALUE:g} m at most; its sign is that of the motion"
         yield Finding(f"found {element.radius:g} m, allowed: {allowed}", about=f"{where}.radius")
@@ -265,12 +269,6 @@ def _validate_coupled(where: str, element: ConstraintElement, parts: Parts) -> I
     if len(known) == 2 and element.bodies != (ends := pair_bodies(*known)):
         message = f"found {', '.join(element.bodies)}, allowed: those of its joints, {', '.join(ends)}"
         yield Finding(message, about=f"{where}.bodies")
-
-
-def _validate_teeth(where: str, teeth: tuple[float, ...]) -> Iterator[Finding]:
-    allowed = "two numbers other than 0, at most one of them negative: that of an internal wheel"
-    if len(teeth) != 2 or not all(0.0 < abs(count) <= MAX_VALUE for count in teeth) or max(teeth) < 0.0:
-        yield Finding(f"found {', '.join(f'{count:g}' for count in teeth)}, allowed: {allowed}", about=where)
 
 
 def _validate_profile(where: str, profile: Profile) -> Iterator[Finding]:

@@ -1,6 +1,8 @@
 """Values of network files: vectors, numbers and expressions of joints and elements, in SI.
 
 Errors go to the table that is read, and a valid value replaces the faulty one, so that reading continues.
+`units` are those of the file, `unit` the one of a value: m, rad, or "" of a number without; `variables` are
+the units of the variables of a joint, rad or m.
 
 1. `read_vectors`, `read_points`, `read_frames`: m, n and a of both bodies.
 2. `read_start`, `read_limits`, `read_drives`: numbers and functions of each variable of a joint.
@@ -40,11 +42,7 @@ def read_vectors(
 ) -> tuple[Vector, Vector]:
     """Return the vectors of both bodies in the file's unit, twice the same if the key has one.
 
-    Args:
-        table: The table of a joint or an element.
-        key: Its key.
-        count: The number of vectors that are allowed.
-        default: That of both if the key is missing; without it the key is required.
+    The default is that of both if the key is missing; without it the key is required.
     """
     value = table.value(key)
     if value is None and default is not None:
@@ -88,13 +86,7 @@ def _perpendicular(n: Vector) -> Vector:
 
 
 def read_start(table: CheckedTable, variables: Sequence[str], units: Units) -> tuple[float, ...]:
-    """Return the `start` of a joint in [rad] and [m]: a number of a joint with one variable, else a list.
-
-    Args:
-        table: The table of the joint.
-        variables: The unit of each variable, rad or m.
-        units: The units of the file.
-    """
+    """Return the `start` of a joint in [rad] and [m]: a number of a joint with one variable, else a list."""
     value = table.value("start")
     if value is None:
         return ()
@@ -109,13 +101,7 @@ def read_start(table: CheckedTable, variables: Sequence[str], units: Units) -> t
 def read_limits(
     table: CheckedTable, variables: Sequence[str], units: Units
 ) -> tuple[tuple[float, float], ...]:
-    """Return `lower` and `upper` of each variable of a joint in [rad] and [m]; empty if it has neither.
-
-    Args:
-        table: The table of the joint.
-        variables: The unit of each variable, rad or m.
-        units: The units of the file.
-    """
+    """Return `lower` and `upper` of each variable of a joint in [rad] and [m]; empty if it has neither."""
     count, ends = len(variables), []
     for key, default in (("lower", -math.inf), ("upper", math.inf)):
         value = table.value(key)
@@ -130,13 +116,7 @@ def read_limits(
 
 
 def read_drives(table: CheckedTable, variables: Sequence[str], units: Units) -> tuple[Expression | None, ...]:
-    """Return the functions that drive the variables of a joint, by `driven` or `value`; empty without both.
-
-    Args:
-        table: The table of the joint.
-        variables: The unit of each variable, rad or m.
-        units: The units of the file.
-    """
+    """Return the functions that drive the variables of a joint, by `driven` or `value`, if it has one."""
     controls, functions = table.value("driven"), table.value("value")
     key, value = ("value", functions) if controls is None else ("driven", controls)
     if controls is not None and functions is not None:
@@ -182,14 +162,7 @@ def _read_triple(table: CheckedTable, key: str, unit: str, units: Units) -> list
 
 
 def read_expression(table: CheckedTable, key: str, unit: str, units: Units) -> Expression:
-    """Return the number or function of controls under a key in SI; the key is required.
-
-    Args:
-        table: The table.
-        key: The key.
-        unit: The unit of the value: m, rad or "" of a number without.
-        units: The units of the file.
-    """
+    """Return the number or function of controls under a key in SI; the key is required."""
     return parse_expression(table, key, table.value(key), unit, units)
 
 

@@ -66,7 +66,7 @@ MIN_POINTS, MAX_POINTS = 4, 1000  # of a profile: a third of a degree apart; eac
 _Numbers: TypeAlias = tuple[float, float, float]
 Profile: TypeAlias = tuple[tuple[float, float], ...]  # points of a cam
 Gradient: TypeAlias = dict[str, Element]  # derivatives by the names on which a value depends
-ValueAndGradient: TypeAlias = tuple[Element, Gradient]
+_Dual: TypeAlias = tuple[Element, Gradient]
 
 
 # --- parts
@@ -319,9 +319,8 @@ class Parts:
         number = quantity_to_si(value, units)
         if not math.isfinite(number):
             allowed = f"a number, or {NAMES[si].partition(' in ')[0]} with its unit" if si else "a number"
-            raise OptionError(
-                Finding(parameter="controls", found=f"{control} = {value}", allowed=allowed)
-            )  # plain: ok
+            text = f"{control} = {value}"
+            raise OptionError(Finding(parameter="controls", found=text, allowed=allowed))  # plain: ok
         return number
 
 
@@ -423,7 +422,7 @@ class Expression:
         """Return its value at values of its names, any elements."""
         return self.value_and_gradient(values)[0]
 
-    def value_and_gradient(self, values: Mapping[str, Element]) -> ValueAndGradient:
+    def value_and_gradient(self, values: Mapping[str, Element]) -> tuple[Element, Gradient]:
         """Return its value and its partial derivatives at values of its names, any elements.
 
         By the rules of differentiation along its tree, so that they are exact to rounding.
@@ -504,7 +503,7 @@ def _is_finite(constant: Any) -> bool:
         return False
 
 
-def _evaluate(node: ast.expr, values: Mapping[str, Element]) -> ValueAndGradient:
+def _evaluate(node: ast.expr, values: Mapping[str, Element]) -> _Dual:
     match node:
         case ast.Constant(value=value):
             return float(value), {}  # type: ignore[arg-type]
@@ -523,7 +522,7 @@ def _evaluate(node: ast.expr, values: Mapping[str, Element]) -> ValueAndGradient
     raise TypeError(f"{ast.dump(node)} was let through")
 
 
-def _apply_operator(operator: ast.operator, a: ValueAndGradient, b: ValueAndGradient) -> ValueAndGradient:
+def _apply_operator(operator: ast.operator, a: _Dual, b: _Dual) -> _Dual:
     """Return a + b, a - b, a b, a / b or a^b.
 
     (a / b)' = a' / b - a b' / b^2. (a^b)' = b a^(b - 1) a' + a^b ln(a) b', the last only if b varies: else a
@@ -546,7 +545,7 @@ def _apply_operator(operator: ast.operator, a: ValueAndGradient, b: ValueAndGrad
     return value, _add(gradient, _scale(dv, value * np.log(u))) if dv else gradient
 
 
-def _apply_function(name: str, *arguments: ValueAndGradient) -> ValueAndGradient:
+def _apply_function(name: str, *arguments: _Dual) -> _Dual:
     """Return a function of one argument u, or atan2(y, x)' = (x y' - y x') / (x^2 + y^2)."""
     u, du = arguments[0]
     match name:

@@ -195,7 +195,7 @@ def test_a_robot_of_the_catalogue_moves_as_its_chain_within_its_limits(robot: st
 def test_any_chain_moves_as_its_frames(chains: SearchStrategy[Chain], data: DataObject) -> None:
     chain = data.draw(chains)
     parts = chain_to_parts("arm", chain, "ground", chain.start, {})
-    network = Network("arm", tuple(parts.bodies), tuple(parts.joints), (), tuple(parts.controls))
+    network = Network("arm", parts.bodies, parts.joints, (), parts.controls)
     rows = st.lists(st.floats(-3.0, 3.0), min_size=len(chain.coordinates), max_size=len(chain.coordinates))
     check_poses(network, chain, np.array([data.draw(rows)]).T)
 
