@@ -18,20 +18,20 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.fmu_file import find_binary
-from urmpipe_fmus.process import await_job, callbacks_with
+from urmpipe_fmus.process import (
+    C_TYPES,
+    DISCARD,
+    FATAL,
+    TERMINATED,
+    WARNING,
+    await_job,
+    callbacks_with,
+)
 from urmpipe_models.processes import limit_memory
 
 CALL_BYTES = 256  # of the file `call`: eight bytes with the number of the call, then its name
 LOG_BYTES = 1_000_000  # of the log, and of the printed output; a longer one is discarded
 MEMORY_BYTES = 8 * 2**30  # for the FMU, with what is only reserved, as runtimes do
-C_TYPES: dict[str, Any] = {
-    "Real": ctypes.c_double,
-    "Integer": ctypes.c_int,
-    "Boolean": ctypes.c_int,
-    "String": ctypes.c_char_p,
-}
-WARNING, DISCARD, FATAL = 1, 2, 4  # fmi2Status (FMI 2.0.4, section 2.1.3); no call is allowed after FATAL
-TERMINATED = 3  # fmi2StatusKind (FMI 2.0.4, section 4.2.3)
 
 
 class CallFailedError(Exception):
@@ -181,7 +181,7 @@ class CheckedInstance:
         try:
             self._call(name, call)
         except CallFailedError as error:
-            if error.status == FATAL:
+            if error.status == FATAL:  # no further call is allowed
                 raise
             return False
         return True

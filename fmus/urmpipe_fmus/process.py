@@ -35,6 +35,16 @@ MAX_COUNTED_PAUSE = 1.0  # s between two polls; a longer pause means that the pr
 OUTPUT = "output.txt"  # file of the shared folder: what the FMUs print
 TAIL_BYTES = 65_536  # of the output, of which the last lines are taken
 
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)  # fmi2Status (FMI 2.0.4, section 2.1.3)
+STATUS_NAMES = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
+LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # fmi2StatusKind (FMI 2.0.4, section 4.2.3)
+C_TYPES: dict[str, Any] = {
+    "Real": ctypes.c_double,
+    "Integer": ctypes.c_int,
+    "Boolean": ctypes.c_int,
+    "String": ctypes.c_char_p,
+}
+
 
 class FmuProcess:
     """A process that runs FMUs, as a context; at its end the process and all that it started are killed.

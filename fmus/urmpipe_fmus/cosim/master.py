@@ -39,10 +39,6 @@ from urmpipe_fmus.cosim.job import (
     next_call,
 )
 from urmpipe_fmus.cosim.slave import (
-    DISCARD,
-    OK,
-    PENDING,
-    WARNING,
     Call,
     FmuCallError,
     LoopExchange,
@@ -51,6 +47,7 @@ from urmpipe_fmus.cosim.slave import (
     Slave,
     status_name,
 )
+from urmpipe_fmus.process import DISCARD, OK, PENDING, WARNING
 from urmpipe_models.elementwise import FloatArray
 
 MAX_ITERATIONS = 50  # Newton's method needs a handful

@@ -26,16 +26,22 @@ from numpy.typing import NDArray
 
 from urmpipe_fmus.cosim.job import BlockJob, Progress, Transfer, encode_call
 from urmpipe_fmus.fmu_file import find_binary
+from urmpipe_fmus.process import (
+    C_TYPES,
+    ERROR,
+    FATAL,
+    LAST_SUCCESSFUL_TIME,
+    OK,
+    STATUS_NAMES,
+    TERMINATED,
+    WARNING,
+)
 
 Call = Callable[[], int]  # a prepared call: returns FMI's status
 
-OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)  # fmi2Status (FMI 2.0.4, section 2.1.3)
-STATUS_NAMES = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
-LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # fmi2StatusKind (FMI 2.0.4, section 4.2.3)
 EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
 DO_STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 STATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
-C_TYPES: dict[str, Any] = {"Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int}
 PERTURBATION = 1e-4  # relative change of inputs to observe whether outputs follow
 
 
@@ -139,11 +145,8 @@ class Slave:
         """Set the start values."""
         for kind, reference, value in self.block.starts:
             references = (ctypes.c_uint * 1)(reference)
-            if kind == "String":
-                values: Any = (ctypes.c_char_p * 1)(str(value).encode())
-            else:
-                values = (C_TYPES[kind] * 1)(value if kind == "Real" else int(value))
-            self.once(f"fmi2Set{kind}", references, 1, values)
+            to_c: Any = {"Real": float, "String": lambda text: str(text).encode()}.get(kind, int)
+            self.once(f"fmi2Set{kind}", references, 1, (C_TYPES[kind] * 1)(to_c(value)))
 
     def getter(self, transfer: Transfer, values: Mapping[str, NDArray[Any]]) -> tuple[int, Call]:
         """Return the code and the call that reads values into their places, which are neighbours.
