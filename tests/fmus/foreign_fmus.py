@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
 
+import numpy as np
 import pytest
 
 from asserting import there
@@ -302,6 +303,25 @@ def system(
         inputs=tuple(inputs),
         **made,
     )
+
+
+ZEROS = LogColumn(np.array([0, 10**9]), np.zeros(2))
+"""A column of 1 s."""
+
+
+def follow(port: str, column: str = "u", log: str = "run.csv", *, interpolate: bool = False) -> LogInput:
+    """Return an input that follows a column of a log."""
+    destination = Port(*port.split(".", 1))
+    return LogInput(destination=destination, log=log, column=column, interpolate=interpolate)
+
+
+def copy_changed(path: Path, copy: Path, name: str, change: Callable[[bytes], bytes]) -> Path:
+    """Copy an FMU, with a change of its entries whose names begin so."""
+    with zipfile.ZipFile(path) as archive, zipfile.ZipFile(copy, "w") as changed:
+        for entry in archive.namelist():
+            data = archive.read(entry)
+            changed.writestr(entry, change(data) if entry.startswith(name) else data)
+    return copy
 
 
 def fmu_of(block: Block) -> Path:

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foreign_fmus import COUNTER, INTEGRATOR, Foreign, Scalar, gain, planned
-from urmpipe_fmus.cosim import LogColumn, LogInput, Plan, Port, system_svg
+from foreign_fmus import COUNTER, INTEGRATOR, ZEROS, Foreign, Scalar, follow, gain, planned
+from urmpipe_fmus.cosim import Plan, system_svg
 from urmpipe_fmus.cosim.drawing import Box, Diagram, Layout, Pin, Wire, build_diagram
 from urmpipe_models.elementwise import FloatArray
 
@@ -91,14 +91,12 @@ def arm_plan() -> Plan:
         ),
     )
     source = Foreign(name="source", scalars=tuple(Scalar(f"q[{i}]", i, unit="rad") for i in (1, 2)))
-    ask = LogInput(destination=Port("g", "u"), log="a<b>&.csv", column="u")
-    column = LogColumn(np.array([0, 10**9]), np.zeros(2))
     return planned(
         {"arm": arm, "source": source, "g": gain(), "i": INTEGRATOR},
         {"arm.phi": "source.q", "i.u": "g.y"},
         None,
-        [ask],
-        column=lambda one: column,
+        [follow("g.u", log="a<b>&.csv")],
+        column=lambda _: ZEROS,
         description="An arm & <more>",
     )
 
@@ -120,16 +118,11 @@ def test_arrays_are_one_port_and_one_wire_and_idle_outputs_are_counted() -> None
 def test_a_log_is_called_by_its_file_whole_paths_tell_two_of_one_name_apart() -> None:
     names = ["far/away/in/a/folder/u.csv", "one/v.csv", "two/v.csv", "a.csv"]
     blocks = {f"b{i}": gain() for i in range(4)}
-    asks = [LogInput(destination=Port(f"b{i}", "u"), log=log, column="u") for i, log in enumerate(names)]
-    column = LogColumn(np.array([0, 10**9]), np.zeros(2))
-    shown = build_diagram(planned(blocks, None, None, asks, column=lambda one: column))
-    assert [name for name in shown.boxes if name not in blocks] == [
-        "u.csv",
-        "one/v.csv",
-        "two/v.csv",
-        "a.csv",
-    ]
-    assert [wire.source for wire in shown.wires] == ["u.csv", "one/v.csv", "two/v.csv", "a.csv"]
+    inputs = [follow(f"b{i}.u", log=log) for i, log in enumerate(names)]
+    shown = build_diagram(planned(blocks, None, None, inputs, column=lambda _: ZEROS))
+    displayed = ["u.csv", "one/v.csv", "two/v.csv", "a.csv"]
+    assert [name for name in shown.boxes if name not in blocks] == displayed
+    assert [wire.source for wire in shown.wires] == displayed
 
 
 def test_a_drawing_holds_names_units_and_connections_and_nothing_from_elsewhere() -> None:
@@ -163,16 +156,12 @@ def held_plan(**period: float) -> Plan:
             Scalar("z", 6),
         ),
     )
-    asks = [
-        LogInput(destination=Port("g", "u"), log="x.csv", column="u"),
-        LogInput(destination=Port("i", "u"), log="x.csv", column="v", interpolate=True),
-    ]
     return planned(
         {"g": gain(), "i": INTEGRATOR, "s": sampled, "t": turned, "h": gain()},
         {"s.e": "g.y", "t.b": "s.y", "h.u": "t.z"},
         {"t": {"a": [0.5, 1.0 / 3.0, 0.5]}, "s": period},
-        asks,
-        column=lambda one: LogColumn(np.array([0, 10**9]), np.zeros(2)),
+        [follow("g.u", log="x.csv"), follow("i.u", "v", "x.csv", interpolate=True)],
+        column=lambda _: ZEROS,
     )
 
 

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from foreign_fmus import INTEGRATOR, Foreign, Scalar, gain, ran
-from urmpipe_fmus.cosim import CosimulationRecord, LogColumn, LogInput, Port
+from foreign_fmus import INTEGRATOR, Foreign, Scalar, follow, gain, ran
+from urmpipe_fmus.cosim import CosimulationRecord, LogColumn
 
 RING = {"b.u": "a.y", "a.u": "b.y"}
 TOLERANCE = 1e-12
 
 
+FOLLOW_C = [follow("b.c", "c", interpolate=True)]
 RISING = LogColumn(np.array([0, 10**9]), np.array([0.0, 1.0]))
 
 
@@ -35,11 +36,6 @@ def formula(name: str, inputs: str, y: str, **options: object) -> Foreign:
         compute=f"double {values}; v->r[{len(inputs)}] = {y};",
         **options,  # type: ignore[arg-type]
     )
-
-
-def follow(port: str) -> list[LogInput]:
-    """Return an input that follows a column of a log, interpolated."""
-    return [LogInput(destination=Port(*port.split(".")), log="c.csv", column="c", interpolate=True)]
 
 
 @pytest.mark.slow
@@ -73,7 +69,7 @@ def test_the_solution_is_followed_over_time() -> None:
     """y = k u + c(t) with u = y^3 by two blocks: y^3 - 2 y + c = 0, from its root at y = 0."""
     c = LogColumn(np.arange(11) * 10**8, np.linspace(0.0, 0.8, 11))
     blocks = {"a": formula("cube", "u", "u * u * u"), "b": formula("line", "uc", "0.5 * (u + c)")}
-    y = solved(blocks, RING, None, follow("b.c"), column=lambda _: c).column("b", "y")
+    y = solved(blocks, RING, None, FOLLOW_C, column=lambda _: c).column("b", "y")
     assert np.allclose(y**3 - 2.0 * y + c.values, 0.0, atol=1e-11)  # the tolerance, magnified by at most ten
     assert (np.diff(y) > 0.0).all()
     assert (y < np.sqrt(2.0 / 3.0)).all()
@@ -153,7 +149,7 @@ def test_a_block_whose_outputs_follow_at_once_only_before_the_first_step_is_seen
         "early", "u", "v->i[0] ? v->r[1] : 1 - 3 * u", step="v->i[0] = 1; v->r[1] = 1 - 3 * v->r[0];"
     )
     blocks = {"a": early, "b": formula("line4", "uc", "4 * u + c")}
-    recorded = solved(blocks, RING, None, follow("b.c"), column=lambda _: RISING)
+    recorded = solved(blocks, RING, None, FOLLOW_C, column=lambda _: RISING)
     c = recorded.column("b", "c")
     assert np.allclose(recorded.column("a", "y"), (1.0 - 3.0 * c) / 13.0, rtol=0.0, atol=1e-10)
 
@@ -187,7 +183,9 @@ def test_a_block_that_goes_back_is_told_again_what_was_set_before_the_loop() -> 
         fresh=False,
     )
     start = {"b": {"k": 4.0}}
-    recorded = solved({"a": late, "b": gain()}, RING, start, follow("a.v"), column=lambda _: RISING)
+    recorded = solved(
+        {"a": late, "b": gain()}, RING, start, [follow("a.v", "c", interpolate=True)], column=lambda _: RISING
+    )
     expected = (1.0 + recorded.column("a", "v")) / 13.0
     assert np.allclose(recorded.column("a", "y")[1:], expected[1:], rtol=0.0, atol=1e-10)
 
@@ -203,7 +201,7 @@ def test_looking_whether_outputs_follow_leaves_no_trace_where_they_do_not() -> N
     )
     blocks = {"a": limited, "b": formula("plus", "uc", "0.5 * u + c")}
     falling = LogColumn(RISING.t_ns, np.array([-1.0, -3.0]))
-    recorded = solved(blocks, RING, None, follow("b.c"), column=lambda _: falling)
+    recorded = solved(blocks, RING, None, FOLLOW_C, column=lambda _: falling)
     held = np.concatenate([[0.0], np.cumsum(0.1 * recorded.column("b", "c")[:-1])])
     assert np.allclose(recorded.column("a", "x"), held, rtol=0.0, atol=1e-12)  # rounding
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asserting import refusal
-from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, gain, planned, ran
-from urmpipe_fmus.cosim import LogColumn, LogInput, Port, simulate
+from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, follow, gain, planned, ran
+from urmpipe_fmus.cosim import LogColumn, Port, simulate
 from urmpipe_models.errors import CosimulationError
 
 RAMP = Foreign(
@@ -117,14 +117,13 @@ def test_blocks_are_initialized_with_what_their_inputs_are_at_the_start() -> Non
         compute="if (!v->i[0]) { v->r[1] = v->r[0]; v->i[0] = 1; }",
         fresh=False,
     )
-    ask = LogInput(destination=Port("double", "u"), log="run.csv", column="u")
     column = LogColumn(np.array([0, 10**8]), np.array([3.0, 4.0]))
     recorded = ran(
         {"first": remembers, "double": gain()},
         {"first.u": "double.y"},
         {"double": {"k": 2.0}},
-        [ask],
-        column=lambda one: column,
+        [follow("double.u")],
+        column=lambda _: column,
     )
     assert recorded.column("first", "y").tolist() == [6.0] * 11
 
@@ -153,15 +152,16 @@ def test_inputs_follow_logs_held_or_interpolated() -> None:
         "on": LogColumn(np.array([0, 500]) * 10**6, np.array([1.0, 0.0])),
     }
 
-    def follow(port: str, column: str, interpolate: bool = False) -> LogInput:
-        destination = Port(*port.split("."))
-        return LogInput(destination=destination, log="run.csv", column=column, interpolate=interpolate)
-
     recorded = ran(
         {"held": gain("metres", unit="m"), "linear": gain("metres", unit="m"), "n": COUNTER},
         None,
         None,
-        [follow("held.u", "u"), follow("n.by", "n"), follow("n.on", "on"), follow("linear.u", "u", True)],
+        [
+            follow("held.u", "u"),
+            follow("n.by", "n"),
+            follow("n.on", "on"),
+            follow("linear.u", "u", interpolate=True),
+        ],
         column=lambda one: columns[one.column],
     )
     t = 0.1 * np.arange(11)

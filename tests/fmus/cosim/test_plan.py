@@ -10,8 +10,22 @@ import numpy as np
 import pytest
 
 from asserting import refusal
-from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, fmu, fmu_of, gain, planned, system
-from urmpipe_fmus.cosim import LogColumn, LogInput, Port, prepare
+from foreign_fmus import (
+    COUNTER,
+    INTEGRATOR,
+    TROUBLE,
+    ZEROS,
+    Foreign,
+    Scalar,
+    copy_changed,
+    fmu,
+    fmu_of,
+    follow,
+    gain,
+    planned,
+    system,
+)
+from urmpipe_fmus.cosim import LogColumn, prepare
 from urmpipe_fmus.cosim.checks import read_interface
 from urmpipe_models.errors import CosimulationError
 
@@ -113,12 +127,11 @@ def test_units_must_be_the_same_by_what_they_are_not_by_how_they_are_spelled() -
 
 
 def test_an_input_has_one_source() -> None:
-    column = LogColumn(np.array([0, 10**9]), np.zeros(2))
-    ask = LogInput(destination=Port("b", "u"), log="run.csv", column="u")
-    assert told(
-        {"a": gain(), "b": gain()}, {"b.u": "a.y"}, {"a": {"u": 1.0}}, [ask], column=lambda one: column
-    ) == ["b.u: found two sources, a.y and the log, allowed: one"]
-    assert told({"b": gain()}, {}, {}, [ask]) == [
+    blocks, start, log = {"a": gain(), "b": gain()}, {"a": {"u": 1.0}}, [follow("b.u")]
+    assert told(blocks, {"b.u": "a.y"}, start, log, column=lambda _: ZEROS) == [
+        "b.u: found two sources, a.y and the log, allowed: one"
+    ]
+    assert told({"b": gain()}, {}, {}, log) == [
         "inputs.b.u: found the log run.csv, but nothing to read it with"
     ]
     every = {f"arm.phi[{i}]": "i.y" for i in range(1, 12)}
@@ -195,9 +208,8 @@ def test_a_loop_of_integers_cannot_be_iterated() -> None:
 
 
 def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_log() -> None:
-    ask = LogInput(destination=Port("a", "u"), log="run.csv", column="u")
     column = LogColumn(np.array([0, 36_910_000_000]), np.zeros(2))
-    blocks = system({"a": gain()}, inputs=[ask], step=0.005, duration=None)
+    blocks = system({"a": gain()}, inputs=[follow("a.u")], step=0.005, duration=None)
     assert prepare(blocks, fmu_of, column=lambda one: column).count == 7382
     assert prepare(blocks, fmu_of, column=lambda one: column, duration=1.0).count == 200
     assert told({"a": TROUBLE}, duration=None) == [
@@ -219,10 +231,9 @@ def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_l
 
 @pytest.mark.parametrize("rate", [30, 60, 90, 300])
 def test_the_last_row_of_a_log_whose_times_are_rounded_to_nanoseconds_is_reached(rate: int) -> None:
-    ask = LogInput(destination=Port("a", "u"), log="run.csv", column="u")
     k = np.arange(7383)
     column = LogColumn(np.round(k / rate * 1e9).astype(np.int64), k.astype(np.float64))
-    blocks = system({"a": gain()}, inputs=[ask], step=1.0 / rate, duration=None)
+    blocks = system({"a": gain()}, inputs=[follow("a.u")], step=1.0 / rate, duration=None)
     plan = prepare(blocks, fmu_of, column=lambda one: column)
     assert plan.logged[0].values.tolist() == k.tolist()
 
@@ -239,31 +250,22 @@ def test_a_duration_that_is_no_multiple_of_the_step_ends_with_the_last_whole_one
     [("by", "found 1.5, allowed: an integer of 32 bits"), ("on", "found 0.5, allowed: true, false")],
 )
 def test_every_value_of_a_log_is_held_to_the_type_of_its_input(port: str, told_as: str) -> None:
-    ask = LogInput(destination=Port("n", port), log="run.csv", column="x")
     column = LogColumn(np.array([0, 1, 2]) * 10**8, np.array([0.0, 0.5, 1.0]) + (port == "by"))
     start = {"by": 1, "on": True}
     del start[port]
-    assert told({"n": COUNTER}, None, {"n": start}, [ask], column=lambda one: column) == [
-        f"inputs.n.{port}: run.csv, column x: {told_as}"
-    ]
+    assert told(
+        {"n": COUNTER}, None, {"n": start}, [follow(f"n.{port}", "x")], column=lambda one: column
+    ) == [f"inputs.n.{port}: run.csv, column x: {told_as}"]
 
 
 def test_a_log_must_fit_its_input() -> None:
-    u = LogInput(destination=Port("a", "u"), log="run.csv", column="u", interpolate=True)
-    n = LogInput(destination=Port("n", "by"), log="run.csv", column="n", interpolate=True)
-    phi = LogInput(destination=Port("arm", "phi"), log="run.csv", column="u")
+    log = [follow("a.u", interpolate=True), follow("n.by", "n", interpolate=True), follow("arm.phi")]
     columns = {
         "u": LogColumn(np.array([0, 10**9]), np.zeros(2), "deg"),
         "n": LogColumn(np.array([0, 10**9]), np.array([1.0, 2.5])),
     }
-    start = {"n": {"on": True}}
-    lines = told(
-        {"a": gain("in_rad", unit="rad"), "n": COUNTER, "arm": ARM},
-        None,
-        start,
-        [u, n, phi],
-        column=lambda one: columns[one.column],
-    )
+    blocks = {"a": gain("in_rad", unit="rad"), "n": COUNTER, "arm": ARM}
+    lines = told(blocks, None, {"n": {"on": True}}, log, column=lambda follower: columns[follower.column])
     assert lines[:2] == [
         "inputs.a.u: found the unit deg, allowed: that of the input, rad",
         "inputs.arm.phi: found an array, allowed: one of " + ", ".join(f"phi[{i}]" for i in range(1, 12)),
@@ -303,12 +305,9 @@ def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
 def test_an_fmu_of_another_kind_is_told(tmp_path: Path, found: str, replaced: str, told_as: str) -> None:
     import fmpy
 
+    old, new = found.encode(), replaced.encode()
     other = tmp_path / "other.fmu"
-    with zipfile.ZipFile(fmu(gain())) as given, zipfile.ZipFile(other, "w") as made:
-        for name in given.namelist():
-            data = given.read(name)
-            changed = name == "modelDescription.xml"
-            made.writestr(name, data.decode().replace(found, replaced).encode() if changed else data)
+    copy_changed(fmu(gain()), other, "modelDescription.xml", lambda data: data.replace(old, new))
     with pytest.raises(CosimulationError) as caught:
         prepare(system({"a": gain()}), lambda block: other)
     binary = f"binaries/{fmpy.platform}/loss{fmpy.sharedLibraryExtension}"

@@ -6,7 +6,6 @@ import math
 import subprocess
 import sys
 import tempfile
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 
 from asserting import refusal, there
-from foreign_fmus import STAIR, TROUBLE, Foreign, Scalar, fmu, gain, ran, system
+from foreign_fmus import STAIR, TROUBLE, Foreign, Scalar, copy_changed, fmu, gain, ran, system
 from urmpipe_fmus.cosim import Block, Connection, CosimulationRecord, Port, System, prepare, simulate
 from urmpipe_models.errors import CosimulationError
 
@@ -108,10 +107,7 @@ def test_warnings_are_counted() -> None:
 
 
 def test_a_library_that_is_none_is_reported(tmp_path: Path) -> None:
-    broken = tmp_path / "broken.fmu"
-    with zipfile.ZipFile(fmu(gain())) as archive, zipfile.ZipFile(broken, "w") as copy:
-        for name in archive.namelist():
-            copy.writestr(name, b"no library" if name.startswith("binaries") else archive.read(name))
+    broken = copy_changed(fmu(gain()), tmp_path / "broken.fmu", "binaries", lambda _: b"no library")
     record = simulate(prepare(system({"a": gain()}, None, {"a": {"u": 0.0}}), lambda block: broken))
     assert there(record.failed).startswith(
         "block a: loading at t = 0 s: cannot be loaded: Failed to load shared library"
