@@ -211,12 +211,7 @@ def ramp(time: Element, begin: Element, initial: Element, target: Element, speed
 
 
 def trapezoid(
-    time: Element,
-    begin: Element,
-    initial: Element,
-    target: Element,
-    speed: Element,
-    acceleration: Element,
+    time: Element, begin: Element, initial: Element, target: Element, speed: Element, acceleration: Element
 ) -> JointMotion:
     """Return the move with a trapezoid of velocity.
 

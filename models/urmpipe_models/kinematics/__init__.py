@@ -1,1 +1,1 @@
-"""How an arm moves: frames, poses, velocities, Jacobian, screws, singular poses."""
+"""Kinematics of an arm: poses, velocities, Jacobian, screws; singularity; identification."""

@@ -140,12 +140,7 @@ def chain_from_dict(data: Mapping[str, Any], file: str | None = None) -> Chain:
 
 
 def _read_chain(
-    data: Mapping[str, Any],
-    kinds: Sequence[str],
-    *,
-    file: str | None,
-    stem: str = "",
-    folder: Path = Path(),
+    data: Mapping[str, Any], kinds: Sequence[str], *, file: str | None, stem: str = "", folder: Path = Path()
 ) -> Chain:
     faults: list[Finding] = []
     table = CheckedTable(data, faults, file)

@@ -106,7 +106,7 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
     )
     carriers = list(_carriers(edges, joints, base))
     visuals = [visual for carrier in carriers for visual in _link_visuals(tree, carrier)]
-    masses = _chain_masses(tree, carriers)
+    inertials, left_out, mass_faults = _chain_masses(tree, carriers)
     if tree.faults:
         raise RobotError(*tree.faults)
     try:
@@ -118,9 +118,9 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
             tool=tool,
             source=Path(path).name,
             visuals=tuple(visual.with_resolved_mesh(Path(path).parent) for visual in visuals),
-            inertials=masses.inertials,
-            left_out=masses.left_out,
-            mass_faults=masses.faults,
+            inertials=inertials,
+            left_out=left_out,
+            mass_faults=mass_faults,
         )
     except RobotError as error:
         raise RobotError(*(replace(fault, file=tree.file) for fault in error.findings)) from error
@@ -336,16 +336,10 @@ class _Mass(NamedTuple):
     line: int
 
 
-class _ChainMasses(NamedTuple):
-    """The masses that a chain carries: `inertials`, `left_out` and `mass_faults` of `Chain`."""
-
-    inertials: tuple[Inertial, ...]
-    left_out: tuple[str, ...]
-    faults: tuple[str, ...]
-
-
-def _chain_masses(tree: UrdfTree, carriers: Sequence[_Carrier]) -> _ChainMasses:
-    """Return the masses that the links of a chain carry, from the base outwards.
+def _chain_masses(
+    tree: UrdfTree, carriers: Sequence[_Carrier]
+) -> tuple[tuple[Inertial, ...], tuple[str, ...], tuple[str, ...]]:
+    """Return `inertials`, `left_out` and `mass_faults` of a chain by the links that it carries.
 
     A link that is fixed to a link of the chain has the same carrier. A link that another joint moves against
     a moving link is left out with all links after it. A mass with an error is left out if it does not move:
@@ -363,7 +357,7 @@ def _chain_masses(tree: UrdfTree, carriers: Sequence[_Carrier]) -> _ChainMasses:
             if carrier.moves:
                 faults += errors
                 left_out += _iter_left_out(tree, carrier.link, links)
-    return _ChainMasses(() if faults else tuple(inertials), tuple(left_out), tuple(faults))
+    return () if faults else tuple(inertials), tuple(left_out), tuple(faults)
 
 
 def _iter_fixed(tree: UrdfTree, carrier: _Carrier, chain: Set[str]) -> Iterator[_Carrier]:

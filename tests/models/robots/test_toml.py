@@ -16,15 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
-from urmpipe_models.arm.chain import (
-    Box,
-    Chain,
-    Inertial,
-    Joint,
-    Mesh,
-    Mimic,
-    Visual,
-)
+from urmpipe_models.arm.chain import Box, Chain, Inertial, Joint, Mesh, Mimic, Visual
 from urmpipe_models.arm.geometric_models import DHRow, articulated_6r, dh_chain, modified_dh_chain, urm_chain
 from urmpipe_models.drives import NO_SPRING, CounterbalanceSpring, Drive, DrivenJoint, Gains, PassiveJoint
 from urmpipe_models.errors import RobotError
@@ -66,65 +58,40 @@ def test_urm_modules_in_mm_and_deg(robot: Any) -> None:
         base = { translation = [0, 0, 1000], rpy = [0, 0, 90] }
         tool = { translation = [0, 0, 150] }
     """
-    expected = urm_chain(
+    bare = urm_chain(
         "two", (0.243215, 0.21243, 0.042215), (math.radians(52), math.pi / 2), directions=(1, -1),
         start=(0.0, math.pi), description="two modules", source="a test",
     ).placed(from_offset([0, 0, 1, 0, 0, math.pi / 2]), translation(0.0, 0.0, 0.15))  # fmt: skip
-    got = robot(text)
-    assert [joint.velocity for joint in got.moving] == [math.pi, math.pi / 2]
-    assert [joint.acceleration for joint in got.moving] == [4 * math.pi] * 2
-    assert [joint.upper for joint in got.moving] == [2 * math.pi] * 2
-    assert [joint.lower for joint in got.moving] == [-math.inf] * 2
-    unlimited = [Joint(joint.name, joint.kind, joint.origin, joint.axis) for joint in got.joints]
-    assert unlimited == list(expected.joints)
-    for field in ("name", "description", "source", "start", "base", "tip", "tool"):
-        assert getattr(got, field) == getattr(expected, field)
+    limits = {"upper": 2 * math.pi, "acceleration": 4 * math.pi}
+    modules = (
+        replace(joint, velocity=velocity, **limits)
+        for joint, velocity in zip(bare.moving, (math.pi, math.pi / 2), strict=True)
+    )
+    assert robot(text) == replace(bare, joints=(*modules, bare.joints[-1]))
 
 
 @pytest.mark.parametrize(("kind", "build"), [("dh", dh_chain), ("modified_dh", modified_dh_chain)])
-def test_dh_rows(robot: Any, kind: str, build: Any) -> None:
+def test_dh_rows_of_which_fixed_ones_have_no_coordinate_no_limits_and_no_start(
+    robot: Any, kind: str, build: Any
+) -> None:
     text = f"""
         kind = "{kind}"
-        limits = {{ lower = [-1, -2] }}
+        limits = {{ lower = [-1, -2], upper = [3, 4], velocity = [5, 6], acceleration = [7, 8] }}
         start = [0.1, 0.2]
-        [[joints]]
-        name = "turn"
-        theta = 0.1
-        d = 0.2
-        a = 0.3
-        alpha = 0.4
-        [[joints]]
-        kind = "prismatic"
-        d = 0.5
+        joints = [
+            {{ name = "turn", theta = 0.1, d = 0.2, a = 0.3, alpha = 0.4 }}, {{ kind = "fixed", a = 0.3 }},
+            {{ kind = "prismatic", d = 0.5 }}, {{ name = "flange", kind = "fixed", d = 0.6 }},
+        ]
     """
-    rows = [DHRow(0.1, 0.2, 0.3, 0.4, "turn", lower=-1.0), DHRow(d=0.5, kind="prismatic", lower=-2.0)]
-    assert robot(text) == build("arm", rows, start=(0.1, 0.2))
-
-
-def test_fixed_dh_rows_have_no_coordinate_no_limits_and_no_start(robot: Any) -> None:
-    text = """
-        kind = "modified_dh"
-        limits = { lower = [-1, -2], upper = [3, 4], velocity = [5, 6], acceleration = [7, 8] }
-        start = [0.1, 0.2]
-        [[joints]]
-        d = 0.2
-        [[joints]]
-        kind = "fixed"
-        a = 0.3
-        [[joints]]
-        kind = "prismatic"
-        [[joints]]
-        name = "flange"
-        kind = "fixed"
-        d = 0.5
-    """
+    rows = [
+        DHRow(0.1, 0.2, 0.3, 0.4, "turn", "revolute", -1.0, 3.0, 5.0, 7.0),
+        DHRow(a=0.3, kind="fixed"),
+        DHRow(d=0.5, kind="prismatic", lower=-2.0, upper=4.0, velocity=6.0, acceleration=8.0),
+        DHRow(d=0.6, name="flange", kind="fixed"),
+    ]
     chain = robot(text)
-    assert [joint.name for joint in chain.joints] == ["q1", "frame2", "q2", "flange"]
-    assert [joint.kind for joint in chain.joints] == ["revolute", "fixed", "prismatic", "fixed"]
-    assert chain.start == (0.1, 0.2)
-    limits = [(joint.lower, joint.upper, joint.velocity, joint.acceleration) for joint in chain.joints]
-    assert limits[0::2] == [(-1.0, 3.0, 5.0, 7.0), (-2.0, 4.0, 6.0, 8.0)]
-    assert limits[1::2] == [(-math.inf, math.inf, math.inf, math.inf)] * 2
+    assert chain == build("arm", rows, start=(0.1, 0.2))
+    assert [joint.name for joint in chain.joints] == ["turn", "frame2", "q2", "flange"]
 
 
 def test_articulated6r_by_its_lengths(robot: Any) -> None:
@@ -135,20 +102,13 @@ def test_articulated6r_by_its_lengths(robot: Any) -> None:
         lengths = [100, 200, 300, 400, 50]
         limits = { lower = [-180, -90, -90, -180, -90, -360], velocity = 90, acceleration = 45 }
     """)
-    bare = articulated_6r(0.1, 0.2, 0.3, 0.4, 0.05)
-    assert (chain.name, chain.tip, chain.start) == ("arm", bare.tip, (0.0,) * 6)
-    assert [joint.origin for joint in chain.joints] == [joint.origin for joint in bare.joints]
-    assert [joint.axis for joint in chain.joints] == [joint.axis for joint in bare.joints]
-    quarter = math.pi / 2
-    assert [joint.lower for joint in chain.joints] == [
-        -math.pi,
-        *[-quarter] * 2,
-        -math.pi,
-        -quarter,
-        -2 * math.pi,
-    ]
-    assert [joint.velocity for joint in chain.joints] == [quarter] * 6
-    assert [joint.acceleration for joint in chain.joints] == [quarter / 2] * 6
+    bare, quarter = articulated_6r(0.1, 0.2, 0.3, 0.4, 0.05, name="arm"), math.pi / 2
+    lowers = (-math.pi, -quarter, -quarter, -math.pi, -quarter, -2 * math.pi)
+    joints = (
+        replace(joint, lower=lower, velocity=quarter, acceleration=quarter / 2)
+        for joint, lower in zip(bare.joints, lowers, strict=True)
+    )
+    assert chain == replace(bare, joints=tuple(joints))
 
 
 def test_joints_of_any_kind(robot: Any) -> None:
@@ -157,24 +117,13 @@ def test_joints_of_any_kind(robot: Any) -> None:
         length_unit = "mm"
         angle_unit = "deg"
         start = [90, 500]
-        [[joints]]
-        name = "mount"
-        kind = "fixed"
-        origin = { rotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]] }
-        [[joints]]
-        name = "turn"
-        lower = -inf
-        upper = 90
-        [[joints]]
-        name = "slide"
-        kind = "prismatic"
-        origin = { translation = [100, 0, 0] }
-        axis = [1, 0, 0]
-        upper = 1000
-        velocity = 250
-        [[joints]]
-        name = "follow"
-        mimic = { joint = "turn", multiplier = -2, offset = 180 }
+        joints = [
+            { name = "mount", kind = "fixed", origin = { rotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]] } },
+            { name = "turn", lower = -inf, upper = 90 },
+            { name = "slide", kind = "prismatic", axis = [1, 0, 0], upper = 1000, velocity = 250, origin.translation = [
+                100, 0, 0] },
+            { name = "follow", mimic = { joint = "turn", multiplier = -2, offset = 180 } },
+        ]
         [tip]
         translation = [0, 0, 100]
     """
@@ -758,7 +707,5 @@ def test_a_mesh_of_a_robot_file_is_looked_up_from_it(tmp_path: Path) -> None:
         Visual("j", Box((0.1, 0.2, 0.3)), translation(0.01, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0)),
     )
     path.write_text('kind = "joints"\n[[joints]]\nname = "j"\n[[visuals]]\nbox = [1, 1, 1]\nsphere = 1\n')
-    with pytest.raises(RobotError) as caught:
-        read_robot_file(path)
     said = "key visuals[0].box: found box and sphere, allowed: one of box, cylinder, capsule, sphere, mesh"
-    assert str(caught.value) == f"{path}: {said}"
+    assert refusal(RobotError, read_robot_file, path) == f"{path}: {said}"

@@ -372,14 +372,6 @@ def test_long_lists_of_links_are_cut_and_only_the_first_faults_ask(urdf: Any) ->
     assert said[20].endswith("joint last: child 'L19x'; allowed: a link of the file")
 
 
-def test_xacro_files_are_told_the_command_that_expands_them(shared: Path) -> None:
-    path = shared / "robots" / "ros-industrial_kuka_experimental" / "kr3r540.xacro"
-    assert (
-        refusal(RobotError, read_urdf, path)
-        == f"{path}: is a xacro file; expand it first: xacro {path} -o kr3r540.urdf"
-    )
-
-
 def test_a_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     assert (
         refusal(RobotError, read_urdf, tmp_path / "none.urdf")
