@@ -117,13 +117,24 @@ def test_joints_of_any_kind(robot: Any) -> None:
         length_unit = "mm"
         angle_unit = "deg"
         start = [90, 500]
-        joints = [
-            { name = "mount", kind = "fixed", origin = { rotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]] } },
-            { name = "turn", lower = -inf, upper = 90 },
-            { name = "slide", kind = "prismatic", axis = [1, 0, 0], upper = 1000, velocity = 250, origin.translation = [
-                100, 0, 0] },
-            { name = "follow", mimic = { joint = "turn", multiplier = -2, offset = 180 } },
-        ]
+        [[joints]]
+        name = "mount"
+        kind = "fixed"
+        origin = { rotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]] }
+        [[joints]]
+        name = "turn"
+        lower = -inf
+        upper = 90
+        [[joints]]
+        name = "slide"
+        kind = "prismatic"
+        origin = { translation = [100, 0, 0] }
+        axis = [1, 0, 0]
+        upper = 1000
+        velocity = 250
+        [[joints]]
+        name = "follow"
+        mimic = { joint = "turn", multiplier = -2, offset = 180 }
         [tip]
         translation = [0, 0, 100]
     """
