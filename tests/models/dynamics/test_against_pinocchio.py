@@ -45,11 +45,9 @@ def pinocchio_of(chain: Chain) -> Any:
     for joint in chain.joints:
         frame = frame * se3(joint.origin)
         if joint.kind != "fixed":
-            made = {
-                "revolute": pinocchio.JointModelRevoluteUnaligned,
-                "prismatic": pinocchio.JointModelPrismaticUnaligned,
-            }[joint.kind]
-            parent = model.addJoint(parent, made(np.array(joint.axis)), frame, joint.name)
+            turns = joint.kind == "revolute"
+            kind = pinocchio.JointModelRevoluteUnaligned if turns else pinocchio.JointModelPrismaticUnaligned
+            parent = model.addJoint(parent, kind(np.array(joint.axis)), frame, joint.name)
             frame = pinocchio.SE3.Identity()
         add_bodies(model, parent, frame, chain, joint.name)
     tool = frame * se3(chain.tip) * se3(chain.tool)
@@ -93,31 +91,23 @@ def of_urdf(path: Path, tip: str) -> tuple[Chain, Any]:
 
 
 class States:
-    """An arm in random states, and what both say of it."""
+    """An arm in random states: rows for Pinocchio, columns for the functions under test."""
 
     def __init__(self, chain: Chain, model: Any) -> None:
-        self.chain, self.model = chain, model
-        self.data = self.model.createData()
+        self.chain, self.model, self.data = chain, model, model.createData()
         rng, count = np.random.default_rng(21), len(self.chain.coordinates)
-        self.q, self.qd, self.qdd = (
-            size * rng.uniform(-1.0, 1.0, (STATES, count)) for size in (np.pi, 3.0, 10.0)
-        )
+        sizes = (np.pi, 3.0, 10.0)
+        self.q, self.qd, self.qdd = (size * rng.uniform(-1.0, 1.0, (STATES, count)) for size in sizes)
+        self.columns = [list(rows.T) for rows in (self.q, self.qd, self.qdd)]
         self.force = 20.0 * rng.uniform(-1.0, 1.0, (STATES, 6))
         x, y, z, mx, my, mz = self.force.T
         self.wrench = Wrench((x, y, z), (mx, my, mz))
 
-    def columns(self, *rows: FloatArray) -> list[list[FloatArray]]:
-        return [list(one.T) for one in rows]
-
     def tool_torques(self) -> FloatArray:
         """J^T F of the tool, along the axes of the world."""
-        frame, found = self.model.getFrameId("tool"), []
-        for q, force in zip(self.q, self.force, strict=True):
-            columns = pinocchio.computeFrameJacobian(
-                self.model, self.data, q, frame, pinocchio.LOCAL_WORLD_ALIGNED
-            )
-            found.append(columns.T @ force)
-        return np.array(found)
+        frame, axes = self.model.getFrameId("tool"), pinocchio.LOCAL_WORLD_ALIGNED
+        jacobians = (pinocchio.computeFrameJacobian(self.model, self.data, q, frame, axes) for q in self.q)
+        return np.array([J.T @ force for J, force in zip(jacobians, self.force, strict=True)])
 
     def rnea(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         rows = zip(q, qd, qdd, strict=True)
@@ -142,7 +132,7 @@ def assert_same(found: Any, expected: FloatArray, within: float = SAME) -> None:
 
 
 def test_inverse_dynamics_are_those_of_pinocchio(states: States) -> None:
-    q, qd, qdd = states.columns(states.q, states.qd, states.qdd)
+    q, qd, qdd = states.columns
     free = np.array(inverse_dynamics(states.chain, q, qd, qdd)).T
     assert_same(free, states.rnea(states.q, states.qd, states.qdd))
     pushed = np.array(inverse_dynamics(states.chain, q, qd, qdd, states.wrench)).T
@@ -150,19 +140,17 @@ def test_inverse_dynamics_are_those_of_pinocchio(states: States) -> None:
 
 
 def test_the_mass_matrix_is_that_of_pinocchio_symmetric_and_positive(states: States) -> None:
-    rows = mass_matrix(states.chain, states.columns(states.q)[0])
+    rows = mass_matrix(states.chain, states.columns[0])
     found = np.array([[np.broadcast_to(one, STATES) for one in row] for row in rows]).transpose(2, 0, 1)
     np.testing.assert_array_equal(found, found.transpose(0, 2, 1))
     assert np.linalg.eigvalsh(found).min() > 0.0
-    expected = []
-    for q in states.q:
-        upper = np.triu(pinocchio.crba(states.model, states.data, q))
-        expected.append(upper + np.triu(upper, 1).T)
+    upper = [np.triu(pinocchio.crba(states.model, states.data, q)) for q in states.q]
+    expected = [half + np.triu(half, 1).T for half in upper]
     assert_same(found, np.array(expected))
 
 
 def test_forward_dynamics_are_those_of_pinocchio_and_undo_the_inverse(states: States) -> None:
-    q, qd, tau = states.columns(states.q, states.qd, states.qdd)
+    q, qd, tau = states.columns
     found = forward_dynamics(states.chain, q, qd, tau)
     rows = zip(states.q, states.qd, states.qdd, strict=True)
     expected = [pinocchio.aba(states.model, states.data, *row).copy() for row in rows]
@@ -175,7 +163,7 @@ def test_forward_dynamics_are_those_of_pinocchio_and_undo_the_inverse(states: St
 
 
 def test_energies_and_centres_are_those_of_pinocchio(states: States) -> None:
-    q, qd = states.columns(states.q, states.qd)
+    q, qd, _ = states.columns
     kinetic, potential = kinetic_energy(states.chain, q, qd), potential_energy(states.chain, q)
     rows = [*zip(states.q, states.qd, strict=True)]
     expected = [pinocchio.computeKineticEnergy(states.model, states.data, *row) for row in rows]
@@ -183,21 +171,18 @@ def test_energies_and_centres_are_those_of_pinocchio(states: States) -> None:
     heights = np.array([pinocchio.computePotentialEnergy(states.model, states.data, row) for row in states.q])
     level = potential - heights  # Pinocchio leaves out the base, which stands still
     np.testing.assert_allclose(level, level[0], rtol=0.0, atol=1e-12 * np.abs(potential).max())
-    moving = [k for k, one in enumerate(states.chain.inertials) if one.joint in moved_by(states.chain)]
-    masses = np.array([states.chain.inertials[k].mass for k in moving])
+    joints, inertials = states.chain.joints, states.chain.inertials
+    first = next(k for k, joint in enumerate(joints) if joint.kind != "fixed")
+    carriers = [joint.name for joint in joints[first:]]
+    moving = [k for k, one in enumerate(inertials) if one.joint in carriers]
+    masses = np.array([inertials[k].mass for k in moving])
     found = masses @ centres_of_mass_over_log(states.chain, states.q)[:, moving] / masses.sum()
     whole = [pinocchio.centerOfMass(states.model, states.data, row).copy() for row in states.q]
     assert_same(found, np.array(whole))
 
 
-def moved_by(chain: Chain) -> list[str]:
-    """The joints from the first moving one on."""
-    first = next(k for k, joint in enumerate(chain.joints) if joint.kind != "fixed")
-    return [joint.name for joint in chain.joints[first:]]
-
-
 def test_the_terms_are_those_of_pinocchio_and_sum_to_the_inverse(states: States) -> None:
-    q, qd, qdd = states.columns(states.q, states.qd, states.qdd)
+    q, qd, qdd = states.columns
     terms = torque_terms(states.chain, q, qd, qdd, states.wrench)
     still = np.zeros_like(states.q)
     weight = states.rnea(states.q, still, still)

@@ -89,24 +89,15 @@ def test_masses_centres_inertias_and_gravity_trace_as_parameters() -> None:
     chain = with_masses(load_robot("urm6"))
     count = len(chain.inertials)
 
-    def torques(q: Any, masses: Any, centres: Any, inertias: Any, gravity: Any) -> list[Any]:
-        changed = [
-            replace(
-                one,
-                mass=masses[k],
-                centre=tuple(centres[3 * k : 3 * k + 3]),
-                inertia=tuple(inertias[6 * k : 6 * k + 6]),
-            )
-            for k, one in enumerate(chain.inertials)
-        ]
-        arm = replace(chain, inertials=tuple(changed), gravity=tuple(gravity))
-        return [inverse_dynamics(arm, q, q, q), mass_matrix(arm, q), kinetic_energy(arm, q, q)]
-
     def of_bodies(q: Any, spread: Any, centres: Any, gravity: Any) -> list[Any]:
         """What numbers drawn from spread make: bodies that there are, their inertias those of boxes."""
         masses = [1.0 + spread[k] * spread[k] for k in range(count)]
-        inertias = [entry for mass in masses for entry in (mass, mass, mass, 0.1, 0.1, 0.1)]
-        return torques(q, masses, centres, inertias, gravity)
+        changed = [
+            replace(one, mass=m, centre=tuple(centres[3 * k : 3 * k + 3]), inertia=(m, m, m, 0.1, 0.1, 0.1))
+            for k, (one, m) in enumerate(zip(chain.inertials, masses, strict=True))
+        ]
+        arm = replace(chain, inertials=tuple(changed), gravity=tuple(gravity))
+        return [inverse_dynamics(arm, q, q, q), mass_matrix(arm, q), kinetic_energy(arm, q, q)]
 
     assert_traced(of_bodies, [6, count, 3 * count, 3])
 
@@ -114,23 +105,17 @@ def test_masses_centres_inertias_and_gravity_trace_as_parameters() -> None:
 def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
     chain = with_drives(with_masses(load_robot("urm6")))
 
-    def state_of(
-        q: Sequence[Any], qd: Sequence[Any], motors: Sequence[Any], constants: Sequence[Any]
-    ) -> ArmState:
-        drives = [Drive(*(c * given for c, given in zip(constants, DRIVE, strict=True))) for _ in range(5)]
-        rows = [motors[4 * k : 4 * k + 4] for k in range(5)]
-        given = [Motor(drive, *row) for drive, row in zip(drives, rows, strict=True)]
-        return ArmState(q, qd, [*given, Spring(constants[0] * 100.0, constants[1], 0.3)])
-
-    def everything(*values: Any) -> list[Any]:
-        state = state_of(*values)
+    def everything(q: Any, qd: Any, motors: Any, x: Any) -> list[Any]:
+        constants = [1.5 + value * value for value in x]
+        drive = Drive(*(c * constant for c, constant in zip(constants, DRIVE, strict=True)))
+        actuators = [Motor(drive, *motors[4 * k : 4 * k + 4]) for k in range(5)]
+        state = ArmState(q, qd, [*actuators, Spring(constants[0] * 100.0, constants[1], 0.3)])
         wrench = Wrench((1.0, 2.0, 3.0))
         rates = [list(one) for one in motor_derivatives(state).values()]
         flows = [*power_flow(chain, state, wrench), arm_energy(chain, state)]
         return [joint_accelerations(chain, state, wrench), rates, flows]
 
-    sizes = [6, 6, 20, 7]
-    assert_traced(lambda q, qd, motors, c: everything(q, qd, motors, [1.5 + x * x for x in c]), sizes)
+    assert_traced(everything, [6, 6, 20, 7])
 
 
 def test_a_held_voltage_traces() -> None:
