@@ -11,7 +11,7 @@ point, in the sense of least |e|, where it cannot. The other two are CoppeliaSim
 values were computed. Joints at a limit that would leave it have no column in J.
 
 1. `refine`, the entry: from the starts to the targets, in blocks of rows.
-2. `descend`: steps of one block until each row has arrived or comes no nearer.
+2. `_descend`: steps of one block until each row has arrived or comes no nearer.
 3. `minimise_motion`: where an arm has more freedoms than a target takes, the null-space rule determines q by
 
        minimise |q - home|^2 / 2    with x(q) = target and lower <= q <= upper,
@@ -142,7 +142,7 @@ def refine(
     lower, upper = joint_limits(chain)
     begin = np.clip(_checked_starts(chain, targets, q, method), lower, upper)
     options = DescentOptions(lower, upper, method, metres, radians, damping, stationary)
-    state = DescentState.at(begin)
+    state = _State.at(begin)
     _run(state, chain, targets, options, iterations, threads)
     slack = np.zeros(len(targets))
     if redundancy(chain, targets):
@@ -169,7 +169,7 @@ def _checked_starts(chain: Chain, targets: Targets, q: FloatArray, method: str) 
 
 
 def _run(
-    state: DescentState,
+    state: _State,
     chain: Chain,
     targets: Targets,
     options: DescentOptions,
@@ -183,7 +183,7 @@ def _run(
     task = build_task(chain, targets)
 
     def work(index: IndexArray) -> None:
-        descend(state, task.rows(index), index, options, steps)
+        _descend(state, task.rows(index), index, options, steps)
 
     for done in range(0, iterations, ROUND):
         steps = min(ROUND, iterations - done)
@@ -194,7 +194,7 @@ def _run(
 
 
 def _minimise_motion(
-    state: DescentState,
+    state: _State,
     chain: Chain,
     targets: Targets,
     home: FloatArray,
@@ -204,7 +204,11 @@ def _minimise_motion(
     """Bring the rows that have arrived to points of least motion; return the largest entries of t."""
     slack = np.zeros(len(targets))
     arrived = np.flatnonzero(state.arrived)
-    state.q[:, arrived] -= _whole_turns(chain, state.q[:, arrived], home.T[:, arrived])
+    period = joint_periods(chain)[:, None]
+    endless = np.isfinite(period)
+    period = np.where(endless, period, 1.0)
+    turns = np.round((state.q[:, arrived] - home.T[:, arrived]) / period)
+    state.q[:, arrived] -= np.where(endless, period * turns, 0.0)  # whole turns from home
 
     def work(index: IndexArray) -> None:
         task = build_task(chain, targets.rows(index))
@@ -213,14 +217,6 @@ def _minimise_motion(
 
     map_blocks(work, [arrived[rows] for rows in row_blocks(len(arrived), BATCH_SIZE)], threads)
     return slack
-
-
-def _whole_turns(chain: Chain, q: FloatArray, home: FloatArray) -> FloatArray:
-    """Return the whole turns in [rad] of joints without limits from home."""
-    period = joint_periods(chain)[:, None]
-    endless = np.isfinite(period)
-    period = np.where(endless, period, 1.0)
-    return np.where(endless, period * np.round((q - home) / period), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,30 +252,19 @@ class DescentOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class DescentState:
-    """The state of every row of a batch.
+class _State:
+    """The state of every row of a batch."""
 
-    Attributes:
-        q: Joint values in [rad] or [m], shape (joints, n).
-        gain: mu / |e|^2 of Levenberg-Marquardt, in the unit of J squared over [m2], shape (n,).
-        steps: Taken so far, shape (n,).
-        distance: |target - tool| in [m], shape (n,).
-        angle: Between tool and target in [rad], shape (n,).
-        arrived: True where both are within their tolerances, shape (n,).
-        ended: True where no further step is taken, shape (n,).
-    """
-
-    q: FloatArray
-    gain: FloatArray
-    steps: IndexArray
-    distance: FloatArray
-    angle: FloatArray
-    arrived: BoolArray
-    ended: BoolArray
+    q: FloatArray  # joint values in [rad] or [m], shape (joints, n)
+    gain: FloatArray  # mu / |e|^2 of Levenberg-Marquardt, in the unit of J squared over [m2], shape (n,)
+    steps: IndexArray  # taken so far, shape (n,)
+    distance: FloatArray  # |target - tool| in [m], shape (n,)
+    angle: FloatArray  # between tool and target in [rad], shape (n,)
+    arrived: BoolArray  # true where both are within their tolerances, shape (n,)
+    ended: BoolArray  # true where no further step is taken, shape (n,)
 
     @classmethod
-    def at(cls, q: FloatArray) -> DescentState:
-        """Return the state of rows at their starts q in [rad] or [m], shape (n, joints)."""
+    def at(cls, q: FloatArray) -> _State:
         n = len(q)
         return cls(
             np.array(q.T, order="C"),
@@ -293,41 +278,24 @@ class DescentState:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ActiveRows:
-    """The rows of a block that have not ended.
+class _ActiveRows:
+    """The rows of a block that have not ended."""
 
-    Attributes:
-        index: Their indices in the batch, shape (n,).
-        task: Their targets.
-        q: Joint values in [rad] or [m], shape (joints, n).
-        gain: mu / |e|^2 of Levenberg-Marquardt [-], shape (n,).
-        error: At q.
-    """
+    index: IndexArray  # their indices in the batch, shape (n,)
+    task: Task  # their targets
+    q: FloatArray  # joint values in [rad] or [m], shape (joints, n)
+    gain: FloatArray  # mu / |e|^2 of Levenberg-Marquardt [-], shape (n,)
+    error: TaskError  # at q
 
-    index: IndexArray
-    task: Task
-    q: FloatArray
-    gain: FloatArray
-    error: TaskError
-
-    def rows(self, rows: IndexArray) -> ActiveRows:
-        """Return some of the rows, indices of shape (m,)."""
+    def rows(self, rows: IndexArray) -> _ActiveRows:
         task, q, error = self.task.rows(rows), take_rows(self.q, rows), self.error.rows(rows)
-        return ActiveRows(self.index[rows], task, q, self.gain[rows], error)
+        return _ActiveRows(self.index[rows], task, q, self.gain[rows], error)
 
 
-def descend(state: DescentState, task: Task, index: IndexArray, options: DescentOptions, steps: int) -> None:
-    """Take some rows of a batch up to `steps` steps further; those that have arrived leave early.
-
-    Args:
-        state: Of the batch; the rows at `index` are updated.
-        task: The targets of the rows at `index`.
-        index: Of the rows in the batch, shape (n,).
-        options: Of the steps.
-        steps: The most to take.
-    """
+def _descend(state: _State, task: Task, index: IndexArray, options: DescentOptions, steps: int) -> None:
+    """Take the rows of a batch at `index` up to `steps` steps further; those that have ended leave early."""
     q = take_rows(state.q, index)
-    rows = ActiveRows(index, task, q, state.gain[index], task.error(q))
+    rows = _ActiveRows(index, task, q, state.gain[index], task.error(q))
     rows = _drop_rows(state, rows, _has_ended(rows, options), options)
     for _ in range(steps):
         if not len(rows.index):
@@ -343,7 +311,7 @@ def _is_under_way(error: TaskError, options: DescentOptions) -> BoolArray:
     return np.asarray((error.square < np.inf) & ~error.within(options.metres, options.radians))
 
 
-def _has_ended(rows: ActiveRows, options: DescentOptions) -> BoolArray:
+def _has_ended(rows: _ActiveRows, options: DescentOptions) -> BoolArray:
     """Return where the target is met or not a number, or where e cannot be made smaller.
 
     The gradient of |e|^2 / 2 is -J^T e; joints at a limit that would leave it do not count.
@@ -355,9 +323,7 @@ def _has_ended(rows: ActiveRows, options: DescentOptions) -> BoolArray:
     return np.asarray(~going | (rows.gain >= GAINS[1]))
 
 
-def _drop_rows(
-    state: DescentState, rows: ActiveRows, leaving: BoolArray, options: DescentOptions
-) -> ActiveRows:
+def _drop_rows(state: _State, rows: _ActiveRows, leaving: BoolArray, options: DescentOptions) -> _ActiveRows:
     """Store the rows that leave, and return the remaining ones."""
     if not leaving.any():
         return rows
@@ -367,7 +333,7 @@ def _drop_rows(
     return rows.rows(np.flatnonzero(~leaving))
 
 
-def _store(state: DescentState, rows: ActiveRows, which: IndexArray, options: DescentOptions) -> None:
+def _store(state: _State, rows: _ActiveRows, which: IndexArray, options: DescentOptions) -> None:
     at, error = rows.index[which], rows.error
     state.q[:, at] = rows.q[:, which]
     state.gain[at] = rows.gain[which]
@@ -376,7 +342,7 @@ def _store(state: DescentState, rows: ActiveRows, which: IndexArray, options: De
     state.arrived[at] = error.within(options.metres, options.radians)[which]
 
 
-def _free_jacobian(rows: ActiveRows, options: DescentOptions) -> FloatArray:
+def _free_jacobian(rows: _ActiveRows, options: DescentOptions) -> FloatArray:
     """Return J without the joints at a limit that would leave it downhill: J^T e points out."""
     J = rows.error.jacobian
     if not options.limited:
@@ -387,7 +353,7 @@ def _free_jacobian(rows: ActiveRows, options: DescentOptions) -> FloatArray:
     return np.where(blocked, 0.0, J)
 
 
-def _step(rows: ActiveRows, options: DescentOptions) -> ActiveRows:
+def _step(rows: _ActiveRows, options: DescentOptions) -> _ActiveRows:
     J = _free_jacobian(rows, options)
     if options.method == "lm":
         return _marquardt(rows, J, options)
@@ -400,7 +366,7 @@ def _step(rows: ActiveRows, options: DescentOptions) -> ActiveRows:
     return replace(rows, q=q, error=rows.task.error(q))
 
 
-def _marquardt(rows: ActiveRows, J: FloatArray, options: DescentOptions) -> ActiveRows:
+def _marquardt(rows: _ActiveRows, J: FloatArray, options: DescentOptions) -> _ActiveRows:
     """Return the rows after a Levenberg-Marquardt step, taken where it gains enough of the prediction.
 
     Predicted is |e|^2 - |e - J dq|^2; the gain ratio is the actual decrease over it.
@@ -467,7 +433,7 @@ def minimise_motion(
         `MOTION_TOLERANCE` except where the null space has no digits, next to a singular pose.
     """
     q = q.copy()
-    now = null_space_step(task, q, home, options)
+    now = _null_space_step(task, q, home, options)
     size = now.size
     rows = np.flatnonzero(size > MOTION_TOLERANCE)
     now, task, length = now.rows(rows), task.rows(rows), np.ones(len(rows))
@@ -476,7 +442,7 @@ def minimise_motion(
             break
         before, to = take_rows(q, rows), take_rows(home, rows)
         after, accepted = _move(task, before, to, now, length, options)
-        new = null_space_step(task, after, to, options)
+        new = _null_space_step(task, after, to, options)
         length = np.where(accepted, _length(after - before, now, new), 0.25 * length)
         now = new.where(accepted, now)
         q[:, rows] = np.where(accepted, after, before)
@@ -487,41 +453,28 @@ def minimise_motion(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NullSpaceStep:
-    """The step towards home that leaves the tool where it is.
+class _NullSpaceStep:
+    """The step towards home that leaves the tool where it is."""
 
-    Attributes:
-        t: In [rad] or [m], shape (joints, n).
-        free: False of the joints that are kept at a limit, shape (joints, n).
-    """
-
-    t: FloatArray
-    free: BoolArray
+    t: FloatArray  # [rad] or [m], shape (joints, n)
+    free: BoolArray  # false of the joints that are kept at a limit, shape (joints, n)
 
     @property
     def size(self) -> FloatArray:
-        """The largest entry of t in [rad] or [m], shape (n,)."""
         return np.asarray(np.abs(self.t).max(axis=0))
 
-    def rows(self, rows: IndexArray) -> NullSpaceStep:
+    def rows(self, rows: IndexArray) -> _NullSpaceStep:
         """Return some of the rows, indices of shape (m,)."""
-        return NullSpaceStep(take_rows(self.t, rows), self.free[:, rows])
+        return _NullSpaceStep(take_rows(self.t, rows), self.free[:, rows])
 
-    def where(self, selected: BoolArray, other: NullSpaceStep) -> NullSpaceStep:
-        """Return the selected rows, a mask of shape (n,), and the other's elsewhere."""
-        return NullSpaceStep(np.where(selected, self.t, other.t), np.where(selected, self.free, other.free))
+    def where(self, selected: BoolArray, other: _NullSpaceStep) -> _NullSpaceStep:
+        return _NullSpaceStep(np.where(selected, self.t, other.t), np.where(selected, self.free, other.free))
 
 
-def null_space_step(task: Task, q: FloatArray, home: FloatArray, options: DescentOptions) -> NullSpaceStep:
-    """Return the step towards home in the null space of the joints that are free to move.
+def _null_space_step(task: Task, q: FloatArray, home: FloatArray, options: DescentOptions) -> _NullSpaceStep:
+    """Return the step towards home in the null space of the joints that are free to move, shape (joints, n).
 
     Of the joints at a limit the one that would move inwards most is released.
-
-    Args:
-        task: The targets.
-        q: Joint values that meet them, in [rad] or [m], shape (joints, n).
-        home: Origin of least motion, in [rad] or [m], shape (joints, n).
-        options: The limits.
     """
     J = task.error(q).jacobian
     low, high = (
@@ -535,7 +488,7 @@ def null_space_step(task: Task, q: FloatArray, home: FloatArray, options: Descen
     if released.any():
         free |= released
         remainder = _remainder(J, home - q, free)
-    return NullSpaceStep(np.where(free, remainder, 0.0), free)
+    return _NullSpaceStep(np.where(free, remainder, 0.0), free)
 
 
 def _remainder(J: FloatArray, wish: FloatArray, free: BoolArray) -> FloatArray:
@@ -556,23 +509,17 @@ def _move(
     task: Task,
     q: FloatArray,
     home: FloatArray,
-    step: NullSpaceStep,
+    step: _NullSpaceStep,
     length: FloatArray,
     options: DescentOptions,
 ) -> tuple[FloatArray, BoolArray]:
     """Return joint values a step along t, back on the target, and where they are nearer to home."""
-    after, met = _return_to_target(
-        task, q + np.minimum(length, _free_length(q, step.t, options)) * step.t, step.free, options
-    )
+    limit = np.where(step.t > 0.0, options.upper[:, None], options.lower[:, None])
+    room = np.divide(limit - q, step.t, out=np.full(q.shape, np.inf), where=step.t != 0.0)
+    length = np.minimum(length, np.asarray(room.min(axis=0)))  # until the first joint is at a limit
+    after, met = _return_to_target(task, q + length * step.t, step.free, options)
     gain = dot_product(q - home, q - home) - dot_product(after - home, after - home)
     return after, met & (gain > 0.0)
-
-
-def _free_length(q: FloatArray, t: FloatArray, options: DescentOptions) -> FloatArray:
-    """Return the multiples of t until the first joint is at a limit, shape (n,)."""
-    limit = np.where(t > 0.0, options.upper[:, None], options.lower[:, None])
-    room = np.divide(limit - q, t, out=np.full(q.shape, np.inf), where=t != 0.0)
-    return np.asarray(room.min(axis=0))
 
 
 def _return_to_target(
@@ -590,7 +537,7 @@ def _return_to_target(
     return q, task.error(q).within(options.metres, options.radians)
 
 
-def _length(displacement: FloatArray, before: NullSpaceStep, after: NullSpaceStep) -> FloatArray:
+def _length(displacement: FloatArray, before: _NullSpaceStep, after: _NullSpaceStep) -> FloatArray:
     """Return the next step in multiples of t: |dq|^2 / (dq . -dt), the inverse of the curvature.
 
     It is the longest where |q - home|^2 is not convex, and 1 where other joints are at limits than before.

@@ -327,8 +327,10 @@ def _passing_axes(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     q5 = np.arctan2(d * np.cos(q1) + e * np.sin(q1) + f, a * np.cos(q1) + b * np.sin(q1) + c)
     for _ in range(2):
         q1, q5 = _newton_step(left, right[:, 1:], q1, q5)
-    q1, q5 = _in_order(arm, motion, q1, q5)
-    q1, q5 = wrap_angle(q1)[:, None], wrap_angle(q5)[:, None]
+    # sorted by the angle about axis 1 from the wrist to axis 2: the same order for any zero of joint 1
+    cosine, sine, _ = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), 0.0)
+    order = np.argsort(wrap_angle(q1 - np.arctan2(sine, cosine)), axis=0)  # NaN last
+    q1, q5 = (wrap_angle(np.take_along_axis(q, order, axis=0))[:, None] for q in (q1, q5))
     count = np.isfinite(q1).sum(axis=0)
     reasons = format_reasons(
         np.isnan(q1),
@@ -367,19 +369,6 @@ def _newton_step(
     step1, step5 = (f * g5 - f5 * g) / det, (f1 * g - f * g1) / det
     good = np.abs(step1) + np.abs(step5) < NEAR_ROOTS
     return np.where(good, q1 - step1, q1), np.where(good, q5 - step5, q5)
-
-
-def _in_order(
-    arm: ParallelGeometry, motion: Transform, q1: FloatArray, q5: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return pairs of q1 and q5, shape (4, n), sorted by the angle about axis 1 from the wrist to axis 2.
-
-    This order, unlike that of q1, is the same for any zero of joint 1 and stays while the arm turns about
-    axis 1.
-    """
-    cosine, sine, _ = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), 0.0)
-    order = np.argsort(wrap_angle(q1 - np.arctan2(sine, cosine)), axis=0)  # NaN last
-    return np.take_along_axis(q1, order, axis=0), np.take_along_axis(q5, order, axis=0)
 
 
 def _rotation_terms(k: Vector, v: Vector) -> tuple[Element, Element, Element]:

@@ -144,7 +144,7 @@ class ParallelAxes:
         return Solutions(q, self.branches, reasons, singular)
 
     def _families(
-        self, outer: OuterJoints, wrist: _Wrist, links: TwoLinks, at_zero: bool
+        self, outer: OuterJoints, wrist: _Wrist, links: _TwoLinks, at_zero: bool
     ) -> tuple[SingularPoses, ...]:
         """Return the families of singular poses, and what is free there."""
         q1, q2, q3, q4, _, q6 = self.names
@@ -229,29 +229,20 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, p4: Vector, wish: FloatArr
     return np.where((allowed == cosine) | (np.abs(allowed) > 1.0 + REACH), wish, moved)
 
 
-class TwoLinks(NamedTuple):
-    """Joints 2 and 3 of both elbows, each of shape (2, a, b, n); their signs are those of z.
+class _TwoLinks(NamedTuple):
+    """Joints 2 and 3 of both elbows, each of shape (2, a, b, n); their signs are those of z."""
 
-    Attributes:
-        q2: In [rad].
-        q3: In [rad].
-        reasons: Why there are none.
-        stretched: Where both elbows are one, the links stretched.
-        withdrawn: The same, one link folded back on the other.
-        free: Where axis 4 is on axis 2, which leaves q2 free.
-    """
-
-    q2: FloatArray
-    q3: FloatArray
-    reasons: TextArray
-    stretched: BoolArray
-    withdrawn: BoolArray
-    free: BoolArray
+    q2: FloatArray  # [rad]
+    q3: FloatArray  # [rad]
+    reasons: TextArray  # why there are none
+    stretched: BoolArray  # where both elbows are one, the links stretched
+    withdrawn: BoolArray  # the same, one link folded back on the other
+    free: BoolArray  # where axis 4 is on axis 2, which leaves q2 free
 
 
 def two_links(
     arm: ParallelGeometry, place: tuple[FloatArray, FloatArray], side: FloatArray, near: FloatArray
-) -> TwoLinks:
+) -> _TwoLinks:
     """Return q2 and q3 that bring the point p4 to a place in the plane.
 
     With the links' lengths l2, l3, the distance r and the angle psi between the links
@@ -285,7 +276,7 @@ def two_links(
         short,
         long,
     )
-    return TwoLinks(
+    return _TwoLinks(
         q2 + np.zeros_like(psi),
         psi - (second - first),
         np.broadcast_to(reasons, psi.shape),

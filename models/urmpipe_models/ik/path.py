@@ -9,7 +9,7 @@
    solution the same branch continues if it has a solution, else the nearest.
 3. Without one: least motion (`path_numeric`).
 4. The result, `JointPath`, with its jumps (`find_jumps`), joint speeds above their limits
-   (`find_speed_violations`) and stretches in singular families.
+   (`_find_speed_violations`) and stretches in singular families.
 """
 
 from __future__ import annotations
@@ -205,7 +205,7 @@ def _build_path(
         motion.reasons,
         motion.shortfall,
         jumps,
-        find_speed_violations(chain, motion.q, seconds),
+        _find_speed_violations(chain, motion.q, seconds),
         tuple(
             SingularStretch(family, first, last, float(seconds[first]), float(seconds[last]))
             for family, where in motion.families.items()
@@ -285,7 +285,7 @@ class _BranchWalk:
         self, chain: Chain, form: ClosedForm, targets: Targets, solutions: Solutions, start: FloatArray
     ) -> None:
         self._chain, self._form, self._targets = chain, form, targets
-        self._candidates = BranchCandidates.of(chain, solutions)
+        self._candidates = _Candidates.of(chain, solutions)
         free = np.zeros(len(solutions), dtype=bool)
         for poses in solutions.singular:
             if poses.free:
@@ -302,7 +302,7 @@ class _BranchWalk:
             rows = slice(sample, self._free.pop(0)[1] + 1)
             solutions = self._form.solve(self._targets.rows(rows), self._last)
             limited = limit_solutions(self._chain, solutions, self._last)
-            self._candidates.replace(rows, BranchCandidates.of(self._chain, limited))
+            self._candidates.replace(rows, _Candidates.of(self._chain, limited))
         same = int(self.column[self.at]) if 0 <= self.at < sample - 1 else None
         column, q = self._candidates.nearest(sample, self._last, same)
         self._take(sample, column, q[None])
@@ -326,46 +326,28 @@ class _BranchWalk:
         self.at, self._last = rows.stop - 1, q[-1]
 
 
-class BranchCandidates(NamedTuple):
-    """The solutions of samples, and the whole turns by which each joint may differ from them.
+class _Candidates(NamedTuple):
+    """The solutions of samples, and the whole turns by which each joint may differ from them."""
 
-    Attributes:
-        q: In [rad], shape (n, k, joints); 0 where there is none.
-        lost: Infinity where there is none, 0 elsewhere [-], shape (n, k).
-        least: Fewest whole turns to add to a joint [-], shape (n, k, joints).
-        most: Most whole turns to add to a joint [-], shape (n, k, joints).
-    """
-
-    q: FloatArray
-    lost: FloatArray
-    least: FloatArray
-    most: FloatArray
+    q: FloatArray  # [rad], shape (n, k, joints); 0 where there is none
+    lost: FloatArray  # infinity where there is none, 0 elsewhere [-], shape (n, k)
+    least: FloatArray  # fewest whole turns to add to a joint [-], shape (n, k, joints)
+    most: FloatArray  # most whole turns to add to a joint [-], shape (n, k, joints)
 
     @classmethod
-    def of(cls, chain: Chain, solutions: Solutions) -> BranchCandidates:
-        """Return the candidates that solutions within limits give."""
+    def of(cls, chain: Chain, solutions: Solutions) -> _Candidates:
         lower, upper = joint_limits(chain)
         q = np.where(solutions.reached[..., None], solutions.q, 0.0)
         least = np.ceil((lower - LIMIT_ROUNDING - q) / TURN)
         most = np.floor((upper + LIMIT_ROUNDING - q) / TURN)
         return cls(q, np.where(solutions.reached, 0.0, np.inf), least, most)
 
-    def replace(self, rows: slice, other: BranchCandidates) -> None:
-        """Replace some samples."""
+    def replace(self, rows: slice, other: _Candidates) -> None:
         for values, replacement in zip(self, other, strict=True):
             values[rows] = replacement
 
     def nearest(self, sample: int, last: FloatArray, column: int | None) -> tuple[int, FloatArray]:
-        """Return the column and the joint values that are nearest to the last ones.
-
-        Args:
-            sample: Its index.
-            last: Joint values before in [rad] or [m], shape (joints,).
-            column: Taken at any distance, if it has a solution; None to take the nearest.
-
-        Returns:
-            The column, and joint values in [rad] or [m], shape (joints,).
-        """
+        """Return the nearest column, or `column` if it has a solution, and its joint values."""
         turns = np.rint((last - self.q[sample]) / TURN)
         near = self.q[sample] + TURN * np.minimum(np.maximum(turns, self.least[sample]), self.most[sample])
         away = near - last
@@ -582,15 +564,10 @@ class SpeedViolation:
         )
 
 
-def find_speed_violations(chain: Chain, q: FloatArray, seconds: FloatArray) -> tuple[SpeedViolation, ...]:
+def _find_speed_violations(chain: Chain, q: FloatArray, seconds: FloatArray) -> tuple[SpeedViolation, ...]:
     """Return where joints exceed their limits, |q_k - q_{k-1}| / (t_k - t_{k-1}), by sample and joint.
 
     Over samples without a solution it is the speed that the joint needs at least to be there in time.
-
-    Args:
-        chain: The arm.
-        q: Joint values in [rad] or [m], shape (n, joints), NaN in missing rows.
-        seconds: Times in [s], rising, shape (n,).
     """
     reached = np.flatnonzero(np.isfinite(q).all(axis=1))
     speed = np.abs(np.diff(q[reached], axis=0)) / np.diff(seconds[reached])[:, None]

@@ -24,7 +24,7 @@ kinematics and Jacobian, which cost about as much for one row as for hundreds.
 2. `SlidingWindow`: converged samples leave the window at the front, new ones enter at the back. Those at
    the front converge in a few sweeps, and meanwhile those after them come near. Samples whose correction is
    too large for the linearisation leave at the back again, so the window finds its length.
-3. `next_limit_change`: a joint whose least motion would leave its limits is fixed at the limit from that
+3. `_next_limit_change`: a joint whose least motion would leave its limits is fixed at the limit from that
    sample on and has no column in J; J_h^T y_k then is its step if it were free, and it is released where
    that points inwards.
 4. `LeastMotionPath`: a sample at the front that does not converge is searched for by `solve`, from the sample
@@ -49,7 +49,6 @@ from urmpipe_models.ik.solve import solve
 from urmpipe_models.ik.task import (
     LDLFactor,
     Task,
-    TaskError,
     build_task,
     factor,
     gram,
@@ -255,7 +254,7 @@ class SlidingWindow:
     def _release(self, count: int, pull: FloatArray | None) -> None:
         """Take the first samples of the window, up to where a joint meets or leaves a limit."""
         q = self._guess[:count]
-        at, fixed = next_limit_change(
+        at, fixed = _next_limit_change(
             q, None if pull is None else pull[:count], self._fixed, self._lower, self._upper
         )
         self._take(np.clip(q[:at], self._lower, self._upper))
@@ -327,18 +326,15 @@ def newton_sweep(
     columns = LDLFactor(system.lower[:, :, None], system.inverse[:, None]).solve(J)
     null = np.eye(len(fixed)) - _matrix_rows(columns.transpose(1, 0, 2)) @ _matrix_rows(J)
     before = np.vstack((np.where(free, last, fixed), guess[:-1])) - guess
-    q = guess + _corrections(null, before, transposed_product(J, system.solve(error.vector)).T)
-    pull = None if free.all() else _pull(system, error, J, np.vstack((before[:1], q[:-1] - guess[1:])))
+    # corrections c_k = q_k - p_k = N_k c_{k-1} + N_k (p_{k-1} - p_k) + J_k^# e_k
+    towards = transposed_product(J, system.solve(error.vector)).T
+    q = guess + solve_recurrence(null, (null @ before[:, :, None])[:, :, 0] + towards)
+    pull = None
+    if not free.all():
+        s = np.vstack((before[:1], q[:-1] - guess[1:]))
+        y = system.solve(error.vector - product(J, np.ascontiguousarray(s.T)))
+        pull = transposed_product(error.jacobian, y).T
     return SweepResult(q, np.sqrt(error.square), pull)
-
-
-def _corrections(null: FloatArray, before: FloatArray, towards: FloatArray) -> FloatArray:
-    """Return c_k = N_k c_{k-1} + N_k (p_{k-1} - p_k) + J_k^# e_k, the corrections q_k - p_k.
-
-    `null`: N_k, shape (w, joints, joints); `before`: p_{k-1} - p_k, of the first sample q_0 - p_1, and
-    `towards`: J_k^# e_k, both of shape (w, joints).
-    """
-    return solve_recurrence(null, (null @ before[:, :, None])[:, :, 0] + towards)
 
 
 def solve_recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
@@ -366,33 +362,18 @@ def solve_recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
     return np.asarray((products @ begins + sums).reshape(-1, size)[:count])
 
 
-def _pull(system: LDLFactor, error: TaskError, J: FloatArray, s: FloatArray) -> FloatArray:
-    """Return J^T y of all joints, fixed ones too: y = (J J^T + lambda^2 1)^-1 (e - J s)."""
-    y = system.solve(error.vector - product(J, np.ascontiguousarray(s.T)))
-    return transposed_product(error.jacobian, y).T
-
-
 def _matrix_rows(matrices: FloatArray) -> FloatArray:
     """Return matrices of shape (k, p, w) as shape (w, k, p)."""
     return np.ascontiguousarray(matrices.transpose(2, 0, 1))
 
 
-def next_limit_change(
+def _next_limit_change(
     q: FloatArray, pull: FloatArray | None, fixed: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> tuple[int, FloatArray]:
     """Return the first sample at which a joint meets or leaves its limit, and the fixed joints from it on.
 
-    Args:
-        q: Joint values in [rad] or [m], shape (m, joints).
-        pull: Step of each joint if it were free, in [rad] or [m], shape (m, joints); None where
-            all are free.
-        fixed: Values of fixed joints in [rad] or [m], NaN of a free one, shape (joints,).
-        lower: Limits in [rad] or [m], shape (joints,).
-        upper: Limits in [rad] or [m], shape (joints,).
-
-    Returns:
-        The index of the sample, m if there is none, and the values of fixed joints from it on in [rad] or
-        [m], shape (joints,).
+    `pull`, shape (m, joints), is the step of each joint if it were free; None where all are. The sample is
+    m if there is none.
     """
     free = np.isnan(fixed)
     beyond = np.where(free, np.maximum(lower - q, q - upper), -np.inf)

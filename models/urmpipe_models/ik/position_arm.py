@@ -5,8 +5,8 @@ The two equations A1 u1 + b1(w) = A3 u3 + b3 of `loop_equations` are solved by t
 1. Axes 2 and 3 meet or are parallel: A3 has rank 1, and a combination of both equations holds joint 1 alone
    (the shoulder: right, left); the other one then gives joint 3 (the elbow: down, up). Axes 1 and 2 meet or
    are parallel: the same, joint 3 first. Each joint has up to two roots (`PositionArm.solve`).
-2. Otherwise one joint is eliminated, and a quadric of up to four roots is left (`quartic_roots`), the quartic
-   of [Pieper1968]_: posture 1 to 4.
+2. Otherwise one joint is eliminated, and a quadric of up to four roots is left (`_quartic_roots`), the
+   quartic of [Pieper1968]_: posture 1 to 4.
 3. Joint 2 follows from both. Where axes meet or are parallel only up to rounding (`RANK_TOLERANCE`), the
    joints are refined by Newton's rule.
 4. Of postures that coincide the later one is masked, with the reason (`mask_coincident`, `mask_duplicates`).
@@ -196,7 +196,7 @@ class PositionArm:
         target = position / self.size
         view = self.equations.view_from_joint1(target)
         if self.order == "both":
-            u1, u3 = quartic_roots(self.equations, view)
+            u1, u3 = _quartic_roots(self.equations, view)
             reasons: TextArray = np.full(u3[0].shape, "", dtype=np.object_)
             ReachReasons(self.equations, self.size).write_position(reasons, np.isnan(u3[0]), view)
             meeting: Meeting = {}
@@ -392,7 +392,7 @@ def mask_coincident(
     reasons[second] = np.where(where, same[:, None], reasons[second])
 
 
-def quartic_roots(equations: LoopEquations, view: WristView) -> tuple[FloatArray, FloatArray]:
+def _quartic_roots(equations: LoopEquations, view: WristView) -> tuple[FloatArray, FloatArray]:
     """Return u1 and u3 of A1 u1 + b1 = A3 u3 + b3, both on their tracks.
 
     The equations give one of the two as v = G u + g of the other, which put into |v|^2 = radius^2 (or v[1] =
@@ -411,7 +411,11 @@ def quartic_roots(equations: LoopEquations, view: WristView) -> tuple[FloatArray
         u1, u3 = _eliminate(first, view.radius, third, radius, offset)
     else:
         u3, u1 = _eliminate(third, radius, first, view.radius, -offset)
-    order = np.argsort(_joint3_order(third, u3), axis=0)[None]  # NaN last
+    from_largest = np.asarray(u3[0])
+    if third.revolute:
+        largest = float(np.arctan2(third.coefficients[1, 1], third.coefficients[1, 0]))
+        from_largest = wrap_angle(np.arctan2(u3[1], u3[0]) - largest)
+    order = np.argsort(from_largest, axis=0)[None]  # NaN last
     return np.take_along_axis(u1, order, axis=1), np.take_along_axis(u3, order, axis=1)
 
 
@@ -451,11 +455,3 @@ def _in_half_angle(quartic: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     p4, p3, p2, p1, p0 = quartic
     a = (p0 + p4) / 2
     return a, (p1 - p3) / 4, (p2 + 2.0 * a) / 4, (p0 - p4) / 2, (p1 + p3) / 4, np.zeros_like(a)
-
-
-def _joint3_order(third: Track, u3: FloatArray) -> FloatArray:
-    """Return the angle or length of joint 3 from where the second equation is largest."""
-    if not third.revolute:
-        return np.asarray(u3[0])
-    largest = float(np.arctan2(third.coefficients[1, 1], third.coefficients[1, 0]))
-    return wrap_angle(np.arctan2(u3[1], u3[0]) - largest)

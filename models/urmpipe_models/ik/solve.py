@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
+from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value
 from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
 from urmpipe_models.ik.limits import joint_periods, limit_solutions, shift_towards_limits
@@ -30,7 +30,6 @@ from urmpipe_models.ik.solutions import (
     NEAREST_POINT,
     NO_BRANCH,
     SearchOptions,
-    SingularPoses,
     Solutions,
     Targets,
     empty_solutions,
@@ -154,14 +153,13 @@ def choose_free_joints(chain: Chain, targets: Targets, solutions: Solutions, nea
     row, column = row[new], column[new]
     q = solutions.q.copy()
     q[row, column] = refined.q[new]
-    singular = tuple(_add_limits_to_choice(poses, row, column) for poses in solutions.singular)
+    singular = tuple(
+        replace(poses, chosen=poses.chosen + CHOSEN_BY_LIMITS)
+        if poses.free and poses.where[row, column].any()
+        else poses
+        for poses in solutions.singular
+    )
     return limit_solutions(chain, replace(solutions, q=q, singular=singular), near)
-
-
-def _add_limits_to_choice(poses: SingularPoses, row: IndexArray, column: IndexArray) -> SingularPoses:
-    if not (poses.free and poses.where[row, column].any()):
-        return poses
-    return replace(poses, chosen=poses.chosen + CHOSEN_BY_LIMITS)
 
 
 def _insert_nearest(solutions: Solutions, missed: BoolArray, nearest: Solutions) -> Solutions:

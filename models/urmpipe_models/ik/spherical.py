@@ -155,7 +155,7 @@ class SphericalWrist:
             angles = self._wrist_angles(rotation, postures.q, None if chosen is None else chosen[3])
         return self._combine(postures, angles, chosen is not None)
 
-    def _wrist_angles(self, rotation: FloatArray, q: FloatArray, near: FloatArray | None) -> WristAngles:
+    def _wrist_angles(self, rotation: FloatArray, q: FloatArray, near: FloatArray | None) -> _WristAngles:
         """Return joints 4 to 6 of every posture, shape (3, 2, k * n)."""
         vectors = [tuple((rotation @ axis).T) for axis in (self.wrist.axes[2], self.wrist.across_tool)]
         for joint in np.flatnonzero(self.screws.revolute[:3]):
@@ -168,7 +168,7 @@ class SphericalWrist:
         free = np.zeros(q.shape[1:]) if near is None else np.broadcast_to(near, q.shape[1:])
         return self.wrist.solve(tool_axis, across, free.reshape(-1))
 
-    def _combine(self, postures: Postures, angles: WristAngles, near: bool) -> Solutions:
+    def _combine(self, postures: Postures, angles: _WristAngles, near: bool) -> Solutions:
         k, n = postures.reasons.shape
         last = angles.q.reshape(3, 2, k, n)
         both = np.asarray(np.isfinite(last).all(axis=0) & np.isfinite(postures.q).all(axis=0))
@@ -182,7 +182,7 @@ class SphericalWrist:
         reasons = self._reasons(postures, angles, reached)
         return Solutions(q, self.branches, reasons, tuple(self._singular(postures, angles, reached, near)))
 
-    def _reasons(self, postures: Postures, angles: WristAngles, reached: BoolArray) -> TextArray:
+    def _reasons(self, postures: Postures, angles: _WristAngles, reached: BoolArray) -> TextArray:
         """Return why there is no solution, shape (n, 2 k)."""
         reasons = np.repeat(postures.reasons.T, 2, axis=1)
         angle, meet = (values.reshape(postures.reasons.shape) for values in (angles.angle, angles.meet))
@@ -200,7 +200,7 @@ class SphericalWrist:
         return reasons
 
     def _singular(
-        self, postures: Postures, angles: WristAngles, reached: BoolArray, near: bool
+        self, postures: Postures, angles: _WristAngles, reached: BoolArray, near: bool
     ) -> list[SingularPoses]:
         """Return the families that solutions lie in, with what is free there and what was chosen."""
         q1, q2, _, q4, _, q6 = self.names
@@ -221,22 +221,14 @@ class SphericalWrist:
         return [SingularPoses(f, where, a, b) for f, where, a, b in spread if where.any()]
 
 
-class WristAngles(NamedTuple):
-    """Joints 4 to 6 of a wrist for m rotations.
+class _WristAngles(NamedTuple):
+    """Joints 4 to 6 of a wrist for m rotations."""
 
-    Attributes:
-        q: In [rad], shape (3, 2, m), not flipped before flipped; NaN where there is none.
-        angle: Between axes 4 and 6, in [rad], shape (m,).
-        along: Where these axes are one line and point the same way, shape (m,).
-        against: Where they are one line and point opposite ways, shape (m,).
-        meet: Where both flips are one, as all three axes lie in a plane, shape (m,).
-    """
-
-    q: FloatArray
-    angle: FloatArray
-    along: BoolArray
-    against: BoolArray
-    meet: BoolArray
+    q: FloatArray  # [rad], shape (3, 2, m), not flipped before flipped; NaN where there is none
+    angle: FloatArray  # between axes 4 and 6, in [rad], shape (m,)
+    along: BoolArray  # where these axes are one line and point the same way, shape (m,)
+    against: BoolArray  # where they are one line and point opposite ways, shape (m,)
+    meet: BoolArray  # where both flips are one, as all three axes lie in a plane, shape (m,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -267,7 +259,7 @@ class Wrist:
         k4, k5, k6 = self.axes
         return float(angle_between(k4, k5)), float(angle_between(k5, k6))
 
-    def solve(self, tool_axis: FloatArray, across: FloatArray, chosen: FloatArray) -> WristAngles:
+    def solve(self, tool_axis: FloatArray, across: FloatArray, chosen: FloatArray) -> _WristAngles:
         """Return both solutions of R4 R5 R6 = Q.
 
         The spherical triangle of the three axes, with the sides tilt 4-5, tilt 5-6 and the angle z between
@@ -297,7 +289,7 @@ class Wrist:
         meet = meet & (np.abs(wrap_angle(q4[0] - q4[1])) < DUPLICATE_TOLERANCE)
         q[:, 1, meet] = np.nan
         along, against = in_line & (angle < np.pi / 2), in_line & (angle > np.pi / 2)
-        return WristAngles(q, angle, along, against, meet)
+        return _WristAngles(q, angle, along, against, meet)
 
     @property
     def across_tool(self) -> FloatArray:

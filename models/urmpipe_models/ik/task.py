@@ -154,7 +154,7 @@ class ToolMotion(NamedTuple):
     jacobian: FloatArray
 
 
-class ConstantTransform(NamedTuple):
+class _ConstantTransform(NamedTuple):
     """A constant transform C: its columns and its translation."""
 
     columns: tuple[Terms, Terms, Terms]
@@ -173,7 +173,7 @@ class PreparedChain:
 
     chain: Chain
     joints: tuple[Joint, ...]
-    steps: tuple[ConstantTransform, ...]
+    steps: tuple[_ConstantTransform, ...]
 
 
 @lru_cache(maxsize=32)
@@ -201,9 +201,9 @@ def _upright(axis: Vector) -> Transform:
     return Transform(Transform((x, cross(axis, x), axis)).columns)
 
 
-def _step(frame: Transform) -> ConstantTransform:
+def _step(frame: Transform) -> _ConstantTransform:
     x, y, z = frame.columns
-    return ConstantTransform((_terms(x), _terms(y), _terms(z)), _terms(frame.translation))
+    return _ConstantTransform((_terms(x), _terms(y), _terms(z)), _terms(frame.translation))
 
 
 def _terms(vector: Vector) -> Terms:
@@ -267,7 +267,7 @@ def _jacobian(arm: PreparedChain, J: FloatArray, levers: FloatArray) -> FloatArr
     return J[:, [place[name] for name in arm.chain.coordinates]]
 
 
-def _placed(columns: Columns, point: FloatArray, step: ConstantTransform) -> tuple[Columns, FloatArray]:
+def _placed(columns: Columns, point: FloatArray, step: _ConstantTransform) -> tuple[Columns, FloatArray]:
     """Return axes and origin of a constant frame that is given in another's."""
     x, y, z = step.columns
     if step.translation:

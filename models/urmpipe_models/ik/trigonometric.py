@@ -135,8 +135,12 @@ def quadric_roots(coefficients: Sequence[FloatArray] | FloatArray) -> FloatArray
     scale = np.abs(k).sum(axis=0)
     valid = np.isfinite(scale) & (scale > 0.0)
     k = np.where(valid, k / np.where(valid, scale, 1.0), np.array([0, 0, 0, 0, 0, 1.0])[:, None])
-    start = _largest(k) + np.pi
-    t = _quartic_roots(_in_tangent(_shifted(k, start)))
+    angles: FloatArray = np.arange(12.0) * (np.pi / 6) + 0.1
+    start = angles[np.argmax(np.abs(_value(k, angles[:, None])), axis=0)] + np.pi
+    a, b, g, d, e, f = _shifted(k, start)
+    t = _quartic_roots(
+        np.stack((a - d + f, 2.0 * (e - b), 4.0 * g - 2.0 * a + 2.0 * f, 2.0 * (b + e), a + d + f))
+    )
     x = start + 2.0 * np.arctan(t.real)
     near = np.abs(t.imag) < NEARLY_REAL * (1.0 + np.abs(t) ** 2)
     x = np.where(t.imag == 0.0, x, np.where(near, _refine_double_root(k, x, np.sign(t.imag)), np.nan))
@@ -144,13 +148,6 @@ def quadric_roots(coefficients: Sequence[FloatArray] | FloatArray) -> FloatArray
         x = _newton_step(k, x)
     x = np.where(np.abs(_value(k, x)) <= BOUNDARY, wrap_angle(x), np.nan)
     return np.sort(x, axis=0)
-
-
-def _largest(k: FloatArray) -> FloatArray:
-    """Return the one of twelve angles where the absolute value of the left side is largest."""
-    angles: FloatArray = np.arange(12.0) * (np.pi / 6) + 0.1
-    largest: FloatArray = angles[np.argmax(np.abs(_value(k, angles[:, None])), axis=0)]
-    return largest
 
 
 def _shifted(k: FloatArray, by: FloatArray) -> tuple[FloatArray, ...]:
@@ -167,14 +164,8 @@ def _shifted(k: FloatArray, by: FloatArray) -> tuple[FloatArray, ...]:
     )
 
 
-def _in_tangent(k: tuple[FloatArray, ...]) -> FloatArray:
-    """Return the quartic in t = tan(x / 2), the highest power first, shape (5, n)."""
-    a, b, g, d, e, f = k
-    return np.stack((a - d + f, 2.0 * (e - b), 4.0 * g - 2.0 * a + 2.0 * f, 2.0 * (b + e), a + d + f))
-
-
 def _quartic_roots(polynomial: FloatArray) -> NDArray[np.complex128]:
-    """Return the roots of quartics, shape (4, n): eigenvalues of their companion matrices."""
+    """Return the roots of quartics of shape (5, n), highest power first, by companion matrices."""
     companion = np.zeros((polynomial.shape[1], 4, 4))
     companion[:, 0, :] = (-polynomial[1:] / polynomial[0]).T
     companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
