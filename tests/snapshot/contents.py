@@ -298,7 +298,9 @@ def _joined(name: str, parts: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any
     rows = np.split(values, np.cumsum(widths)[:-1])
     values = np.concatenate([rows[k] for k in order]) if len(order) else values
     component = name.rpartition(":")[2]
-    kind = "arrays" if component in {"scalars", "packed"} else "looks" if component in LOOKS else "scene"
+    kind = "looks" if component in LOOKS else "scene"
+    if component in {"scalars", "packed"} and not name.startswith("/shown"):  # what is shown is thinned
+        kind = "arrays"
     if len(np.unique(widths)) == 1 and widths[0]:
         return array(values.reshape(len(t), -1), t[order], kind)
     return array(values, t[order], kind, f" widths {_hash(widths[order].tobytes())}")
