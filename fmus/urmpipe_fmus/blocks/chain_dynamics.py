@@ -1,6 +1,10 @@
-"""What of an arm's masses can be changed while it is simulated, and what acts on its tool.
+"""Block of the dynamics of a robot: its motion under joint torques and a force on its tool.
 
-The dynamics of an arm as a unit: how it moves under torques and a force on its tool.
+    M(q) q'' + h(q, q') + g(q) - J^T F = tau    ([Iso9283]_ eq. 13)
+
+1. `chain_to_masses`: masses, centres of mass and gravity as tunable parameters (also of `driven_arm`).
+2. `tool_inputs`, `read_wrench`: force and moment on the tool (also of `driven_arm`).
+3. `chain_dynamics`: the block.
 """
 
 from __future__ import annotations
@@ -8,10 +12,10 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from itertools import chain as joined
+from itertools import chain as chain_iterables
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, State, Values, Variable
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, State, Values
 from urmpipe_fmus.blocks.coordinates import (
     KINDS,
     acceleration_outputs,
@@ -38,25 +42,24 @@ from urmpipe_models.dynamics.links import (
 from urmpipe_models.elementwise import Element
 from urmpipe_models.robots.toml import chain_from_dict
 
+CHAIN_DYNAMICS_OPTIONS: Mapping[str, str] = {
+    "robot": "a robot with masses: a name of the catalogue, a .toml or a .urdf file",
+}
+
 
 class Arm(NamedTuple):
-    """An arm of some masses.
-
-    Attributes:
-        chain: The arm.
-        links: Its moving parts.
-    """
+    """A robot with values of its masses, and its moving links."""
 
     chain: Chain
     links: Links
 
 
 class Masses(NamedTuple):
-    """The masses of an arm.
+    """The masses of a robot.
 
     Attributes:
         parameters: Tunable; they start at the masses of the robot's description.
-        arm_at: Returns the arm of some values of the parameters.
+        arm_at: Returns the arm with the values of the parameters.
     """
 
     parameters: tuple[Parameter, ...]
@@ -64,102 +67,88 @@ class Masses(NamedTuple):
 
 
 def chain_to_masses(robot: Chain) -> Masses:
-    """Return the masses of an arm that move, their centres, and gravity as parameters.
+    """Return the moving masses of a robot, their centres, and gravity as parameters.
 
-    Masses that stand still and masses of 0 have no part in the motion and are left out.
+    Masses that do not move and masses of 0 do not affect the motion and are left out.
     """
     first = next(k for k, joint in enumerate(robot.joints) if joint.kind != "fixed")
     carriers = {joint.name for joint in robot.joints[first:]}
-    moving = tuple(one for one in robot.inertials if one.joint in carriers and one.mass)
-    arm = replace(robot, inertials=moving, visuals=())
+    moving = tuple(inertial for inertial in robot.inertials if inertial.joint in carriers and inertial.mass)
+    without_masses = replace(robot, inertials=moving, visuals=())
     centres = [f"centre{k}" for k in range(1, len(moving) + 1)]
 
     last: tuple[list[Any], Arm] | None = None
 
     def arm_at(v: Values) -> Arm:
-        """Return the arm of some masses: the last one as long as they are the same objects."""
+        """Return the arm; the last one again while the values are the same objects."""
         nonlocal last
-        given = [v.masses, v.gravity, *(getattr(v, name) for name in centres)]
-        elements = [*joined.from_iterable(given)]
-        found = last
-        if found is None or [*map(id, elements)] != [*map(id, found[0])]:
+        values = [v.masses, v.gravity, *(getattr(v, name) for name in centres)]
+        elements = [*chain_iterables.from_iterable(values)]
+        latest = last
+        if latest is None or [*map(id, elements)] != [*map(id, latest[0])]:
             inertials = (
-                replace(one, mass=mass, centre=centre)
-                for one, mass, centre in zip(moving, given[0], given[2:], strict=True)
+                replace(inertial, mass=mass, centre=centre)
+                for inertial, mass, centre in zip(moving, values[0], values[2:], strict=True)
             )
-            chain = replace(arm, inertials=tuple(inertials), gravity=v.gravity)
-            found = last = elements, Arm(chain, chain_to_links(chain))
-        return found[1]
+            chain = replace(without_masses, inertials=tuple(inertials), gravity=v.gravity)
+            latest = last = elements, Arm(chain, chain_to_links(chain))
+        return latest[1]
 
-    masses = Parameter(
-        name="masses",
-        description="Masses on the joints " + ", ".join(str(one.joint) for one in moving),
-        unit="kg",
-        start=tuple(float(one.mass) for one in moving),
-        minimum=MIN_CONSTANT,
-        size=len(moving),
-    )
-    places = (
+    parameters = (
         Parameter(
-            name=name,
-            description=f"Centre of mass {k} in the frame of joint {one.joint}: x, y, z",
-            unit="m",
-            display_unit="mm",
-            start=tuple(map(float, one.centre)),
-            size=3,
-        )
-        for k, (name, one) in enumerate(zip(centres, moving, strict=True), start=1)
-    )
-    gravity = Parameter(
-        name="gravity",
-        description="Acceleration of gravity in the world: x, y, z",
-        unit="m/s2",
-        start=tuple(map(float, robot.gravity)),
-        size=3,
-    )
-    return Masses((masses, *places, gravity), arm_at)
-
-
-def tool_inputs() -> tuple[Input, Input]:
-    """Return what acts on the tool centre point as inputs."""
-    return (
-        Input(
-            name="force",
-            description="Force on the tool centre point, along the axes of the world",
-            unit="N",
-            size=3,
+            name="masses",
+            description="Masses on the joints " + ", ".join(str(inertial.joint) for inertial in moving),
+            unit="kg",
+            start=tuple(float(inertial.mass) for inertial in moving),
+            minimum=MIN_CONSTANT,
+            size=len(moving),
         ),
-        Input(
-            name="moment",
-            description="Moment on the tool centre point, along the axes of the world",
-            unit="N.m",
+        *(
+            Parameter(
+                name=name,
+                description=f"Centre of mass {k} in the frame of joint {inertial.joint}: x, y, z",
+                unit="m",
+                display_unit="mm",
+                start=tuple(map(float, inertial.centre)),
+                size=3,
+            )
+            for k, (name, inertial) in enumerate(zip(centres, moving, strict=True), start=1)
+        ),
+        Parameter(
+            name="gravity",
+            description="Acceleration of gravity in the world: x, y, z",
+            unit="m/s2",
+            start=tuple(map(float, robot.gravity)),
             size=3,
         ),
     )
+    return Masses(parameters, arm_at)
+
+
+def tool_inputs() -> Iterator[Input]:
+    """Yield force and moment on the tool centre point as inputs."""
+    for name, unit in (("force", "N"), ("moment", "N.m")):
+        description = f"{name.capitalize()} on the tool centre point, along the axes of the world"
+        yield Input(name=name, description=description, unit=unit, size=3)
 
 
 def read_wrench(v: Values) -> Wrench:
-    """Return what acts on the tool centre point."""
+    """Return force [N] and moment [N m] on the tool centre point."""
     return Wrench(v.force, v.moment)
 
 
-CHAIN_DYNAMICS_OPTIONS: Mapping[str, str] = {
-    "robot": "a robot with masses: a name of the catalogue, a .toml or a .urdf file",
-}
-
-
 def chain_dynamics(robot: Chain) -> BlockModel:
-    """Return the unit: torques of the joints and a force on the tool in; their motion out.
+    """Return the block: torques of the joints and a force on the tool in; their motion out.
 
-    Inputs are the torques `tau` of the joints that turn and the forces `f` of those that slide, each from the
-    base outwards; states their values `phi` and `s` with the rates `phid` and `sd`, which start at the start
-    pose at rest. Masses, centres and gravity are tunable.
+    Inputs are the torques `tau` of the revolute joints and the forces `f` of the prismatic ones, each from
+    the base outwards; states their values `phi` and `s` with the velocities `phid` and `sd`, which start at
+    rest at the start pose. Masses, centres and gravity are tunable.
 
     Args:
-        robot: The arm, with masses.
+        robot: The robot, with masses.
 
     Raises:
-        UnitError: If the robot is none.
+        UnitError: If `robot` is no robot.
         RobotError: If it has no masses, or a joint moves none.
 
     Source: [Iso9283]_ eq. 13, solved for the accelerations.
@@ -170,11 +159,10 @@ def chain_dynamics(robot: Chain) -> BlockModel:
 
     def accelerations(v: Values) -> list[Element]:
         """Return q''."""
-        torques = gather(robot, v, {one: one.effort for one in KINDS})
+        torques = gather(robot, v, {kind: kind.effort for kind in KINDS})
         arm, links = masses.arm_at(v)
-        return forward_dynamics(
-            arm, read_coordinates(robot, v), read_coordinates(robot, v, "d"), torques, read_wrench(v), links
-        )
+        q, qd = read_coordinates(robot, v), read_coordinates(robot, v, "d")
+        return forward_dynamics(arm, q, qd, torques, read_wrench(v), links)
 
     def outputs(v: Values) -> Mapping[str, Any]:
         """Return the accelerations and the energy."""
@@ -183,7 +171,7 @@ def chain_dynamics(robot: Chain) -> BlockModel:
         return {**scatter(robot, accelerations(v), "dd"), "energy_stored": energy}
 
     def derivatives(v: Values) -> Mapping[str, Any]:
-        """Return the rates, the accelerations, and the power of the force on the tool."""
+        """Return the velocities, the accelerations, and the power of the force on the tool."""
         q, qd = read_coordinates(robot, v), read_coordinates(robot, v, "d")
         return {
             **scatter(robot, qd),
@@ -194,7 +182,20 @@ def chain_dynamics(robot: Chain) -> BlockModel:
     return BlockModel(
         name="chain_dynamics",
         description=f"Motion of {robot.name or 'an arm'} under the torques of its joints",
-        variables=(*masses.parameters, *_inputs(robot), *_outputs(robot), *_states(robot)),
+        variables=(
+            *masses.parameters,
+            *_effort_inputs(robot),
+            *tool_inputs(),
+            *acceleration_outputs(robot),
+            Output(name="energy_stored", description="Kinetic and potential energy", unit="J"),
+            *motion_states(robot),
+            State(
+                name="energy_in",
+                description="Work of the force and moment on the tool",
+                unit="J",
+                output=True,
+            ),
+        ),
         outputs=outputs,
         derivatives=derivatives,
         internal_step=5e-4,
@@ -209,30 +210,17 @@ def chain_dynamics(robot: Chain) -> BlockModel:
 
 
 def from_robot_toml(robot: str) -> BlockModel:
-    """Return `chain_dynamics` of the arm that a text of `robot_toml` describes, bit by bit."""
+    """Return `chain_dynamics` of the robot in a text of `robot_toml`, equal to the bit."""
     return chain_dynamics(chain_from_dict(tomllib.loads(robot)))
 
 
-def _inputs(robot: Chain) -> Iterator[Input]:
+def _effort_inputs(robot: Chain) -> Iterator[Input]:
     for kind in coordinate_kinds(robot):
-        at = kind.indices(robot)
+        indices = kind.indices(robot)
         word = "Torques" if kind.effort_unit == "N.m" else "Forces"
         yield Input(
             name=kind.effort,
-            description=f"{word} {format_joints(robot, at)}",
+            description=f"{word} {format_joints(robot, indices)}",
             unit=kind.effort_unit,
-            size=len(at),
+            size=len(indices),
         )
-    yield from tool_inputs()
-
-
-def _outputs(robot: Chain) -> Iterator[Variable]:
-    yield from acceleration_outputs(robot)
-    yield Output(name="energy_stored", description="Kinetic and potential energy", unit="J")
-
-
-def _states(robot: Chain) -> Iterator[State]:
-    yield from motion_states(robot)
-    yield State(
-        name="energy_in", description="Work of the force and moment on the tool", unit="J", output=True
-    )

@@ -1,6 +1,8 @@
-"""What of an arm's shape can be changed while it is simulated: parameters, and the chain that they make.
+"""Block of the kinematics of a robot: the places of its points, and their motion, from its joints.
 
-The kinematics of an arm as a unit: where its points are, and how they move.
+1. `chain_to_geometry`: the geometry as tunable parameters - segments and tilts of a URM arm, the frames of
+   the joints of any other - with base and tool.
+2. `kinematic_chain`: the block.
 """
 
 from __future__ import annotations
@@ -28,13 +30,20 @@ from urmpipe_models.kinematics.forward import Motion, forward, iter_point_motion
 from urmpipe_models.math3d import Transform, euler_zyx, from_rpy, matrix_to_rpy
 from urmpipe_models.robots.toml import chain_from_dict
 
+KINEMATIC_CHAIN_OPTIONS: Mapping[str, str] = {
+    "robot": "a robot: a name of the catalogue, a .toml or a .urdf file",
+    "points": 'the points whose place is an output, such as ["p6", "p7"] (default: all)',
+    "sensors": "the points whose angles, and motion with rates, are outputs (default: the tool centre)",
+    "rates": "true: the joints' rates are inputs, the sensors' velocity and acceleration outputs",
+}
+
 
 class Geometry(NamedTuple):
-    """The shape of an arm.
+    """The geometry of a robot.
 
     Attributes:
-        parameters: Tunable; they start at the shape that the robot's description tells.
-        chain_at: Returns the arm of some values of the parameters.
+        parameters: Tunable; they start at the geometry of the robot's description.
+        chain_at: Returns the robot with the values of the parameters.
     """
 
     parameters: tuple[Parameter, ...]
@@ -42,61 +51,58 @@ class Geometry(NamedTuple):
 
 
 def chain_to_geometry(robot: Chain) -> Geometry:
-    """Return the parameters of an arm: its lengths and tilts if they describe it, else its joints' frames.
+    """Return the geometry of a robot: lengths and tilts of a URM arm, else the frames of its joints.
 
-    Where it stands (`base`) and its `tool` are parameters of both.
+    The frames of its base and its tool (`base`, `tool`) are parameters of both.
     """
-    links = [one for one in robot.parameters if one.place not in ("base", "tool")]
-    of_urm = {one.source for one in links} == {SEGMENT_SOURCE, TILT_SOURCE}
-    shape = _of_urm(robot, links) if of_urm else _of_frames(robot)
+    links = [parameter for parameter in robot.parameters if parameter.place not in ("base", "tool")]
+    is_urm = {parameter.source for parameter in links} == {SEGMENT_SOURCE, TILT_SOURCE}
+    geometry = _urm_geometry(robot, links) if is_urm else _frame_geometry(robot)
     ends = (
         *_frame_parameters("base", "the base in the world", robot.base),
         *_frame_parameters("tool", "the tool centre point at the end of the arm", robot.tool),
     )
 
     def chain_at(v: Values) -> Chain:
-        """Return the arm on its base and with its tool."""
-        return shape.chain_at(v).placed(_frame_at(v, "base"), _frame_at(v, "tool"))
+        return geometry.chain_at(v).placed(_read_frame(v, "base"), _read_frame(v, "tool"))
 
-    return Geometry((*shape.parameters, *ends), chain_at)
+    return Geometry((*geometry.parameters, *ends), chain_at)
 
 
-def _of_urm(robot: Chain, links: Sequence[ArmParameter]) -> Geometry:
-    """Return the shape of a URM arm."""
+def _urm_geometry(robot: Chain, links: Sequence[ArmParameter]) -> Geometry:
+    """Return the geometry of a URM arm: lengths and tilts."""
     lengths, tilts = (
-        [one for one in links if one.source == source] for source in (SEGMENT_SOURCE, TILT_SOURCE)
+        [parameter for parameter in links if parameter.source == source]
+        for source in (SEGMENT_SOURCE, TILT_SOURCE)
     )
 
     def chain_at(v: Values) -> Chain:
-        """Return the arm of some lengths and tilts."""
         values = zip((*lengths, *tilts), (*v.lengths, *v.tilts), strict=True)
-        return robot.with_parameters({one.name: value for one, value in values})
+        return robot.with_parameters({parameter.name: value for parameter, value in values})
 
-    return Geometry(
-        (
-            Parameter(
-                name="lengths",
-                description="Segments r_1..r_(n+1), the last one the effector",
-                unit="m",
-                display_unit="mm",
-                start=tuple(one.value for one in lengths),
-                size=len(lengths),
-            ),
-            Parameter(
-                name="tilts",
-                description="Tilts theta_2..theta_(n+1) of each segment against the one before",
-                unit="rad",
-                display_unit="deg",
-                start=tuple(one.value for one in tilts),
-                size=len(tilts),
-            ),
+    parameters = (
+        Parameter(
+            name="lengths",
+            description="Segments r_1..r_(n+1), the last one the effector",
+            unit="m",
+            display_unit="mm",
+            start=tuple(parameter.value for parameter in lengths),
+            size=len(lengths),
         ),
-        chain_at,
+        Parameter(
+            name="tilts",
+            description="Tilts theta_2..theta_(n+1) of each segment against the one before",
+            unit="rad",
+            display_unit="deg",
+            start=tuple(parameter.value for parameter in tilts),
+            size=len(tilts),
+        ),
     )
+    return Geometry(parameters, chain_at)
 
 
-def _of_frames(robot: Chain) -> Geometry:
-    """Return the shape of any arm: the frame that every joint sits in, and the end; the axes are constant."""
+def _frame_geometry(robot: Chain) -> Geometry:
+    """Return the geometry of any robot: the frames of its joints and of its tip; the axes are constant."""
     origins = [f"origin{k}" for k in range(1, len(robot.joints) + 1)]
     parameters = [
         parameter
@@ -105,12 +111,11 @@ def _of_frames(robot: Chain) -> Geometry:
     ]
 
     def chain_at(v: Values) -> Chain:
-        """Return the arm of some frames."""
         joints = [
-            replace(joint, origin=_frame_at(v, name))
+            replace(joint, origin=_read_frame(v, name))
             for name, joint in zip(origins, robot.joints, strict=True)
         ]
-        return replace(robot, joints=tuple(joints), tip=_frame_at(v, "tip"), visuals=())
+        return replace(robot, joints=tuple(joints), tip=_read_frame(v, "tip"), visuals=())
 
     tip = _frame_parameters("tip", "the end of the arm in the frame of the last joint", robot.tip)
     return Geometry((*parameters, *tip), chain_at)
@@ -138,17 +143,9 @@ def _frame_parameters(name: str, where: str, frame: Transform) -> tuple[Paramete
     )
 
 
-def _frame_at(v: Values, name: str) -> Transform:
+def _read_frame(v: Values, name: str) -> Transform:
     """Return the frame of the two parameters of a name."""
     return Transform(from_rpy(*getattr(v, f"{name}_rpy")).rotation, getattr(v, name))
-
-
-KINEMATIC_CHAIN_OPTIONS: Mapping[str, str] = {
-    "robot": "a robot: a name of the catalogue, a .toml or a .urdf file",
-    "points": 'the points whose place is an output, such as ["p6", "p7"] (default: all)',
-    "sensors": "the points whose angles, and motion with rates, are outputs (default: the tool centre)",
-    "rates": "true: the joints' rates are inputs, the sensors' velocity and acceleration outputs",
-}
 
 
 def kinematic_chain(
@@ -158,102 +155,110 @@ def kinematic_chain(
     sensors: Sequence[str] | None = None,
     rates: bool = False,
 ) -> BlockModel:
-    """Return the unit that computes points of an arm from its joints.
+    """Return the block that computes points of a robot from its joints.
 
-    Inputs are the angles `phi` of the joints that turn and the ways `s` of those that slide, each from the
+    Inputs are the angles `phi` of the revolute joints and the ways `s` of the prismatic ones, each from the
     base outwards; with rates also `phid`, `phidd`, `sd`, `sdd`. They start at the calibration pose. They have
-    no limits: what lies beyond a joint's range has its place all the same, and a repolarized angle counts on.
+    no limits: a value beyond a joint's range has a pose too, and a repolarized angle exceeds one turn.
 
     Args:
-        robot: The arm.
-        points: Which of p1..pn are outputs, by name; all by default.
+        robot: The robot.
+        points: Names of the points p1..pn that are outputs; all by default.
         sensors: Points whose angles rz, ry, rx are outputs too; the tool centre point by default.
         rates: Whether the joints' rates are inputs; then velocity v and acceleration a of the sensors are
             outputs.
 
     Raises:
-        UnitError: With what is wrong with the options.
+        UnitError: With the errors of the options.
 
     Source: [UrmArm2021]_ eq. 1-14; v and a by the outward recursion (see `iter_point_motions`).
     """
     check_robot("kinematic_chain", robot)
     names = robot.point_names
-    chosen = check_choices("kinematic_chain", "points", names if points is None else points, names)
-    sensed = check_choices("kinematic_chain", "sensors", names[-1:] if sensors is None else sensors, names)
+    selected = check_choices("kinematic_chain", "points", names if points is None else points, names)
+    sensor_names = names[-1:] if sensors is None else sensors
+    sensor_names = check_choices("kinematic_chain", "sensors", sensor_names, names)
     check_flag("kinematic_chain", "rates", rates)
-    if not (chosen or sensed):
+    if not (selected or sensor_names):
         raise UnitError("unit kinematic_chain: options points, sensors: found none, allowed: one of either")
     geometry = chain_to_geometry(robot)
 
     def outputs(v: Values) -> Mapping[str, Any]:
-        """Return the points, and what the sensors see."""
+        """Return the places of the points, and the angles and motions of the sensors."""
         arm = geometry.chain_at(v)
-        poses, motions = _moved(arm, v, rates)
-        places = dict(zip(names, poses, strict=True))
-        found = {name: places[name].translation for name in chosen}
-        for name in sensed:
-            found |= _sensed(name[1:], places[name], motions[names.index(name)] if rates else None)
-        return found
+        q = read_coordinates(arm, v)
+        motions: dict[str, Motion] = {}
+        if rates:
+            qd, qdd = read_coordinates(arm, v, "d"), read_coordinates(arm, v, "dd")
+            motions = dict(zip(names, iter_point_motions(arm, q, qd, qdd), strict=True))
+            poses = {name: motion.pose for name, motion in motions.items()}
+        else:
+            poses = dict(zip(names, forward(arm, q), strict=True))
+        values: dict[str, Any] = {name: poses[name].translation for name in selected}
+        for name in sensor_names:
+            rz, ry, rx, singular = euler_zyx(poses[name].rotation)
+            of_sensor = {"rz": rz, "ry": ry, "rx": rx, "singular": singular}
+            if rates:
+                of_sensor |= {"v": motions[name].velocity, "a": motions[name].acceleration}
+            values |= {f"{quantity}{name[1:]}": value for quantity, value in of_sensor.items()}
+        return values
 
     return BlockModel(
         name="kinematic_chain",
         description=f"Points of {robot.name or 'an arm'} from its joints",
         variables=(
             *geometry.parameters,
-            *_inputs(robot, rates),
-            *(_output(name, f"Place of point {name}: x, y, z", "m", 3) for name in chosen),
-            *(variable for name in sensed for variable in _sensor_outputs(name, rates)),
+            *_joint_inputs(robot, rates),
+            *(_output(name, f"Place of point {name}: x, y, z", "m", 3) for name in selected),
+            *(variable for name in sensor_names for variable in _sensor_outputs(name, rates)),
         ),
         outputs=outputs,
-        equations=_equations(rates),
+        equations=(
+            "p_k = the origin of the frame after joint k: the product of the joints' frames and motions;",
+            "of a URM arm p_(i+1) = Rz(phi_1) [r_1 + sum_k prod_j (Ry(theta_(j+1)) Rz(phi_(j+1))) r_(k+1)]"
+            " (eq. 1-8)",
+            "R = Rz(rz) Ry(ry) Rx(rx) (eq. 9, 14)",
+            "rz = atan2(a21, a11), ry = atan2(-a31, hypot(a11, a21)), rx = atan2(a32, a33) (eq. 10-13)",
+            "at ry = +-90 deg: rx = 0, rz = atan2(-a12, a22), and singular is true",
+            *(RATE_EQUATIONS if rates else ()),
+        ),
         source="UrmArm2021, eq. 1-14, with atan2 in eq. 10 and 13",
-        recipe=robot_recipe(__name__, robot, points=list(chosen), sensors=list(sensed), rates=rates),
+        recipe=robot_recipe(__name__, robot, points=list(selected), sensors=list(sensor_names), rates=rates),
     )
 
 
+RATE_EQUATIONS = (
+    "v = v_before + omega x d, a = a_before + alpha x d + omega x (omega x d), joint by joint",
+    "omega grows by z phid, alpha by z phidd + omega x z phid; a sliding joint adds z sd to v,",
+    "z sdd + 2 omega x z sd to a",
+)
+
+
 def from_robot_toml(robot: str, **options: Any) -> BlockModel:
-    """Return `kinematic_chain` of the arm that a text of `robot_toml` describes, bit by bit."""
+    """Return `kinematic_chain` of the robot in a text of `robot_toml`, equal to the bit."""
     return kinematic_chain(chain_from_dict(tomllib.loads(robot)), **options)
 
 
-def _moved(arm: Chain, v: Values, rates: bool) -> tuple[Sequence[Transform], Sequence[Motion]]:
-    """Return the poses of p1..pn, and their motions if the rates are known."""
-    q = read_coordinates(arm, v)
-    if not rates:
-        return forward(arm, q), ()
-    motions = tuple(iter_point_motions(arm, q, read_coordinates(arm, v, "d"), read_coordinates(arm, v, "dd")))
-    return [motion.pose for motion in motions], motions
-
-
-def _sensed(number: str, pose: Transform, motion: Motion | None) -> dict[str, Any]:
-    """Return the outputs of a sensor: angles, where they are a convention, and motion."""
-    rz, ry, rx, singular = euler_zyx(pose.rotation)
-    found = {"rz": rz, "ry": ry, "rx": rx, "singular": singular}
-    if motion is not None:
-        found |= {"v": motion.velocity, "a": motion.acceleration}
-    return {f"{name}{number}": value for name, value in found.items()}
-
-
-def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
-    """Yield the joints' angles and ways, and their rates."""
+def _joint_inputs(robot: Chain, rates: bool) -> Iterator[Input]:
+    """Yield the coordinates, and with rates their velocities and accelerations."""
     for kind in coordinate_kinds(robot):
-        at = kind.indices(robot)
-        of = format_joints(robot, at)
+        indices = kind.indices(robot)
+        joints = format_joints(robot, indices)
         yield Input(
             name=kind.name,
-            description=f"{kind.word}s {of}",
+            description=f"{kind.word}s {joints}",
             unit=kind.unit,
             display_unit=kind.display_unit,
-            start=tuple(float(robot.start[k]) for k in at),
-            size=len(at),
+            start=tuple(float(robot.start[k]) for k in indices),
+            size=len(indices),
         )
-        for dots, rate in (("d", "/s"), ("dd", "/s2")) if rates else ():
+        for dots, per, word in (("d", "/s", "Velocities"), ("dd", "/s2", "Accelerations")) if rates else ():
             yield Input(
                 name=f"{kind.name}{dots}",
-                description=f"{'Velocities' if dots == 'd' else 'Accelerations'} {of}",
-                unit=f"{kind.unit}{rate}",
-                display_unit=f"{kind.display_unit}{rate}",
-                size=len(at),
+                description=f"{word} {joints}",
+                unit=f"{kind.unit}{per}",
+                display_unit=f"{kind.display_unit}{per}",
+                size=len(indices),
             )
 
 
@@ -273,30 +278,5 @@ def _sensor_outputs(name: str, rates: bool) -> Iterator[Variable]:
 
 
 def _output(name: str, description: str, unit: str, size: int | None) -> Output:
-    return Output(
-        name=name,
-        description=description,
-        unit=unit,
-        display_unit="deg" if unit == "rad" else "",
-        size=size,
-    )
-
-
-def _equations(rates: bool) -> tuple[str, ...]:
-    return (
-        "p_k = the origin of the frame after joint k: the product of the joints' frames and motions;",
-        "of a URM arm p_(i+1) = Rz(phi_1) [r_1 + sum_k prod_j (Ry(theta_(j+1)) Rz(phi_(j+1))) r_(k+1)]"
-        " (eq. 1-8)",
-        "R = Rz(rz) Ry(ry) Rx(rx) (eq. 9, 14)",
-        "rz = atan2(a21, a11), ry = atan2(-a31, hypot(a11, a21)), rx = atan2(a32, a33) (eq. 10-13)",
-        "at ry = +-90 deg: rx = 0, rz = atan2(-a12, a22), and singular is true",
-        *(
-            (
-                "v = v_before + omega x d, a = a_before + alpha x d + omega x (omega x d), joint by joint",
-                "omega grows by z phid, alpha by z phidd + omega x z phid; a sliding joint adds z sd to v,",
-                "z sdd + 2 omega x z sd to a",
-            )
-            if rates
-            else ()
-        ),
-    )
+    display_unit = "deg" if unit == "rad" else ""
+    return Output(name=name, description=description, unit=unit, display_unit=display_unit, size=size)

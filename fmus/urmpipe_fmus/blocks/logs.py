@@ -1,9 +1,4 @@
-"""A log as a unit: the columns of a table inside the FMU, over time.
-
-The repolarizer as a unit: joint angles without the jumps of limited joints.
-
-The deviation of a point from where it should be, as a unit.
-"""
+"""Blocks that work on logs: a log that is played, the repolarizer, and the meter of deviations."""
 
 from __future__ import annotations
 
@@ -12,23 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.block import (
-    BlockModel,
-    Input,
-    Memory,
-    Output,
-    Parameter,
-    Recipe,
-    Table,
-    Values,
-    ValueType,
-    Variable,
-)
-from urmpipe_fmus.blocks.coordinates import check_count, check_flag
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, Recipe, Table, Values, ValueType
+from urmpipe_fmus.blocks.coordinates import check_count, check_flag, option_error
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.delta import delta, exceeds_tolerance
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError, format_value
+from urmpipe_models.errors import UnitError
 from urmpipe_models.wraps import State, step
 
 LOG_SOURCE_OPTIONS: Mapping[str, str] = {
@@ -39,13 +23,13 @@ LOG_SOURCE_OPTIONS: Mapping[str, str] = {
 
 
 class Column(NamedTuple):
-    """A column of the table, or some that stand side by side and make an array.
+    """A column of the table, or adjacent columns that are an array.
 
     Attributes:
-        name: Of the output.
-        unit: Spelled as FMI does.
-        size: How many columns; None for one that is no array.
-        description: One line for people.
+        name: Name of the output.
+        unit: Unit in FMI's spelling.
+        size: Number of columns of an array; None for one column that is no array.
+        description: One line of text.
     """
 
     name: str
@@ -57,44 +41,54 @@ class Column(NamedTuple):
 def log_source(
     table: Table, columns: Sequence[Column | Sequence[Any]], interpolate: bool = False
 ) -> BlockModel:
-    """Return the unit that plays a log.
+    """Return the block that plays a log.
 
     Before the first row its values are those of the first, after the last those of the last. Angles that
-    jump by a period are better held than interpolated: a value on the jump is no place where the joint was.
+    jump by a period should be held, not interpolated: the joint was never at a value inside the jump.
 
     Args:
         table: The rows; times count from the log's start.
-        columns: What the columns of the table are, from left to right: `Column`s or what makes one.
+        columns: The columns of the table, from left to right: `Column`s or their fields.
         interpolate: Linear between two rows, else each row holds until the next.
 
     Raises:
-        UnitError: If the columns are not as many as the table has, or with what is wrong with their names.
+        UnitError: If the columns are not as many as the table has, or with the errors of their names.
     """
     check_flag("log_source", "interpolate", interpolate)
     if not isinstance(table, Table) or isinstance(columns, str) or not isinstance(columns, Sequence):
         raise UnitError("unit log_source: found no table and columns, allowed: a Table, a list of columns")
-    shown = [_column(one) for one in columns]
-    width = sum(one.size or 1 for one in shown)
-    if width != table.columns or not shown:
+    outputs = [_read_column(column) for column in columns]
+    width = sum(column.size or 1 for column in outputs)
+    if width != table.columns or not outputs:
         raise UnitError(
             f"unit log_source: option columns: found {width} columns, allowed: {table.columns} of the table"
         )
 
-    def outputs(v: Values) -> Mapping[str, Element | Sequence[Element]]:
-        """Return the columns at the instant, those of an array together."""
+    def play(v: Values) -> Mapping[str, Element | Sequence[Element]]:
+        """Return the values at the instant, those of an array together."""
         before, after, fraction = v.table
         values = iter(
             [a + fraction * (b - a) for a, b in zip(before, after, strict=True)] if interpolate else before
         )
         return {
-            one.name: next(values) if one.size is None else tuple(islice(values, one.size)) for one in shown
+            column.name: next(values) if column.size is None else tuple(islice(values, column.size))
+            for column in outputs
         }
 
     return BlockModel(
         name="log_source",
         description=f"A log of {len(table.t_ns)} rows, {'interpolated' if interpolate else 'held'}",
-        variables=tuple(_output(one) for one in shown),
-        outputs=outputs,
+        variables=tuple(
+            Output(
+                name=column.name,
+                description=column.description or f"Column {column.name} of the log",
+                unit=column.unit,
+                display_unit="deg" if column.unit == "rad" else "",
+                size=column.size,
+            )
+            for column in outputs
+        ),
+        outputs=play,
         table=table,
         equations=(
             "y = y_k + (t - t_k) / (t_(k+1) - t_k) (y_(k+1) - y_k), with t_k <= t < t_(k+1)"
@@ -104,49 +98,33 @@ def log_source(
             "t in whole nanoseconds",
         ),
         recipe=Recipe(
-            __name__, "log_source", {"columns": [list(one) for one in shown], "interpolate": interpolate}
+            __name__,
+            "log_source",
+            {"columns": [list(column) for column in outputs], "interpolate": interpolate},
         ),
     )
 
 
-def _column(given: Column | Sequence[Any]) -> Column:
-    """Return a column from what makes one.
-
-    Raises:
-        UnitError: If it makes none.
-    """
-    parts = () if isinstance(given, str) or not isinstance(given, Sequence) else tuple(given)
+def _read_column(fields: Column | Sequence[Any]) -> Column:
+    """Return a column from its fields; `UnitError` if they do not fit."""
+    parts = () if isinstance(fields, str) or not isinstance(fields, Sequence) else tuple(fields)
     texts = (*parts[:2], *parts[3:])
-    if not 1 <= len(parts) <= len(Column._fields) or not all(isinstance(one, str) for one in texts):
-        allowed = "name, unit, size and description"
-        raise UnitError(f"unit log_source: option columns: found {format_value(given)}, allowed: {allowed}")
+    if not 1 <= len(parts) <= len(Column._fields) or not all(isinstance(text, str) for text in texts):
+        raise option_error("log_source", "columns", fields, "name, unit, size and description")
     column = Column(*parts)
     if column.size is not None:
         check_count("log_source", f"columns: {column.name}: size", column.size)
     return column
 
 
-def _output(column: Column) -> Output:
-    return Output(
-        name=column.name,
-        description=column.description or f"Column {column.name} of the log",
-        unit=column.unit,
-        display_unit="deg" if column.unit == "rad" else "",
-        size=column.size,
-    )
-
-
 REPOLARIZER_OPTIONS: Mapping[str, str] = {"joints": "the number of joints, such as 6"}
-
-POINT = 1.0
-"""Time is counted in communication points: what lies between two of them, `max_step` tells."""
 
 
 def repolarizer(joints: int) -> BlockModel:
-    """Return the unit that adds whole periods to angles, so that they go on where they were.
+    """Return the block that adds whole periods to angles, so that they are continuous.
 
-    What `urmpipe_models.wraps.step` gives sample by sample, the samples being the communication points
-    and max_step in place of a largest speed.
+    It steps with `urmpipe_models.wraps.step` from communication point to communication point, with 1 for
+    their distance and max_step for the largest speed.
 
     Args:
         joints: The number of joints.
@@ -157,12 +135,50 @@ def repolarizer(joints: int) -> BlockModel:
     Source: [UrmArm2021]_ eq. 15-18 with the corrections of the errata.
     """
     check_count("repolarizer", "joints", joints)
+
+    def memory(name: str, description: str, unit: str = "", kind: ValueType = "Real") -> Memory:
+        return Memory(name=name, description=description, unit=unit, type=kind, size=joints)
+
     return BlockModel(
         name="repolarizer",
         description="Joint angles without the jumps of joints that are limited to one period",
-        variables=(*_parameters(), *_signals(joints), *_memories(joints)),
-        outputs=_outputs,
-        update=_update,
+        variables=(
+            Parameter(
+                name="period",
+                description="What a joint jumps by where its environment limits it",
+                unit="rad",
+                display_unit="deg",
+                start=2.0 * math.pi,
+                minimum=1e-6,
+            ),
+            Parameter(
+                name="max_step",
+                description="How far a joint can move from one communication point to the next",
+                unit="rad",
+                display_unit="deg",
+                start=math.pi / 2.0,
+                minimum=1e-9,
+            ),
+            Input(
+                name="raw",
+                description="Joint angles as their environment limits them",
+                unit="rad",
+                display_unit="deg",
+                size=joints,
+            ),
+            Output(
+                name="q", description="Repolarized joint angles", unit="rad", display_unit="deg", size=joints
+            ),
+            Output(name="turns", description="Whole periods added", size=joints, type="Integer"),
+            memory("last", "Raw angles of the communication point before", "rad"),
+            memory("residual", "Step to them, less a period if it was a repolarization", "rad"),
+            memory("lasted", "Communication points that this step took"),
+            memory("turns_before", "Whole periods added there", kind="Integer"),
+            memory("elapsed", "Communication points without a value since then"),
+            memory("seen", "Whether there was one before", kind="Boolean"),
+        ),
+        outputs=_repolarizer_outputs,
+        update=_repolarizer_update,
         equations=(
             "q = raw + period turns (eq. 15)",
             "turns changes by -sign(d) where a step d of raw meets ||d| - period| <= max_step (eq. 17, 18),",
@@ -174,81 +190,40 @@ def repolarizer(joints: int) -> BlockModel:
     )
 
 
-def _parameters() -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            name="period",
-            description="What a joint jumps by where its environment limits it",
-            unit="rad",
-            display_unit="deg",
-            start=2.0 * math.pi,
-            minimum=1e-6,
-        ),
-        Parameter(
-            name="max_step",
-            description="How far a joint can move from one communication point to the next",
-            unit="rad",
-            display_unit="deg",
-            start=math.pi / 2.0,
-            minimum=1e-9,
-        ),
-    )
-
-
-def _signals(joints: int) -> tuple[Variable, ...]:
-    return (
-        Input(
-            name="raw",
-            description="Joint angles as their environment limits them",
-            unit="rad",
-            display_unit="deg",
-            size=joints,
-        ),
-        Output(name="q", description="Repolarized joint angles", unit="rad", display_unit="deg", size=joints),
-        Output(name="turns", description="Whole periods added", size=joints, type="Integer"),
-    )
-
-
-def _memories(joints: int) -> tuple[Memory, ...]:
-    def memory(name: str, description: str, unit: str = "", kind: ValueType = "Real") -> Memory:
-        """Return a memory of every joint."""
-        return Memory(name=name, description=description, unit=unit, type=kind, size=joints)
-
-    return (
-        memory("last", "Raw angles of the communication point before", "rad"),
-        memory("residual", "Step to them, less a period if it was a repolarization", "rad"),
-        memory("lasted", "Communication points that this step took"),
-        memory("turns_before", "Whole periods added there", kind="Integer"),
-        memory("elapsed", "Communication points without a value since then"),
-        memory("seen", "Whether there was one before", kind="Boolean"),
-    )
-
-
-def _steps(v: Values) -> Iterator[tuple[State, Element]]:
-    """Yield what `step` gives of each joint: the state to remember and the repolarized angle."""
-    remembered = zip(v.last, v.residual, v.lasted, v.turns_before, v.elapsed, v.seen, strict=True)
-    for fields, raw in zip(remembered, v.raw, strict=True):
-        state, q, _ = step(State(*fields), raw, POINT, period=v.period, max_speed=v.max_step)
+def _iter_steps(v: Values) -> Iterator[tuple[State, Element]]:
+    """Yield the next state and the repolarized angle of each joint."""
+    states = zip(v.last, v.residual, v.lasted, v.turns_before, v.elapsed, v.seen, strict=True)
+    for fields, raw in zip(states, v.raw, strict=True):
+        state, q, _ = step(State(*fields), raw, 1.0, period=v.period, max_speed=v.max_step)
         yield state, q
 
 
-def _outputs(v: Values) -> Mapping[str, Sequence[Element]]:
-    states, q = zip(*_steps(v), strict=True)
+def _repolarizer_outputs(v: Values) -> Mapping[str, Sequence[Element]]:
+    states, q = zip(*_iter_steps(v), strict=True)
     return {"q": q, "turns": tuple(state.turns for state in states)}
 
 
-def _update(v: Values) -> Mapping[str, Sequence[Element]]:
-    states = [state for state, _ in _steps(v)]
+def _repolarizer_update(v: Values) -> Mapping[str, Sequence[Element]]:
+    states = [state for state, _ in _iter_steps(v)]
     fields = dict(zip(State._fields, zip(*states, strict=True), strict=True))
     fields["turns_before"] = fields.pop("turns")
     return fields
 
 
 def delta_meter() -> BlockModel:
-    """Return the unit that subtracts where a point is from where it should be.
+    """Return the block that measures the deviation of a point from its reference.
 
     Source: [UrmArm2021]_ eq. 19-21, 23.
     """
+
+    def outputs(v: Values) -> Mapping[str, Element]:
+        deviation = delta(v.reference, v.actual)
+        return {
+            "delta": (deviation.x, deviation.y, deviation.z),
+            "norm": deviation.norm,
+            "out_of_tolerance": exceeds_tolerance(deviation, v.tolerance),
+        }
+
     return BlockModel(
         name="delta_meter",
         description="Deviation of a point from where it should be, and whether it is tolerated",
@@ -271,7 +246,7 @@ def delta_meter() -> BlockModel:
                 type="Boolean",
             ),
         ),
-        outputs=_outputs_delta_meter,
+        outputs=outputs,
         equations=(
             "delta = reference - actual (eq. 19-21)",
             "norm = sqrt(delta_x^2 + delta_y^2 + delta_z^2) (eq. 23)",
@@ -280,12 +255,3 @@ def delta_meter() -> BlockModel:
         source="UrmArm2021, eq. 19-21 and 23",
         recipe=Recipe(__name__, "delta_meter"),
     )
-
-
-def _outputs_delta_meter(v: Values) -> Mapping[str, Element]:
-    found = delta(v.reference, v.actual)
-    return {
-        "delta": (found.x, found.y, found.z),
-        "norm": found.norm,
-        "out_of_tolerance": exceeds_tolerance(found, v.tolerance),
-    }
