@@ -182,10 +182,19 @@ def read_tree(path: Path) -> UrdfTree:
     if (most := max(len(root.all("link")), len(root.all("joint")))) > MAX_LINKS:
         raise RobotError(Finding(f"found {most} links or joints, allowed: {MAX_LINKS} at most", str(path)))
     tree = UrdfTree(str(path), root.attributes.get("name", path.stem))
-    for node in root.all("link"):
-        _add_link(tree, node)
-    for node in root.all("joint"):
-        _add_joint(tree, node)
+    known: dict[str, Node] | dict[str, Edge]
+    for tag, known in (("link", tree.links), ("joint", tree.edges)):
+        for node in root.all(tag):
+            name = node.attributes.get("name")
+            if not name:
+                tree.fault(f"{tag} without a name", node.line)
+            elif name in known:
+                message = f"{tag} {name}: duplicate name; first defined in line {known[name].line}"
+                tree.fault(message, node.line)
+            elif tag == "link":
+                tree.links[name] = node
+            else:
+                tree.edges[name] = _read_joint(tree, node, name)
     for node in root.walk():
         name, colour = node.attributes.get("name"), node.first("color")
         if node.tag == "material" and name and colour:
@@ -193,28 +202,6 @@ def read_tree(path: Path) -> UrdfTree:
     _check_links(tree)
     _check_mimics(tree)
     return tree
-
-
-def _add_link(tree: UrdfTree, node: Node) -> None:
-    name = node.attributes.get("name")
-    if not name:
-        tree.fault("link without a name", node.line)
-    elif name in tree.links:
-        line = tree.links[name].line
-        tree.fault(f"link {name}: duplicate name; first defined in line {line}", node.line)
-    else:
-        tree.links[name] = node
-
-
-def _add_joint(tree: UrdfTree, node: Node) -> None:
-    name = node.attributes.get("name")
-    if not name:
-        tree.fault("joint without a name", node.line)
-    elif name in tree.edges:
-        line = tree.edges[name].line
-        tree.fault(f"joint {name}: duplicate name; first defined in line {line}", node.line)
-    else:
-        tree.edges[name] = _read_joint(tree, node, name)
 
 
 def _read_joint(tree: UrdfTree, node: Node, name: str) -> Edge:
