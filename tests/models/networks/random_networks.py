@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
@@ -298,6 +299,10 @@ def assert_same_space(first: FloatArray, second: FloatArray, atol: float) -> Non
     """Hold two orthonormal bases to the same space by their projections."""
     assert first.shape == second.shape
     np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=0.0, atol=atol)
+
+
+def assert_close(found: ArrayLike, expected: ArrayLike, atol: float) -> None:
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=atol)
 
 
 def log_of(matrix: FloatArray) -> FloatArray:

@@ -11,10 +11,10 @@ import pytest
 from random_networks import (
     ELEMENTS,
     Poses,
+    assert_close,
     assert_same_space,
     axis_frame,
     element_between,
-    into,
     joint_between,
     matrix,
     motion,
@@ -23,7 +23,6 @@ from random_networks import (
     transform,
     twist_space,
     unit,
-    vec,
 )
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import evaluate_closure
@@ -33,14 +32,9 @@ from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import analyse_mobility
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, ElementKind, Expression, Joint
 
-CLOSES = 1e-12
-"""Residuals in [m] and [rad]: products of some ten matrices with entries up to 10."""
-
-SAME = 1e-6
-"""Of projections onto twist spaces: differences of 1e-12 times the networks' conditions, below 1e5."""
-
-NETWORKS = 5
-"""So many of each kind and each number of other elements, 0 to 4: 100."""
+CLOSES = 1e-12  # residuals in [m] and [rad]: products of some ten matrices with entries up to 10
+SAME = 1e-6  # projections onto twist spaces: differences of 1e-12 times the networks' conditions, below 1e5
+NETWORKS = 5  # of each kind and each number of other elements, 0 to 4: 100
 
 
 class Composition(NamedTuple):
@@ -56,14 +50,9 @@ def in_ground(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the points in [m] and normals [-] of an element in the ground: p, n, q and the other n."""
     first, second = (poses[name] for name in element.bodies)
-    p, q = (
-        pose[:3, :3] @ np.array(a) + pose[:3, 3]
-        for pose, a in zip((first, second), element.points, strict=True)
-    )
-    n, other = (
-        pose[:3, :3] @ np.array(one) for pose, one in zip((first, second), element.normals, strict=True)
-    )
-    return p, n, q, other
+    p = first[:3, :3] @ np.array(element.points[0]) + first[:3, 3]
+    q = second[:3, :3] @ np.array(element.points[1]) + second[:3, 3]
+    return p, first[:3, :3] @ np.array(element.normals[0]), q, second[:3, :3] @ np.array(element.normals[1])
 
 
 def as_rod(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
@@ -171,9 +160,7 @@ def test_an_element_equals_its_joints_on_a_hundred_networks(kind: ElementKind, o
         for mechanism, at in ((of_element, x), (of_joints, y)):
             assert np.abs(evaluate_closure(mechanism, at[:, np.newaxis]).residual).max(initial=0.0) < CLOSES
         held: FloatArray = np.array(of_joints.poses(y.tolist())["platform"].rotation)
-        np.testing.assert_allclose(
-            held, np.array(of_element.poses(x.tolist())["platform"].rotation), rtol=0.0, atol=CLOSES
-        )
+        assert_close(held, np.array(of_element.poses(x.tolist())["platform"].rotation), CLOSES)
         one, other = analyse_mobility(of_element, x), analyse_mobility(of_joints, y)
         assert one.mobility == 5 - others
         assert other.idle == built.idle
@@ -239,7 +226,7 @@ def test_the_driven_length_of_an_element_is_followed() -> None:
     x = np.array([0.25, 0.4])  # 0.5^2 = 0.4^2 + 0.3^2
     closure = evaluate_closure(mechanism, x[:, np.newaxis])
     assert abs(closure.residual[0, 0]) < 1e-15
-    np.testing.assert_allclose(closure.jacobian[0, :, 0], [-2.0, 0.8], rtol=0.0, atol=1e-15)
+    assert_close(closure.jacobian[0, :, 0], [-2.0, 0.8], 1e-15)
 
 
 def test_points_and_lines_of_elements_are_fixed_to_their_bodies() -> None:
@@ -254,4 +241,3 @@ def test_points_and_lines_of_elements_are_fixed_to_their_bodies() -> None:
             assert float(measure_element(element, *moved).distance) == pytest.approx(
                 float(element.length.value({})), abs=1e-13
             )
-    assert into(np.eye(4), np.array([1.0, 2.0, 3.0])).tolist() == list(vec(np.array([1.0, 2.0, 3.0])))

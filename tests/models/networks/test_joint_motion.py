@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -10,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from random_networks import (
     KINDS,
     Poses,
+    assert_close,
     assert_same_space,
     axis_frame,
     body_jacobian,
@@ -74,20 +77,10 @@ def test_rotations_are_orthogonal_and_equal_the_matrix_exponential(angle: float)
     q = vectors(angle)
     found = rotations(q)
     size = max(1.0, angle)  # the rounding of the angle itself turns by eps |q|
-    np.testing.assert_allclose(
-        found @ found.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), rtol=0.0, atol=ROTATION_ROUNDING
-    )
-    np.testing.assert_allclose(np.linalg.det(found), 1.0, rtol=0.0, atol=ROTATION_ROUNDING)
+    assert_close(found @ found.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), ROTATION_ROUNDING)
+    assert_close(np.linalg.det(found), 1.0, ROTATION_ROUNDING)
     expected = np.array([expm(skew(one)) for one in q.T])
-    np.testing.assert_allclose(
-        found, expected, rtol=0.0, atol=10 * ROTATION_ROUNDING * size
-    )  # expm squares 6 times
-
-
-def test_one_rotation_vector_of_floats_is_the_same() -> None:
-    q = vectors(2.0)
-    rows: FloatArray = np.array(exp3((float(q[0, 7]), float(q[1, 7]), float(q[2, 7]))).rotation)
-    np.testing.assert_array_equal(rows, rotations(q)[7])
+    assert_close(found, expected, 10 * ROTATION_ROUNDING * size)  # expm squares 6 times
 
 
 def test_series_and_closed_form_meet_where_they_take_over() -> None:
@@ -100,7 +93,7 @@ def test_series_and_closed_form_meet_where_they_take_over() -> None:
             for found in (function((q[0], q[1], q[2])) for q in (below, above))
         )
         # the closed forms of 1 - cos and a - sin lose digits there, which count times |q| = 1e-4
-        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-13)
+        assert_close(one, other, 1e-13)
 
 
 def test_the_printed_matrix_is_no_rotation() -> None:
@@ -114,7 +107,7 @@ def test_the_printed_matrix_is_no_rotation() -> None:
     printed[0, 0] = u[0] * u[2] * v + np.cos(theta)
     corrected = np.array(right)
     corrected[0, 0] = u[0] * u[0] * v + np.cos(theta)
-    np.testing.assert_allclose(corrected, right, rtol=0.0, atol=ROTATION_ROUNDING)
+    assert_close(corrected, right, ROTATION_ROUNDING)
     assert abs(np.linalg.det(right) - 1.0) < ROTATION_ROUNDING
     assert abs(np.linalg.det(printed) - 1.0) > 0.01
     assert np.abs(printed @ printed.T - np.eye(3)).max() > 0.01
@@ -140,7 +133,7 @@ def test_turning_is_the_derivative_of_the_rotation(angle: float) -> None:
         expected = np.array([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
         found: FloatArray = np.array(left_jacobian((q[0], q[1], q[2]))).T
         # differences of step 1e-2: truncation 1e-12 / 140, rounding 1e-14
-        np.testing.assert_allclose(found, expected, rtol=0.0, atol=2e-12)
+        assert_close(found, expected, 2e-12)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 6.0])
@@ -149,7 +142,7 @@ def test_left_jacobian_inverse_is_the_inverse(angle: float) -> None:
     turning: FloatArray = np.array(left_jacobian((q[0], q[1], q[2]))).transpose(2, 1, 0)
     back = left_jacobian_inverse(q).transpose(2, 0, 1)
     # near 2 pi the inverse grows like 1 / (2 pi - angle), here 1 / 0.28
-    np.testing.assert_allclose(back @ turning, np.tile(np.eye(3), (20, 1, 1)), rtol=0.0, atol=1e-12)
+    assert_close(back @ turning, np.tile(np.eye(3), (20, 1, 1)), 1e-12)
 
 
 @pytest.mark.parametrize("angle", [*ANGLES, 3.0 * np.pi - 1e-6, 3.0 * np.pi + 1e-6, 100.0])
@@ -158,7 +151,7 @@ def test_wrapped_vectors_turn_the_same_by_half_a_turn_at_most(angle: float) -> N
     short = np.array(wrap_rotation_vector(tuple(q)))
     assert (np.linalg.norm(short, axis=0) <= np.pi + 1e-14 * max(1.0, angle)).all()
     # 2 pi n is rounded to eps |q|
-    np.testing.assert_allclose(rotations(short), rotations(q), rtol=0.0, atol=1e-13 * max(1.0, angle))
+    assert_close(rotations(short), rotations(q), 1e-13 * max(1.0, angle))
 
 
 def one_joint(joints: list[Joint], bodies: int) -> Network:
@@ -190,9 +183,8 @@ def test_a_global_joint_is_three_revolutes_whose_axes_meet(seed: int) -> None:
         )
     three = build_mechanism(one_joint(hinges, 3))
 
-    np.testing.assert_allclose(
-        pose_of(three, np.asarray(angles), "b3"), pose_of(ball_arm, q, "b1"), rtol=0.0, atol=1e-13
-    )  # rounding of seven matrix products
+    # rounding of seven matrix products
+    assert_close(pose_of(three, np.asarray(angles), "b3"), pose_of(ball_arm, q, "b1"), 1e-13)
     # 1e-10: differences are good to 1e-12, the least sine of these axes with each other is 0.05
     assert_same_space(
         column_space(body_jacobian(ball_arm, q, "b1")),
@@ -208,7 +200,7 @@ def test_a_global_joint_keeps_its_centre() -> None:
     centre = matrix(joint.frames[0])[:3, 3]
     for q in vectors(2.5).T:
         seen = pose_of(arm, q, "b1") @ matrix(joint.frames[1])
-        np.testing.assert_allclose(seen[:3, 3], centre, rtol=0.0, atol=1e-14)
+        assert_close(seen[:3, 3], centre, 1e-14)
 
 
 # --- joints
@@ -229,7 +221,7 @@ def test_joints_move_as_matrix_exponentials_of_their_twists(kind: JointKind, see
     rng = np.random.default_rng(seed)
     joint, q = joint_of(kind, rng), np.array(random_values(kind, rng))
     expected = motion(kind, q, joint.pitch)
-    np.testing.assert_allclose(matrix(joint_frame(joint, list(q))), expected, rtol=0.0, atol=ROUNDING)
+    assert_close(matrix(joint_frame(joint, list(q))), expected, ROUNDING)
 
 
 @pytest.mark.slow
@@ -247,7 +239,7 @@ def test_twists_are_derivatives_of_matrix_exponentials(kind: JointKind) -> None:
         for k in range(len(q)):
             expected = rates[:, :, k] @ inverse
             # differences of step 1e-2: 1e-12 / 140 of truncation, 1e-14 of rounding
-            np.testing.assert_allclose(generator(found[:3, k], found[3:, k]), expected, rtol=0.0, atol=3e-12)
+            assert_close(generator(found[:3, k], found[3:, k]), expected, 3e-12)
 
 
 def user_motion() -> tuple[Expression, ...]:
@@ -270,19 +262,14 @@ def test_a_user_joint_moves_as_its_formulas_say() -> None:
         return pose
 
     for x in np.random.default_rng(1).uniform(-1.5, 1.5, (20, 2)):
-        np.testing.assert_allclose(matrix(arm.poses(list(x))["b"]), expected(x), rtol=0.0, atol=ROUNDING)
+        assert_close(matrix(arm.poses(list(x))["b"]), expected(x), ROUNDING)
         values = arm.joint_values(joint, x)
         screws = twists_of(joint, np.array([float(one.value) for one in values]), np.eye(4))
         rates = difference(one_by_one(expected), x, 1e-2)
         for k in range(2):
             twist = screws @ np.array([float(one.gradient.get(k, 0.0)) for one in values])
             # truncation of step 1e-2 with seventh derivatives up to 1.5^7 = 17
-            np.testing.assert_allclose(
-                generator(twist[:3], twist[3:]),
-                rates[:, :, k] @ np.linalg.inv(expected(x)),
-                rtol=0.0,
-                atol=1e-11,
-            )
+            assert_close(generator(twist[:3], twist[3:]), rates[:, :, k] @ np.linalg.inv(expected(x)), 1e-11)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -304,14 +291,7 @@ def test_what_a_joint_allows_and_forbids_is_all_that_there_is(kind: JointKind) -
 def test_a_driven_joint_forbids_what_it_is_driven_by(kind: JointKind) -> None:
     rng = np.random.default_rng(5)
     free = joint_of(kind, rng)
-    joint = Joint(
-        "J",
-        kind,
-        free.bodies,
-        free.frames,
-        values=(Expression("s"),) * len(JOINT_UNITS[kind]),
-        pitch=free.pitch,
-    )
+    joint = replace(free, values=(Expression("s"),) * len(JOINT_UNITS[kind]))
     at, q = random_pose(rng), np.array(random_values(kind, rng))
     found = list(constraint_twists(joint, list(q), transform(at)))
     drives = np.array([(*w, *v) for name, _, (w, v) in found if name == "drive"]).T
@@ -323,37 +303,23 @@ def test_a_driven_joint_forbids_what_it_is_driven_by(kind: JointKind) -> None:
 # --- poses of whole networks, by matrices alone
 
 
-def joints_of(network: Network) -> dict[str, FloatArray]:
-    """Return R = A_1 T A_2^-1 of each joint at its start."""
-    return {
-        one.name: matrix(one.frames[0])
-        @ motion(one.kind, one.start, one.pitch)
-        @ np.linalg.inv(matrix(one.frames[1]))
-        for one in network.joints
-    }
+def joint_matrix(joint: Joint) -> FloatArray:
+    """Return R = A_1 T A_2^-1 at the start."""
+    first, second = map(matrix, joint.frames)
+    return first @ motion(joint.kind, joint.start, joint.pitch) @ np.linalg.inv(second)
 
 
 def poses_by_matrices(network: Network, names: set[str]) -> Poses:
     """Return the pose of each body along some joints, visited until nothing new is found."""
-    moved = joints_of(network)
     poses: Poses = {network.ground: np.eye(4)}
     while len(poses) < len(network.body_names):
-        for one in network.joints:
-            a, b = one.bodies
-            if one.name in names and a in poses and b not in poses:
-                poses[b] = poses[a] @ moved[one.name]
-            if one.name in names and b in poses and a not in poses:
-                poses[a] = poses[b] @ np.linalg.inv(moved[one.name])
+        for joint in (joint for joint in network.joints if joint.name in names):
+            a, b = joint.bodies
+            if a in poses and b not in poses:
+                poses[b] = poses[a] @ joint_matrix(joint)
+            elif b in poses and a not in poses:
+                poses[a] = poses[b] @ np.linalg.inv(joint_matrix(joint))
     return poses
-
-
-def apart(network: Network, rng: np.random.Generator) -> Network:
-    """Return a network with other starts: its loops are open."""
-    joints = tuple(
-        Joint(one.name, one.kind, one.bodies, one.frames, random_values(one.kind, rng), pitch=one.pitch)
-        for one in network.joints
-    )
-    return Network(network.name, network.bodies, joints, network.elements)
 
 
 @pytest.mark.slow
@@ -364,22 +330,23 @@ def test_poses_and_gaps_of_random_networks_are_those_of_matrices(seed: int) -> N
     closed = random_network(rng, bodies=5, extra=3)
     mechanism = build_mechanism(closed)
     assert np.abs(evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).residual).max() < ROUNDING
-    network = apart(closed, rng)
+    starts = [random_values(joint.kind, rng) for joint in closed.joints]  # others: its loops are open
+    joints = [replace(joint, start=start) for joint, start in zip(closed.joints, starts, strict=True)]
+    network = replace(closed, joints=tuple(joints))
     mechanism = build_mechanism(network)
     tree = {network.joints[one.joint].name for one in mechanism.graph.branches}
     expected = poses_by_matrices(network, tree)
     found = mechanism.poses(mechanism.start.tolist())
     for name, pose in expected.items():
-        np.testing.assert_allclose(matrix(found[name]), pose, rtol=0.0, atol=ROUNDING)
+        assert_close(matrix(found[name]), pose, ROUNDING)
     residual = evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).residual[:, 0]
     for k, cut in enumerate(mechanism.graph.cuts):
         joint = network.joints[cut]
         a, b = joint.bodies
-        E = np.linalg.inv(expected[a] @ joints_of(network)[joint.name] @ matrix(joint.frames[1])) @ (
-            expected[b] @ matrix(joint.frames[1])
-        )
+        second = matrix(joint.frames[1])
+        E = np.linalg.inv(expected[a] @ joint_matrix(joint) @ second) @ expected[b] @ second
         gap = residual[6 * k : 6 * k + 6]
-        np.testing.assert_allclose(gap[:3], E[:3, 3], rtol=0.0, atol=ROUNDING)
+        assert_close(gap[:3], E[:3, 3], ROUNDING)
         # a logarithm near pi is good to the root of rounding
-        np.testing.assert_allclose(gap[3:], log_of(E), rtol=0.0, atol=1e-6)
-        np.testing.assert_allclose(motion("global", gap[3:])[:3, :3], E[:3, :3], rtol=0.0, atol=ROUNDING)
+        assert_close(gap[3:], log_of(E), 1e-6)
+        assert_close(motion("global", gap[3:])[:3, :3], E[:3, :3], ROUNDING)
