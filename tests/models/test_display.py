@@ -1,4 +1,4 @@
-"""How a result shows itself: one line at a prompt, headline, notes and table in a notebook."""
+"""The repr of results: one line at a prompt, headline, notes and table in a notebook."""
 
 from __future__ import annotations
 
@@ -8,25 +8,16 @@ import pandas as pd
 import pytest
 
 from urmpipe_models.display import HEAD_ROWS, MAX_LINE_LENGTH, Displayable, format_count, format_headline
-
-
-@dataclass
-class Doubt:
-    """What a person should know."""
-
-    message: str
-
-    def __str__(self) -> str:
-        return self.message
+from urmpipe_models.errors import Finding
 
 
 @dataclass(repr=False)
 class Shelf(Displayable):
-    """A result of so many rows."""
+    """A result of some rows."""
 
     headline: str
     rows: int = 0
-    warnings: tuple[Doubt, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
     def _headline(self) -> str:
         return self.headline
@@ -35,8 +26,8 @@ class Shelf(Displayable):
         return pd.DataFrame({"book": range(1000, 1000 + self.rows)})
 
 
-def warned(*messages: str) -> tuple[Doubt, ...]:
-    return tuple(Doubt(message) for message in messages)
+def warned(*messages: str) -> tuple[Finding, ...]:
+    return tuple(Finding(message) for message in messages)
 
 
 def test_the_line_has_the_headline_and_the_number_of_warnings() -> None:
@@ -46,7 +37,7 @@ def test_the_line_has_the_headline_and_the_number_of_warnings() -> None:
 
 
 @pytest.mark.parametrize(("warnings", "ending"), [((), ">"), (warned("one"), ", 1 warning>")])
-def test_what_does_not_fit_into_the_line_is_cut(warnings: tuple[Doubt, ...], ending: str) -> None:
+def test_what_does_not_fit_into_the_line_is_cut(warnings: tuple[Finding, ...], ending: str) -> None:
     room = MAX_LINE_LENGTH - len("<Shelf ") - len(ending)
     assert repr(Shelf("x" * room, warnings=warnings)) == f"<Shelf {'x' * room}{ending}"
     assert repr(Shelf("x" * (room + 1), warnings=warnings)) == f"<Shelf {'x' * (room - 3)}...{ending}"

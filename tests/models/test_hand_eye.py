@@ -1,4 +1,4 @@
-"""The frames of base and tool between computed and measured poses: known frames, SciPy, and what is open."""
+"""Hand-eye calibration: known frames, SciPy's least squares, and unobservable directions."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ from urmpipe_models.hand_eye import (
     solve_hand_eye,
 )
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import FORMS, RotationForm, to_matrices, to_quaternions
+from urmpipe_models.math3d import FORMS, RotationForm, column_count, to_matrices, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
-ROUNDING = 1e-12
-"""Positions of some metres round at 1e-15, and a fit loses a few digits."""
+ROUNDING = 1e-12  # positions of some metres round at 1e-15, and a fit loses a few digits
 
 
 class Truth(NamedTuple):
@@ -62,13 +61,13 @@ def placed(position: FloatArray, rotation: FloatArray) -> Truth:
     return Truth(base, shift, tool, offset, position, np.broadcast_to(rotation, (len(position), 3, 3)))
 
 
-def found_in(truth: Truth, *, turned: bool) -> HandEye:
+def solve(truth: Truth, *, turned: bool) -> HandEye:
     return solve_hand_eye(
         truth.position, truth.rotation, truth.measured, truth.measured_rotation if turned else None
     )
 
 
-def misses(found: HandEye, truth: Truth, measured: FloatArray) -> FloatArray:
+def misfit(found: HandEye, truth: Truth, measured: FloatArray) -> FloatArray:
     moved = (truth.position + truth.rotation @ found.tool_position) @ found.base_rotation.T
     return measured - moved - found.base_position
 
@@ -91,7 +90,7 @@ def assert_found(found: HandEye, truth: Truth, *, turned: bool) -> None:
 def test_any_frames_are_found_from_exact_poses(robot: str, turned: bool) -> None:
     for seed in range(4):
         truth = random_truth(seed, robot=robot)
-        assert_found(found_in(truth, turned=turned), truth, turned=turned)
+        assert_found(solve(truth, turned=turned), truth, turned=turned)
 
 
 @pytest.mark.slow
@@ -99,7 +98,7 @@ def test_any_frames_are_found_from_exact_poses(robot: str, turned: bool) -> None
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(5, 40), spread=st.floats(0.5, np.pi))
 def test_any_frames_are_found_from_few_poses_and_small_motions(seed: int, count: int, spread: float) -> None:
     truth = random_truth(seed, count, spread=spread)
-    found = found_in(truth, turned=True)
+    found = solve(truth, turned=True)
     np.testing.assert_allclose(found.base_rotation, truth.base, atol=1e-9)
     np.testing.assert_allclose(found.tool_position, truth.offset, atol=1e-9)
 
@@ -125,14 +124,14 @@ def test_no_other_frames_leave_less_of_noisy_positions(seed: int, turned: bool) 
     turns = truth.measured_rotation @ noise
     found = solve_hand_eye(truth.position, truth.rotation, measured, turns if turned else None)
 
-    def miss(x: FloatArray) -> FloatArray:
+    def residuals(x: FloatArray) -> FloatArray:
         base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
         moved = (truth.position + truth.rotation @ (truth.offset + x[3:6])) @ base.T
         return np.asarray((measured - moved - truth.shift - x[6:]).ravel())
 
-    best = least_squares(miss, np.zeros(9), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    best = least_squares(residuals, np.zeros(9), xtol=1e-15, ftol=1e-15, gtol=1e-15)
     least = np.sqrt(2 * best.cost / 300)
-    assert rms(misses(found, truth, measured)) == pytest.approx(least, rel=1e-9)  # both are at the foot
+    assert rms(misfit(found, truth, measured)) == pytest.approx(least, rel=1e-9)
     if turned:
         left = (Rotation.from_matrix(found.base_rotation @ truth.rotation @ found.tool_rotation)).inv()
         spun = (left * Rotation.from_matrix(turns)).as_rotvec()
@@ -145,7 +144,7 @@ def test_orientations_in_a_wrong_form_move_no_position() -> None:
     wrong = Rotation.random(100, np.random.default_rng(4)).as_matrix()
     alone = solve_hand_eye(truth.position, truth.rotation, measured)
     found = solve_hand_eye(truth.position, truth.rotation, measured, wrong)
-    assert rms(misses(found, truth, measured)) == pytest.approx(rms(misses(alone, truth, measured)), rel=1e-9)
+    assert rms(misfit(found, truth, measured)) == pytest.approx(rms(misfit(alone, truth, measured)), rel=1e-9)
 
 
 def test_orientations_tell_what_positions_on_a_line_leave_open() -> None:
@@ -158,18 +157,18 @@ def test_orientations_tell_what_positions_on_a_line_leave_open() -> None:
     turns = truth.measured_rotation @ Rotation.from_rotvec(rng.normal(0.0, 0.01, (200, 3))).as_matrix()
     found = solve_hand_eye(truth.position, truth.rotation, measured, turns)
 
-    def miss(x: FloatArray) -> FloatArray:
+    def residuals(x: FloatArray) -> FloatArray:
         base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
         tool = truth.tool @ Rotation.from_rotvec(x[9:]).as_matrix()
         moved = (truth.position + truth.rotation @ (truth.offset + x[3:6])) @ base.T
         apart = RADIAN_LENGTH / np.sqrt(2) * (turns - base @ truth.rotation @ tool)
         return np.concatenate(((measured - moved - truth.shift - x[6:9]).ravel(), apart.ravel()))
 
-    best = least_squares(miss, np.zeros(12), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    best = least_squares(residuals, np.zeros(12), xtol=1e-15, ftol=1e-15, gtol=1e-15)
     apart = RADIAN_LENGTH / np.sqrt(2) * (turns - found.base_rotation @ truth.rotation @ found.tool_rotation)
-    left = (misses(found, truth, measured) ** 2).sum() + (apart**2).sum()
+    left = (misfit(found, truth, measured) ** 2).sum() + (apart**2).sum()
     assert left == pytest.approx(2 * best.cost, rel=1e-9)
-    assert [one.part for one in found.untold] == ["tool offset"]  # along the one axis of all turns
+    assert [direction.part for direction in found.untold] == ["tool offset"]  # along the axis of all turns
     np.testing.assert_allclose(np.abs(found.untold[0].axis), [1.0, 0.0, 0.0], atol=1e-9)
 
 
@@ -179,23 +178,19 @@ LINE = np.outer(RNG.uniform(-1.0, 1.0, 50), [1 / 3, 2 / 3, 2 / 3])
 POINT = np.broadcast_to(POINTS[0], POINTS.shape)
 ABOUT_Z = Rotation.from_rotvec(np.outer(RNG.uniform(-2.0, 2.0, 50), [0.0, 0.0, 1.0])).as_matrix()
 
+OFFSETS = ["tool offset"] * 3
+# Poses, and their unobservable directions without orientations and with them.
 OPEN_SETS: list[tuple[FloatArray, FloatArray, list[str], list[str]]] = [
     (POINTS, TURNS, [], []),
-    (POINTS, TURNS[0], ["tool offset"] * 3, ["tool offset"] * 3),
-    (POINTS, ABOUT_Z @ TURNS[0], ["tool offset"], ["tool offset"]),
+    (POINTS, TURNS[0], OFFSETS, OFFSETS),
+    (POINTS, ABOUT_Z @ TURNS[0], OFFSETS[:1], OFFSETS[:1]),
     (LINE, TURNS, [], []),
-    (LINE, TURNS[0], ["tool offset"] * 3 + ["base turn"], ["tool offset"] * 3 + ["tool turn"]),
+    (LINE, TURNS[0], [*OFFSETS, "base turn"], [*OFFSETS, "tool turn"]),
     (POINT, TURNS, [], []),
     (POINT, ABOUT_Z @ TURNS[0], ["tool offset", "base turn"], ["tool offset", "tool turn"]),
-    (
-        POINT,
-        TURNS[0],
-        ["tool offset"] * 3 + ["base turn"] * 3,
-        ["tool offset"] * 3 + ["tool turn"] * 3,
-    ),
-    (POINTS[:1], TURNS[:1], ["tool offset"] * 3 + ["base turn"] * 3, ["tool offset"] * 3 + ["tool turn"] * 3),
+    (POINT, TURNS[0], [*OFFSETS, *["base turn"] * 3], [*OFFSETS, *["tool turn"] * 3]),
+    (POINTS[:1], TURNS[:1], [*OFFSETS, *["base turn"] * 3], [*OFFSETS, *["tool turn"] * 3]),
 ]
-"""Poses, what they leave open without orientations, and with them."""
 
 
 @pytest.mark.slow
@@ -205,14 +200,14 @@ def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
 ) -> None:
     truth = placed(position, rotation)
     for parts, with_turns in ((alone, False), (turned, True)):
-        found = found_in(truth, turned=with_turns)
-        assert [one.part for one in found.untold] == parts
-        np.testing.assert_allclose(misses(found, truth, truth.measured), 0.0, atol=1e-9)
-        for one in found.untold:
-            assert np.linalg.norm(one.axis) == pytest.approx(1.0)
-            assert one.seen < 1e-7  # the root of rounding
-            if one.part == "tool offset":
-                assert found.tool_position @ one.axis == pytest.approx(0.0, abs=1e-9)
+        found = solve(truth, turned=with_turns)
+        assert [direction.part for direction in found.untold] == parts
+        np.testing.assert_allclose(misfit(found, truth, truth.measured), 0.0, atol=1e-9)
+        for direction in found.untold:
+            assert np.linalg.norm(direction.axis) == pytest.approx(1.0)
+            assert direction.seen < 1e-7  # the root of rounding
+            if direction.part == "tool offset":
+                assert found.tool_position @ direction.axis == pytest.approx(0.0, abs=1e-9)
         if with_turns:
             made = found.base_rotation @ truth.rotation @ found.tool_rotation
             np.testing.assert_allclose(made, truth.measured_rotation, atol=1e-9)
@@ -221,7 +216,7 @@ def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
 
 
 def test_the_axis_of_all_turns_is_the_one_along_which_the_tool_is_open() -> None:
-    found = found_in(placed(POINTS, ABOUT_Z @ TURNS[0]), turned=False)
+    found = solve(placed(POINTS, ABOUT_Z @ TURNS[0]), turned=False)
     assert abs(TURNS[0, 2] @ found.untold[0].axis) == pytest.approx(1.0)
     assert found.tool_rotation.tolist() == np.eye(3).tolist()
 
@@ -229,13 +224,13 @@ def test_the_axis_of_all_turns_is_the_one_along_which_the_tool_is_open() -> None
 def test_a_tool_that_hardly_turns_is_found_and_said_to_be_hardly_told() -> None:
     small = Rotation.from_rotvec(RNG.normal(0.0, 0.002, (50, 3))).as_matrix()
     truth = placed(POINTS, small @ TURNS[0])
-    found = found_in(truth, turned=True)
+    found = solve(truth, turned=True)
     np.testing.assert_allclose(found.tool_position, truth.offset, atol=1e-9)
-    assert [one.part for one in found.untold] == ["tool offset"] * 3
-    for one in found.untold:
-        spun = truth.rotation @ one.axis
-        assert one.seen == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)
-        assert one.seen < WEAK_SENSITIVITY
+    assert [direction.part for direction in found.untold] == ["tool offset"] * 3
+    for direction in found.untold:
+        spun = truth.rotation @ direction.axis
+        assert direction.seen == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)
+        assert direction.seen < WEAK_SENSITIVITY
 
 
 @pytest.mark.slow
@@ -253,7 +248,7 @@ def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: Rotation
     if columns is None:
         columns = made.as_euler(form.upper())  # type: ignore[call-overload]  # a word of Euler angles
     alike = {"zyz", "zxz"}  # these differ by quarter turns of base and tool
-    for other in (one for one in FORMS if quaternions_fit(columns, one)):
+    for other in (name for name in FORMS if column_count(name) == columns.shape[1]):
         guess = to_matrices(to_quaternions(columns, other))
         fits = rotation_residual(truth.rotation, guess) < 1e-7
         assert fits == (other == form or {form, other} == alike), other
@@ -265,17 +260,12 @@ def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: Rotation
         assert rotation_residual(truth.rotation, in_degrees) > 0.1
 
 
-def quaternions_fit(columns: FloatArray, form: RotationForm) -> bool:
-    return bool(columns.shape[1] == (9 if form == "matrix" else 4 if form.startswith("quat") else 3))
-
-
 def test_the_angle_that_is_left_is_that_of_the_noise() -> None:
     truth = random_truth(8, 500)
     noise = Rotation.from_rotvec(np.random.default_rng(8).normal(0.0, 0.01, (500, 3)))
     turns = truth.measured_rotation @ noise.as_matrix()
     turns[3] = np.nan
     expected = rms(np.delete(noise.as_rotvec(), 3, axis=0))
-    assert rotation_residual(truth.rotation, turns) == pytest.approx(
-        expected, rel=0.01
-    )  # 6 of 1500 are fitted
+    residual = rotation_residual(truth.rotation, turns)
+    assert residual == pytest.approx(expected, rel=0.01)  # 6 of 1500 are fitted
     assert np.isnan(rotation_residual(truth.rotation, np.full_like(turns, np.nan)))
