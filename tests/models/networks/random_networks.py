@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -309,3 +310,22 @@ def log_of(matrix: FloatArray) -> FloatArray:
     """Return the rotation vector in [rad] by the logarithm of a matrix."""
     full = np.real(logm(matrix[:3, :3]))
     return np.array([full[2, 1], full[0, 2], full[1, 0]])
+
+
+DOOR: dict[str, Any] = {
+    "angle_unit": "deg",
+    "controls": {"opening": {"start": 20, "lower": -10, "upper": 90}},
+    "chains": {"arm": {"robot": "ur5e", "start": [0, -90, 100, -10, 90, 0]}},
+    "bodies": {"door": {}},
+    "joints": {
+        "hinge": {
+            "kind": "revolute", "bodies": ["ground", "door"], "n": [0, 0, 1],
+            "a": [[0.6, -0.5, 0], [0, 0, 0]], "driven": "opening",
+        },
+        "grip": {
+            "kind": "user", "bodies": ["door", "arm.tool"],
+            "m": [0, 0, 1], "n": [0, 1, 0], "a": [0, 0.5, 0.4],
+        },
+    },
+}  # fmt: skip
+"""An arm of the catalogue that holds the handle of a door."""

@@ -20,8 +20,7 @@ from urmpipe_models.networks.parts import Joint, JointKind
 
 pin = pytest.importorskip("pinocchio")
 
-SAME = 1e-9
-"""Of projections: both Jacobians round to 1e-15, the worst condition here is below 1e4."""
+SAME = 1e-9  # of projections: both Jacobians round to 1e-15, the worst condition here is below 1e4
 
 
 @dataclass

@@ -22,8 +22,9 @@ from urmpipe_pipeline.networks.network_motion import NetworkMotion
 
 PI, TURN, Z = math.pi, 2 * math.pi, [0, 0, 1]
 
-ANSWER = 1e-9
-"""In [m] and [rad]: Newton ends at gaps of 1e-13, which mechanisms far from singular magnify by about 10."""
+ANSWER = (
+    1e-9  # m and rad: Newton ends at gaps of 1e-13, which mechanisms far from singular magnify by about 10
+)
 
 
 def apart(found: FloatArray, expected: FloatArray) -> FloatArray:
@@ -148,18 +149,15 @@ def test_perturbed_change_points_keep_the_branch_of_their_start(seed: int) -> No
     for _ in range(50):
         kind = rng.integers(3)
         short, long = rng.uniform(0.3, 0.9), rng.uniform(1.0, 1.6)
-        lengths = [(short, long, short, long), (short, short, long, long), (short, 0.7, 0.9, 1.6 - short)][
-            kind
-        ]
+        kinds = [(short, long, short, long), (short, short, long, long), (short, 0.7, 0.9, 1.6 - short)]
         size = 10.0 ** rng.uniform(-6, -2)
-        a, b, c, d = (one * (1.0 + size * rng.uniform(-1, 1)) for one in lengths)
+        a, b, c, d = (one * (1.0 + size * rng.uniform(-1, 1)) for one in kinds[kind])
         begin, sign, way = float(rng.uniform(0.6, 2.5)), int(rng.choice([-1, 1])), int(rng.choice([-1, 1]))
         cosines = [(a * a + d * d - (b + other * c) ** 2) / (2 * a * d) for other in (1, -1)]
         limits = [turn * math.acos(one) for one in cosines if abs(one) < 1 for turn in (1, -1)]
         first = min((way * (one - begin) % TURN for one in limits), default=TURN)
-        moved = network_drive(
-            planar(a, b, c, d, begin, sign), {"crank": (begin, begin + way * SWEEP)}, steps=24
-        )
+        drives = {"crank": (begin, begin + way * SWEEP)}
+        moved = network_drive(planar(a, b, c, d, begin, sign), drives, steps=24)
         case = (a, b, c, d, begin, sign, way)
         assert moved.complete == (first > SWEEP), case
         if not moved.complete:
@@ -198,14 +196,10 @@ def test_a_four_bar_that_cannot_turn_stops_at_its_limit(end: float, sign: int) -
 @pytest.mark.parametrize(
     ("ends", "flat"),
     [
-        ((-1, 7), [0, PI, TURN]),
-        ((7, -1), [TURN, PI, 0]),
-        ((0, 1), [0]),  # begins flat
-        ((1, PI), [PI]),  # ends flat
-        ((PI, TURN), [PI, TURN]),
-        ((0.5, 2.5), []),
+        ((-1, 7), [0, PI, TURN]), ((7, -1), [TURN, PI, 0]), ((0.5, 2.5), []),
+        ((0, 1), [0]), ((1, PI), [PI]), ((PI, TURN), [PI, TURN]),  # begins flat, ends flat, both
     ],
-)
+)  # fmt: skip
 def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
     ends: tuple[float, float], flat: list[float]
 ) -> None:
@@ -310,12 +304,8 @@ def five_bar(left: float, right: float) -> tuple[Tables, FloatArray]:
         del joints[name]["start"]
         joints[name]["driven"] = control
     controls = {"left": {"start": left}, "right": {"start": right}}
-    return {
-        "angle_unit": "rad",
-        "bodies": {name: {} for name in "abcd"},
-        "joints": joints,
-        "controls": controls,
-    }, found
+    bodies: Tables = {name: {} for name in "abcd"}
+    return {"angle_unit": "rad", "bodies": bodies, "joints": joints, "controls": controls}, found
 
 
 def five_bar_at(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -419,9 +409,7 @@ def test_rates_and_forces_at_rows_where_branches_meet_are_those_of_the_motion() 
     moved = network_drive(tables, {"crank": (0.0, TURN)}, torques={"theta4": -10.0})
     assert [event.row for event in moved.events] == pytest.approx([0, 100, 200], abs=1e-6)
     rate, acceleration = moved.joint_motion[1], moved.joint_motion[2]
-    np.testing.assert_allclose(
-        np.abs(rate), TURN, atol=1e-7
-    )  # polynomials of 7th degree through rows 4 mm apart
+    np.testing.assert_allclose(np.abs(rate), TURN, atol=1e-7)  # polynomials of 7th degree, rows 4 mm apart
     np.testing.assert_allclose(acceleration, 0.0, atol=1e-4)  # 39 rad/s2 would be the crank's centripetal one
     assert moved.forces is not None
     np.testing.assert_allclose(moved.forces.drives[:, 0], 10.0, atol=1e-6)

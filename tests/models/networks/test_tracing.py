@@ -8,16 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.file import Network, load_network, network_names
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.rates import (
-    close_network,
-    closure_jacobian,
-    largest_residual,
-    predict_variables,
-    variable_changes,
-)
 
 KINDS: dict[str, Any] = {
     "bodies": {name: {} for name in "abcdef"},
@@ -62,27 +54,3 @@ def test_poses_of_symbols_numbers_and_columns_are_the_same(network: Network) -> 
         # sums of products of numbers near 1: rounding
         np.testing.assert_allclose(columns[:, k], numbers, atol=1e-14)
         np.testing.assert_allclose(np.array(traced(*x[:, k])).ravel(), numbers, atol=1e-14)
-
-
-@pytest.mark.parametrize("name", ["four-bar", "cam-follower", "stewart-gough-driven"])
-def test_steps_that_close_a_network_are_the_same_of_symbols_and_numbers(name: str) -> None:
-    import casadi as ca
-
-    mechanism = build_mechanism(load_network(name))
-    before = assemble(mechanism).x[:, 0]
-    x = before + np.random.default_rng(2).normal(scale=1e-3, size=len(before))
-
-    def step(x: Any) -> list[Any]:
-        ahead = [x[k] + 0.01 for k in mechanism.controls]
-        predicted = predict_variables(mechanism, x, variable_changes(mechanism, before.tolist(), x), ahead)
-        entries = [one for column in closure_jacobian(mechanism, predicted) for one in column]
-        return [largest_residual(mechanism, predicted), *entries, *close_network(mechanism, predicted, 3)]
-
-    symbols = [ca.SX.sym(f"x{k}") for k in range(len(x))]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
-        traced = ca.Function("step", symbols, [ca.vertcat(*map(ca.SX, step(symbols)))])
-    numbers = np.array([float(one) for one in step(x.tolist())])
-    # of sums of products of numbers near 1 rounding remains, which three Newton steps take along
-    np.testing.assert_allclose(np.array(traced(*x)).ravel(), numbers, atol=1e-11)
-    assert abs(largest_residual(mechanism, numbers[-len(x) :].tolist())) < 1e-9  # as far as steps of h^2 lead

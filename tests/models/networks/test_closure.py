@@ -24,16 +24,12 @@ from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.parts import Body, Control, Expression, Joint
 
+# of the largest entry: differences of 1e-3 round to 1e-12 and neglect 1e-18 times the seventh derivative,
+# which is large near a half turn and where lines are nearly parallel
 RELATIVE = 1e-8
-"""Of the largest entry: differences of step 1e-3 round to 1e-12 and neglect 1e-18 times the seventh
-derivative, which is large near a half turn and where lines are nearly parallel."""
-
-HALF_TURN = 3.0
-"""In [rad]: gaps beyond are left out, as at pi the rotation vector jumps."""
-
+HALF_TURN = 3.0  # rad: gaps beyond are left out, as at pi the rotation vector jumps
+# of what drives joints: u is a function of s and t
 FORMULAS = ("0.7 * s - t", "sin(u) + 0.2 * s ** 2", "atan2(t, 2 + s * s)", "0.4", "sqrt(2 + s * t / 4) - u")
-"""Of what drives joints: u is itself a function of s and t."""
-
 CONTROLS = (
     Control("u", value=Expression("v * s + cos(t)")),  # stands before what it is a function of
     Control("s", 0.3),
@@ -55,9 +51,7 @@ def driven_at_random(network: Network, rng: np.random.Generator) -> Network:
     user = Joint("user", "user", random_pair(network.body_names, rng), motion=user_motion())
     joints.insert(int(rng.integers(len(joints))), user)
     elements = tuple(
-        replace(
-            one, length=Expression(f"{one.length.text} + 0.1 * s * u") if rng.random() < 0.7 else one.length
-        )
+        replace(one, length=Expression(f"{one.length.text} + 0.1 * s * u")) if rng.random() < 0.7 else one
         for one in network.elements
     )
     return Network(network.name, network.bodies, tuple(joints), elements, CONTROLS)

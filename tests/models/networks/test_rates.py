@@ -1,0 +1,192 @@
+"""The closure elementwise: Newton steps of numbers, columns and symbols, and values with two derivatives."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from random_networks import DOOR
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.networks.assembly import assemble
+from urmpipe_models.networks.file import load_network, network_names
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
+from urmpipe_models.networks.rates import (
+    Taylor,
+    close_network,
+    closure_jacobian,
+    closure_residual,
+    damped_normal_step,
+    largest_residual,
+    predict_variables,
+    variable_changes,
+)
+
+# --- Newton steps
+
+NETWORKS = [*map(load_network, network_names()), load_network(DOOR)]
+
+
+def residual(mechanism: Mechanism, x: FloatArray) -> FloatArray:
+    return np.array(closure_residual(mechanism, x.tolist()), dtype=np.float64)
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
+def test_the_jacobian_is_that_of_finite_differences_where_the_network_is_closed(network: Any) -> None:
+    mechanism = build_mechanism(network)
+    x = assemble(mechanism, restarts=0).x[:, 0]
+    assert np.abs(residual(mechanism, x)).max() < 1e-13  # rounding
+    step = 1e-6  # error of the quotient: step^2 and 1e-16 / step
+    for k, column in zip(mechanism.free, closure_jacobian(mechanism, x.tolist()), strict=True):
+        ahead, behind = x.copy(), x.copy()
+        ahead[k] += step * mechanism.column_scales[k]
+        behind[k] -= step * mechanism.column_scales[k]
+        difference = (residual(mechanism, ahead) - residual(mechanism, behind)) / (2.0 * step)
+        np.testing.assert_allclose(np.array(column, dtype=np.float64), difference, atol=1e-8)
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
+def test_steps_converge_quadratically_and_columns_give_what_floats_give(network: Any) -> None:
+    mechanism, rng = build_mechanism(network), np.random.default_rng(3)
+    x = np.repeat(assemble(mechanism, restarts=0).x, 4, axis=1)
+    scales = mechanism.column_scales[mechanism.free, np.newaxis]
+    x[mechanism.free] += 1e-3 * scales * rng.uniform(-1.0, 1.0, (len(mechanism.free), 4))
+
+    def left_over(steps: int) -> float:
+        rows = closure_residual(mechanism, close_network(mechanism, [*x], steps))
+        return max(float(np.abs(row).max()) for row in rows)
+
+    # from 1e-3 a step leads below 1e-6 times the curvature, two below its square times the curvature
+    assert left_over(1) < 3e-5
+    assert left_over(2) < 1e-8
+    assert left_over(3) < 1e-13
+    columns = close_network(mechanism, [*x], 2)
+    floats = np.array([close_network(mechanism, one.tolist(), 2) for one in x.T], dtype=np.float64).T
+    for column, row in zip(columns, floats, strict=True):
+        np.testing.assert_allclose(np.broadcast_to(column, 4), row, atol=1e-11)  # rounding over mu
+
+
+def test_a_damped_step_is_that_of_least_squares_also_with_redundant_rows_and_idle_columns() -> None:
+    rng = np.random.default_rng(4)
+    J = rng.normal(size=(8, 5))
+    J[:, 4] = J[:, 0] - 2.0 * J[:, 1]  # which no row determines
+    J[5:] = J[:3] + J[2:5]
+    e = J @ rng.normal(size=5)
+    step = np.array(damped_normal_step([[*map(float, column)] for column in J.T], [*map(float, e)]))
+    np.testing.assert_allclose(J @ step, -e, atol=1e-10)
+    least = np.linalg.lstsq(J, -e, rcond=1e-9)[0]
+    # along the idle direction rounding of some 1e-15 of e over mu = 1e-13: some percent
+    assert float(np.linalg.norm(step - least)) < 0.2 * float(np.linalg.norm(least))
+
+
+@pytest.mark.parametrize("name", ["four-bar", "cam-follower", "stewart-gough-driven"])
+def test_steps_that_close_a_network_are_the_same_of_symbols_and_numbers(name: str) -> None:
+    import casadi as ca
+
+    mechanism = build_mechanism(load_network(name))
+    before = assemble(mechanism).x[:, 0]
+    x = before + np.random.default_rng(2).normal(scale=1e-3, size=len(before))
+
+    def step(x: Any) -> list[Any]:
+        ahead = [x[k] + 0.01 for k in mechanism.controls]
+        predicted = predict_variables(mechanism, x, variable_changes(mechanism, before.tolist(), x), ahead)
+        entries = [one for column in closure_jacobian(mechanism, predicted) for one in column]
+        return [largest_residual(mechanism, predicted), *entries, *close_network(mechanism, predicted, 3)]
+
+    symbols = [ca.SX.sym(f"x{k}") for k in range(len(x))]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
+        traced = ca.Function("step", symbols, [ca.vertcat(*map(ca.SX, step(symbols)))])
+    numbers = np.array([float(one) for one in step(x.tolist())])
+    # of sums of products of numbers near 1 rounding remains, which three Newton steps take along
+    np.testing.assert_allclose(np.array(traced(*x)).ravel(), numbers, atol=1e-11)
+    assert abs(largest_residual(mechanism, numbers[-len(x) :].tolist())) < 1e-9  # as far as steps of h^2 lead
+
+
+# --- values with two derivatives: each rule against differences of the function itself, through NumPy
+
+FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
+SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
+STEP = 0.01
+
+RULES: dict[str, Callable[[Any, Any], Any]] = {
+    "add": lambda u, v: 3.0 + u + v,
+    "subtract": lambda u, v: 1.5 - u - v,
+    "negative": lambda u, v: -u,
+    "multiply": lambda u, v: u * v * 2.0,
+    "divide": lambda u, v: u / v,
+    "reciprocal": lambda u, v: 2.0 / u,
+    "square": lambda u, v: np.square(u),
+    "power": lambda u, v: u**3 - v**-2 + u**0.5,
+    "power of a negative base": lambda u, v: (-u) ** 3,
+    "variable power": lambda u, v: u**v + 2.0**v,
+    "sin": lambda u, v: np.sin(u),
+    "cos": lambda u, v: np.cos(u * v),
+    "tan": lambda u, v: np.tan(0.5 * u),
+    "exp": lambda u, v: np.exp(u - v),
+    "log": lambda u, v: np.log(u),
+    "sqrt": lambda u, v: np.sqrt(u + v),
+    "arctan2": lambda u, v: np.arctan2(u - 1.0, -v),
+    "floor": lambda u, v: u * np.floor(v + 7.5),
+    "remainder": lambda u, v: np.remainder(u + 10.0, 6.0),
+    "absolute": lambda u, v: np.abs(u - 5.0) + np.abs(v),
+    "maximum": lambda u, v: np.maximum(u * u, v - 9.0) + np.maximum(u, 0.1),
+    "minimum": lambda u, v: np.minimum(u - 9.0, v * v) + np.minimum(0.1, v),
+    "where": lambda u, v: np.where(u > v, u * v, v / u) + np.where(u < 0.0, 1.0, v),
+}
+
+
+def u_at(t: Any) -> Any:
+    return 1.2 + 0.4 * t + 0.3 * t**2
+
+
+def v_at(t: Any) -> Any:
+    return 2.0 + 0.2 * t - 0.5 * t**2
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_rules_are_derivatives(name: str) -> None:
+    """Of the columns u(t) and v(t) at three times, and of floats."""
+    t, steps = np.array([0.0, 0.3, -0.2]), STEP * np.arange(-4, 5)
+    u = Taylor(u_at(t), 0.4 + 0.6 * t, np.full(3, 0.6))
+    v = Taylor(v_at(t), 0.2 - t, np.full(3, -1.0))
+    found, rule = RULES[name](u, v), RULES[name]
+    values = np.array([rule(u_at(t + step), v_at(t + step)) for step in steps])
+    # eighth order: h^8 = 1e-16; rounding of 1e-15 / h and 1e-14 / h^2
+    np.testing.assert_allclose(found.value, rule(u_at(t), v_at(t)), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.first, FIRST @ values / STEP, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found.second, SECOND @ values / STEP**2, rtol=0, atol=1e-9)
+    scalar = rule(Taylor(u_at(0.3), 0.58, 0.6), Taylor(v_at(0.3), -0.1, -1.0))
+    numbers = [float(one) for one in (scalar.value, scalar.first, scalar.second)]
+    np.testing.assert_allclose(
+        numbers, [one[1] for one in (found.value, found.first, found.second)], rtol=1e-14
+    )
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 3])
+def test_powers_of_zero(n: int) -> None:
+    power = Taylor(np.array([0.0]), 0.7, 0.3) ** n
+    second = 0.3 * (n == 1) + 2 * 0.7**2 * (n == 2)
+    assert (power.value, power.first, power.second) == (0.0**n, 0.7 * (n == 1), second)
+
+
+def test_comparisons_are_of_the_values() -> None:
+    u, v = Taylor(np.array([1.0, 2.0]), 1.0), Taylor(np.array([2.0, 2.0]), -1.0)
+    results = (u < v, u <= v, u == v, u != 1.0, u >= 2.0)
+    expected = [[True, False], [True, True], [False, True], [False, True], [False, True]]
+    assert [np.asarray(result).tolist() for result in results] == expected
+
+
+NO_RULE: list[Callable[[Any], Any]] = [
+    np.arcsin, np.cosh, np.add.reduce, np.sum,
+    lambda u: np.sin(u, where=True), lambda u: np.concatenate((u, u)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("call", NO_RULE)
+def test_a_function_without_a_rule_is_refused(call: Callable[[Any], Any]) -> None:
+    with pytest.raises(TypeError):
+        call(Taylor(np.array([0.1, 0.2]), 1.0))
