@@ -168,12 +168,13 @@ def _grouped(pairs: Iterable[tuple[str, Any]]) -> Columns:
             found[f"{name} #{sum(one.startswith(f'{name} #') for one in found)}"] = array(value)
         else:
             texts[name].append(value)
-    return found | {
-        name: numbers(some)
-        if all(map(_is_number, some)) and set(some) - {"", "null"}
-        else column("words", some)
-        for name, some in texts.items()
-    }
+    return found | {name: _texts(name, some) for name, some in texts.items()}
+
+
+def _texts(name: str, some: list[str]) -> dict[str, Any]:
+    if name == ".size":  # of a file that has the texts of modules
+        return column("shown", some)
+    return numbers(some) if all(map(_is_number, some)) and set(some) - {"", "null"} else column("words", some)
 
 
 def _is_number(word: str) -> bool:
