@@ -142,25 +142,21 @@ class CallWatchdog:
 
 
 def await_job(folder: Path) -> None:
-    """Wait in the process of the FMUs until its folder holds the job; exit if the parent exits first."""
+    """Wait in the process of the FMUs until its folder holds the job.
+
+    When the parent exits, which closes the standard input, this process exits too, and removes the folder.
+    Standard input is replaced by an empty one, so that an FMU that reads does not wait.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted too, and ends this process
     if not sys.stdin.buffer.readline():
         shutil.rmtree(folder, ignore_errors=True)
         os._exit(0)
-    exit_with_parent(folder)
-
-
-def exit_with_parent(folder: Path) -> None:
-    """Exit this process, and remove its folder, when the parent exits: that closes the standard input.
-
-    Standard input is replaced by an empty one, so that an FMU that reads does not wait.
-    """
     parent_pipe = os.dup(0)
     empty = os.open(os.devnull, os.O_RDONLY)
     os.dup2(empty, 0)
     os.close(empty)
 
-    def watch() -> None:
+    def watch_parent() -> None:
         while os.read(parent_pipe, 1024):
             pass
         shutil.rmtree(folder, ignore_errors=True)
@@ -169,7 +165,7 @@ def exit_with_parent(folder: Path) -> None:
                 os.killpg(os.getpid(), signal.SIGKILL)
         os._exit(1)
 
-    threading.Thread(target=watch, daemon=True).start()
+    threading.Thread(target=watch_parent, daemon=True).start()
 
 
 def callbacks_with(log: Callable[..., None]) -> Any:

@@ -46,7 +46,7 @@ robot = "urm7"
 """
 
 TOLD = [
-    "3: system.stepp: found 'stepp' (did you mean step?)",
+    "3: system.stepp: unknown (did you mean step?)",
     "8: blocks.lag.start.TT: found 'TT' (did you mean T?)",
     "13: blocks.third: unit: found 'no_such_unit'",
     "17: blocks.fourth.file: found 'missing.py'",
@@ -55,7 +55,7 @@ TOLD = [
     "25: connections.third.a: block found 'lagg' (did you mean lag?)",
     "26: connections.fourth.a: output of lag: found 'yyy'",
     "29: inputs.lag.u: missing.csv: found no such file",
-    "30: inputs.lag.v.column: not found",
+    "30: inputs.lag.v.column: found nothing",
     "30: inputs.lag.v: input of lag: found 'v'",
     "31: inputs.lagg.u: block found 'lagg' (did you mean lag?)",
     "32: inputs.lag.w.log: found '$voltage'",

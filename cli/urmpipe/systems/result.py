@@ -178,7 +178,7 @@ def _block(plan: Plan, block: Block) -> SimulatedBlock:
 def _settings(plan: Plan, block: str, shown: Interface) -> Iterator[Setting]:
     """Yield what the parameters, states and unconnected inputs of a block had before the first step."""
     given = {one.variable.name: one.value for one in plan.starts[block]}
-    fed = {*plan.sources, *(one.destination for one in plan.logged)}
+    fed = {*plan.sources, *plan.logged}
     for one in shown.variables.values():
         value = given.get(one.name, one.start)
         if (

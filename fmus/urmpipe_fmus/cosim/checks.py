@@ -244,7 +244,7 @@ def _variables(description: Any) -> Iterator[Variable]:
             variability=variable.variability,
             initial=variable.initial or "",
             unit=unit,
-            base=to_si_base(unit, bases.get(unit)),
+            base=_to_si_base(unit, bases.get(unit)),
             minimum=float(low) if low else -math.inf,
             maximum=float(high) if high else math.inf,
             nominal=abs(float(variable.nominal or (declared and declared.nominal) or 0.0)),
@@ -254,7 +254,7 @@ def _variables(description: Any) -> Iterator[Variable]:
         )
 
 
-def to_si_base(unit: str, stated: Any = None) -> BaseUnit | None:
+def _to_si_base(unit: str, stated: Any = None) -> BaseUnit | None:
     """Return a unit in the base units of SI, as FMPy read it or else from its spelling; None if unknown."""
     if stated is not None:
         exponents = {name: getattr(stated, name) for name in BASE_NAMES}
@@ -265,14 +265,8 @@ def to_si_base(unit: str, stated: Any = None) -> BaseUnit | None:
         return None
 
 
-def unit_mismatch(unit: str, base: BaseUnit | None, destination: Variable) -> str | None:
-    """Return how the unit of a source differs from an input's; None if it does not, empty if one has none.
-
-    Args:
-        unit: The source's unit; empty if it has none.
-        base: The same in the base units of SI, if that is known.
-        destination: The input.
-    """
+def _unit_mismatch(unit: str, base: BaseUnit | None, destination: Variable) -> str | None:
+    """Return how the unit of a source differs from an input's; None if it does not, empty if one has none."""
     if destination.type != "Real" or unit == destination.unit:
         return None
     if not unit or not destination.unit:
@@ -400,7 +394,7 @@ class Wiring:
             if output.kind != variable.kind:
                 self._fault(table, f"found {source}, {output.kind}, allowed: {variable.kind}")
                 return
-            mismatch = unit_mismatch(output.unit, output.base, variable)
+            mismatch = _unit_mismatch(output.unit, output.base, variable)
             if mismatch:
                 self._fault(table, f"{source}: {mismatch}")
                 return
@@ -431,7 +425,7 @@ class Wiring:
         self._mentioned.add(port)
         if unit is None:
             return False
-        mismatch = unit_mismatch(unit, to_si_base(unit), variable)
+        mismatch = _unit_mismatch(unit, _to_si_base(unit), variable)
         if mismatch:
             self._fault(table, mismatch)
         elif mismatch is not None:

@@ -51,19 +51,6 @@ class LogColumn:
     unit: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LogInputValues:
-    """The values of an input that follows a log.
-
-    Attributes:
-        destination: The input.
-        values: Its value at every communication point, in the input's own unit, shape (points,).
-    """
-
-    destination: Port
-    values: NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A system that is ready to run.
@@ -73,7 +60,7 @@ class Plan:
         interfaces: The interface of each block's FMU, in the order of the blocks.
         links: The connections by scalars.
         starts: The start values, by block.
-        logged: The inputs from logs.
+        logged: Values of the inputs from logs at the communication points, in their units, shape (points,).
         order: The exchanges of a communication point.
         count: Number of communication steps: t_k = k step, k = 0 .. count.
         notes: Allowed, but worth a look.
@@ -83,7 +70,7 @@ class Plan:
     interfaces: Mapping[str, Interface]
     links: tuple[Link, ...]
     starts: Mapping[str, tuple[StartValue, ...]]
-    logged: tuple[LogInputValues, ...]
+    logged: Mapping[Port, NDArray[np.float64]]
     order: tuple[Exchange | Loop, ...]
     count: int
     notes: tuple[str, ...]
@@ -158,10 +145,10 @@ def prepare(
         )
     times = np.arange(count + 1, dtype=np.float64) * step
     inputs = {log_input.destination: log_input for log_input in system.inputs}
-    logged = tuple(
-        _values(inputs[port], columns[port], _variable(interfaces, port), times, faults)
+    logged = {
+        port: _values(inputs[port], columns[port], _variable(interfaces, port), times, faults)
         for port in wiring.logged
-    )
+    }
     order = _order(system, interfaces, wiring, faults)
     if faults and system.path.is_file():
         shipped = system.path.parent == SYSTEMS_FOLDER
@@ -239,9 +226,9 @@ def _values(
     variable: Variable,
     times: NDArray[np.float64],
     faults: list[Finding],
-) -> LogInputValues:
+) -> NDArray[np.float64]:
     """Return the values of a log at the communication points, at times in [s]."""
-    port, table = log_input.destination, f"inputs.{log_input.destination}"
+    table = f"inputs.{log_input.destination}"
     if log_input.interpolate and variable.type != "Real":
         message = f"interpolate: found for an {variable.type}, allowed: for a Real"
         faults.append(Finding(message, about=table))
@@ -249,13 +236,13 @@ def _values(
         rows = Table(column.t_ns, np.asarray(column.values)[:, None])
     except UrmpipeError as error:
         faults += _findings(table, error)
-        return LogInputValues(port, np.zeros(len(times)))
+        return np.zeros(len(times))
     reasons = map(variable.rejection_reason, np.unique(rows.values).tolist())
     if reason := next(filter(None, reasons), ""):
         faults.append(Finding(f"{log_input.log}, column {log_input.column}: {reason}", about=table))
     before, after, fraction = rows.rows_at(times)
     values = before[0] + fraction * (after[0] - before[0]) if log_input.interpolate else before[0]
-    return LogInputValues(port, np.ascontiguousarray(values))
+    return np.ascontiguousarray(values)
 
 
 def _order(
@@ -307,7 +294,7 @@ class JobBuilder:
         self._numbers = {name: i for i, name in enumerate(plan.interfaces)}
         self.recorded: dict[str, list[Port]] = {kind: [] for kind in TYPES}
         self._torn = [port for loop in plan.loops for port in loop.torn]
-        for port in (*(logged.destination for logged in plan.logged), *self._outputs()):
+        for port in (*plan.logged, *self._outputs()):
             self.recorded[plan.variable(port).type].append(port)
         recorded = {port: i for ports in self.recorded.values() for i, port in enumerate(ports)}
         connected = {port: recorded[source] for port, source in self._sources.items()}
@@ -404,10 +391,10 @@ class JobBuilder:
     def _logged(self) -> dict[str, NDArray[np.float64] | NDArray[np.int32]]:
         """Return the values from logs by type, shape (points, inputs)."""
         columns: dict[str, list[np.ndarray]] = {}
-        for logged in self._plan.logged:
-            kind = self._plan.variable(logged.destination).type
-            columns.setdefault(kind, []).append(logged.values.astype(DTYPES[kind]))
-        return {kind: np.column_stack(values) for kind, values in columns.items()}
+        for port, values in self._plan.logged.items():
+            kind = self._plan.variable(port).type
+            columns.setdefault(kind, []).append(values.astype(DTYPES[kind]))
+        return {kind: np.column_stack(arrays) for kind, arrays in columns.items()}
 
     def _start(self) -> dict[str, np.ndarray]:
         """Return the vectors at the start: torn inputs have the start values of their blocks."""

@@ -3,10 +3,10 @@
 `read_system` reads a system's TOML file in four steps; every error is collected with its table or key, from
 which `add_line_numbers` finds the line.
 
-1. Texts that name a file in the folder of the system file become its path (`resolve_paths`).
+1. Texts that name a file in the folder of the system file become its path (`_resolve_paths`).
 2. The arguments get their values: defaults from `[arguments]`, replaced by those of the caller
-   (`merge_arguments`).
-3. Each text `$name` is replaced by the argument of that name (`substitute_arguments`).
+   (`_merge_arguments`).
+3. Each text `$name` is replaced by the argument of that name (`_substitute_arguments`).
 4. The tables `system`, `blocks`, `connections`, `inputs` and `loops` are read (`_SystemReader`).
 """
 
@@ -202,12 +202,11 @@ def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     tables = read_toml(path, CosimulationError)
     faults: list[Finding] = []
     CheckedTable(tables, faults, None, key_in_about=True).table("arguments")  # reports what is no table
-    resolved = {key: resolve_paths(path.parent, tables.get(key, {})) for key in _WITH_PATHS}
+    resolved = {key: _resolve_paths(path.parent, tables.get(key, {})) for key in _WITH_PATHS}
     defaults = resolved["arguments"] if isinstance(resolved["arguments"], Mapping) else {}
-    values = merge_arguments(defaults, arguments or {}, faults, shipped=path.parent == SYSTEMS_FOLDER)
+    values = _merge_arguments(defaults, arguments or {}, faults, shipped=path.parent == SYSTEMS_FOLDER)
     tables = {key: value for key, value in {**tables, **resolved}.items() if key != "arguments"}
-    faults += find_unknown_arguments(tables, values)
-    system = _SystemReader(path, substitute_arguments(tables, values), faults).read()
+    system = _SystemReader(path, _substitute_arguments(tables, values, faults), faults).read()
     unusable = {name for name in system.by_name if _has_fault(f"blocks.{name}", faults)}
     placed_faults = add_line_numbers(path, str(name_or_path), faults) if faults else ()
     return replace(system, arguments=values, faults=placed_faults, unusable_blocks=frozenset(unusable))
@@ -230,58 +229,47 @@ def _has_fault(table: str, faults: list[Finding]) -> bool:
 
 
 _WITH_PATHS = ("arguments", "blocks", "inputs")  # tables whose texts may name files
-_NAME_KEYS = ("unit", "column")  # keys whose texts are names, also if a file has the same name
+_NAME_KEYS = {"unit", "column"}  # keys whose texts are names, also if a file has the same name
 
 
-def resolve_paths(folder: Path, value: Any) -> Any:
-    """Return a value in which each text that names a file of a folder is that file's path."""
-    if isinstance(value, str) and value and not value.startswith("$"):
-        path = folder / value
-        return str(path) if is_existing_file(path) else value
+def _resolve_paths(folder: Path, tables: Any) -> Any:
+    """Return tables in which each text that names a file of a folder is that file's path."""
+
+    def resolve(text: str, keys: tuple[str, ...]) -> str:
+        if not text or text.startswith("$") or not _NAME_KEYS.isdisjoint(keys):
+            return text
+        return str(folder / text) if is_existing_file(folder / text) else text
+
+    return _map_texts(resolve, tables)
+
+
+def _substitute_arguments(tables: Any, arguments: Mapping[str, Any], faults: list[Finding]) -> Any:
+    """Return tables in which each text `$name` is the argument of that name; unknown names are reported."""
+
+    def substitute(text: str, keys: tuple[str, ...]) -> Any:
+        if text.startswith("$") and text[1:] in arguments:
+            return arguments[text[1:]]
+        if text.startswith("$"):
+            unknown = format_unknown_name(text, (f"${name}" for name in arguments))
+            faults.append(Finding(f"{unknown} ([arguments] names them)", about=".".join(keys)))
+        return text
+
+    return _map_texts(substitute, tables)
+
+
+def _map_texts(function: Callable[[str, tuple[str, ...]], Any], value: Any, *keys: str) -> Any:
+    """Return tables and lists in which each text is replaced by a function of it and its keys."""
     if isinstance(value, Mapping):
-        return {
-            key: item if key in _NAME_KEYS else resolve_paths(folder, item) for key, item in value.items()
-        }
-    return _map_items(lambda item: resolve_paths(folder, item), value)
+        return {key: _map_texts(function, item, *keys, key) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_map_texts(function, item, *keys) for item in value]
+    return function(value, keys) if isinstance(value, str) else value
 
 
-def substitute_arguments(value: Any, arguments: Mapping[str, Any]) -> Any:
-    """Return a value in which each text `$name` is the argument of that name."""
-    if isinstance(value, str) and value[:1] == "$" and value[1:] in arguments:
-        return arguments[value[1:]]
-    return _map_items(lambda item: substitute_arguments(item, arguments), value)
-
-
-def _map_items(function: Callable[[Any], Any], value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: function(item) for key, item in value.items()}
-    return [function(item) for item in value] if isinstance(value, list) else value
-
-
-def find_unknown_arguments(value: Any, arguments: Mapping[str, Any], place: str = "") -> Iterator[Finding]:
-    """Yield an error for each text `$name` of a value without such an argument."""
-    if isinstance(value, str) and value[:1] == "$" and value[1:] not in arguments:
-        names = (f"${name}" for name in arguments)
-        yield Finding(f"{format_unknown_name(value, names)} ([arguments] names them)", about=place)
-    elif isinstance(value, Mapping):
-        for key, item in value.items():
-            yield from find_unknown_arguments(item, arguments, f"{place}.{key}" if place else str(key))
-    elif isinstance(value, list):
-        for item in value:
-            yield from find_unknown_arguments(item, arguments, place)
-
-
-def merge_arguments(
+def _merge_arguments(
     defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: list[Finding], shipped: bool = False
 ) -> dict[str, Any]:
-    """Return the arguments of a system: those of the caller, each of its default's type, else the defaults.
-
-    Args:
-        defaults: The table `[arguments]` of the file.
-        arguments: The caller's values, as texts.
-        faults: Errors are added here.
-        shipped: Whether the system is one of urmpipe.
-    """
+    """Return the defaults, with the caller's texts as values of their types instead; errors are added."""
     values = dict(defaults)
     for name, text in arguments.items():
         if name not in defaults:

@@ -25,7 +25,7 @@ from foreign_fmus import (
     planned,
     system,
 )
-from urmpipe_fmus.cosim import LogColumn, prepare
+from urmpipe_fmus.cosim import LogColumn, Port, prepare
 from urmpipe_fmus.cosim.checks import read_interface
 from urmpipe_models.errors import CosimulationError
 
@@ -235,7 +235,7 @@ def test_the_last_row_of_a_log_whose_times_are_rounded_to_nanoseconds_is_reached
     column = LogColumn(np.round(k / rate * 1e9).astype(np.int64), k.astype(np.float64))
     blocks = system({"a": gain()}, inputs=[follow("a.u")], step=1.0 / rate, duration=None)
     plan = prepare(blocks, fmu_of, column=lambda one: column)
-    assert plan.logged[0].values.tolist() == k.tolist()
+    assert plan.logged[Port("a", "u")].tolist() == k.tolist()
 
 
 def test_a_duration_that_is_no_multiple_of_the_step_ends_with_the_last_whole_one_and_is_told() -> None:
