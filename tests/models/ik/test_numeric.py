@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from ik_arms import joints_within, limited, planar
+from ik_arms import by_shorter_way, joints_within, limited, planar
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
@@ -31,8 +31,7 @@ from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
 
-MET = 1e-10
-"""What is promised by default in [m] and [rad], and what forward kinematics confirms."""
+MET = 1e-10  # what is promised by default in [m] and [rad], and what forward kinematics confirms
 
 
 def test_where_nothing_bends_each_step_is_what_was_foreseen_and_the_next_is_damped_an_eighth() -> None:
@@ -344,8 +343,7 @@ def test_the_least_motion_of_a_planar_arm_is_that_of_a_search_over_its_freedom()
     distances = []
     for sign in (1.0, -1.0):
         q2 = np.arctan2(y, x) - sign * q3 / 2 - q1
-        away = np.stack([q1, q2, sign * q3]) - home[:, None]
-        away -= 2 * math.pi * np.round(away / (2 * math.pi))
+        away = by_shorter_way(np.stack([q1, q2, sign * q3]) - home[:, None])
         distances.append(np.nanmin(np.square(away).sum(axis=0)))
     found = np.square(refined.q[0] - home).sum()
     np.testing.assert_allclose(found, min(distances), atol=1e-6)  # steps of 3e-4: their square

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from asserting import there
+from ik_arms import by_shorter_way
 from parallel_arms import EXACT, UR, WRISTS, apart, assert_every_solution_meets, form_of, poses, random_arm
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
@@ -210,7 +211,7 @@ def test_names_of_branches_do_not_depend_on_where_joints_count_from(wrist: str) 
         one = form_of(chain).solve(targets)
         other = form_of(with_other_zeros(chain, shift)).solve(targets)
         np.testing.assert_array_equal(other.reached, one.reached)
-        away = np.remainder(other.q + shift - one.q + math.pi, 2.0 * math.pi) - math.pi
+        away = by_shorter_way(other.q + shift - one.q)
         np.testing.assert_allclose(away[one.reached], 0.0, atol=1e-7)
 
 
@@ -221,7 +222,7 @@ def test_a_branch_keeps_its_name_along_a_path_between_singular_poses(wrist: str)
         chain = load_robot("ur5e") if wrist == "ur" else random_arm(rng, wrist)
         q = rng.uniform(-math.pi, math.pi, 6) + np.linspace(0.0, 1.0, 400)[:, None] * rng.uniform(-1, 1, 6)
         solutions = form_of(chain).solve(forward_targets(chain, q))
-        away = np.abs(np.remainder(solutions.q - q[:, None] + math.pi, 2.0 * math.pi) - math.pi).max(axis=2)
+        away = np.abs(by_shorter_way(solutions.q - q[:, None])).max(axis=2)
         column = np.where(solutions.reached, away, np.inf).argmin(axis=1)
         smallest = singularity_over_log(chain, q).smallest
         clear = np.minimum(smallest[1:], smallest[:-1]) > 0.01
@@ -255,7 +256,7 @@ def test_eaik_finds_as_many_solutions_and_the_same(wrist: str) -> None:
         solutions = form_of(chain).solve(targets)
         for row in range(15):
             theirs, mine = eaik_solutions(chain, targets, row), solutions.q[row][solutions.reached[row]]
-            away = np.abs(np.remainder(theirs[:, None] - mine + math.pi, 2 * math.pi) - math.pi).max(axis=2)
+            away = np.abs(by_shorter_way(theirs[:, None] - mine)).max(axis=2)
             assert (away.min(axis=1) < 1e-5).all()  # their root finder of general wrists leaves 1e-7
             short += len(mine) != len(theirs)
     assert short <= (2 if wrist == "parallel" else 0)  # there EAIK loses a pair of 8 now and then

@@ -19,14 +19,9 @@ from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.robots.catalogue import load_robot
 
-ROUNDING = 1e-9
-"""rad: what a closed form's 1e-12 become where the Jacobian's least singular value is 1e-3."""
-
-UR = np.array([0.3, -1.2, 1.4, -0.8, 1.2, 0.3])
-"""A pose in rad of a UR arm, its elbow and wrist bent."""
-
-BENT = np.array([0.3, 0.4, -0.5, 0.7, -0.4, 0.2])
-"""One of an arm with a spherical wrist."""
+ROUNDING = 1e-9  # rad: what a closed form's 1e-12 become where the Jacobian's least singular value is 1e-3
+UR = np.array([0.3, -1.2, 1.4, -0.8, 1.2, 0.3])  # a pose in rad of a UR arm, its elbow and wrist bent
+BENT = np.array([0.3, 0.4, -0.5, 0.7, -0.4, 0.2])  # one of an arm with a spherical wrist
 
 
 def line(first: FloatArray, last: FloatArray, count: int) -> FloatArray:

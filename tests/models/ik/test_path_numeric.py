@@ -30,8 +30,7 @@ from urmpipe_models.math3d import Transform, translation
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.wraps import repolarize
 
-NANOMETRE = 1e-9
-"""What the solver promises: targets are met within it."""
+NANOMETRE = 1e-9  # what the solver promises: targets are met within it
 
 
 @pytest.fixture(scope="module")
@@ -77,15 +76,11 @@ def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(
     assert not followed.shortfall.any()
     # rad a sample: 0.59 m/s are 3 mm, over singular values down to 0.07 m/rad and briefly less
     assert np.abs(np.diff(followed.q, axis=0)).max() < 0.015
-
-
-def test_the_demo_path_starts_in_the_calibration_pose(followed: JointPath) -> None:
-    # the path starts at its p7, to the nanometre that the file is written to, in a singular pose
-    np.testing.assert_allclose(followed.q[0], load_robot("urm6").start, rtol=0.0, atol=1e-15)
-
-
-def test_each_step_along_the_demo_path_is_least(followed: JointPath) -> None:
     assert_least_motion(followed, 0.01)
+    # it starts at p7 of the calibration, to the nanometre that the file is written to, in a singular pose;
+    # rad: the joints do not follow the rounding of the file there: 0.086 by least motion alone
+    np.testing.assert_allclose(followed.q[0], load_robot("urm6").start, rtol=0.0, atol=1e-15)
+    assert np.linalg.norm(np.diff(followed.q[:200], axis=0), axis=1).sum() < 0.06
 
 
 def test_the_distance_to_singular_poses_is_told_along_the_path(followed: JointPath) -> None:
@@ -128,11 +123,6 @@ def test_windows_of_other_sizes_give_the_same_motion(
     steps, expected = np.diff(path.q[1000:], axis=0), np.diff(followed.q[1000:count], axis=0)
     # rad: where the nanometre is just kept or not, lambda^2 is 1e-8 or 1e-9 m2 of steps of 4e-3 over sigma^2
     np.testing.assert_allclose(steps, expected, rtol=0.0, atol=2e-8)
-
-
-def test_at_the_singular_start_the_joints_do_not_follow_the_rounding_of_the_file(followed: JointPath) -> None:
-    # rad: 0.053 so; 0.086 by least motion alone, which steps by a nanometre over sigma
-    assert np.linalg.norm(np.diff(followed.q[:200], axis=0), axis=1).sum() < 0.06
 
 
 def test_joints_within_pi_are_unwrapped_by_the_repolarizer(

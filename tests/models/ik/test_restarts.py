@@ -31,8 +31,7 @@ from urmpipe_models.ik.solutions import (
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
 
-MET = 1.01e-10
-"""In [m] and [rad]: what is promised, and the rounding of the peer's rotation vector."""
+MET = 1.01e-10  # in [m] and [rad]: what is promised, and the rounding of the peer's rotation vector
 
 
 def assert_solved(chain: Chain, targets: Targets, solutions: Solutions) -> None:

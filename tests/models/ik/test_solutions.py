@@ -50,6 +50,7 @@ def test_the_nearest_solution_is_taken_by_the_shorter_way() -> None:
         found.nearest(start, np.array([TURN])), [[3.0 - TURN], [0.5 - TURN]], atol=1e-15
     )
     np.testing.assert_allclose(found.nearest(start, np.array([math.inf])), [[-1.0], [0.5]])
+    assert found.nearest_column(np.array([[2.0], [2.0]]), np.array([math.inf])).tolist() == [0, 1]  # one each
 
 
 def test_where_there_are_none_reasons_can_be_made_longer() -> None:
@@ -58,10 +59,6 @@ def test_where_there_are_none_reasons_can_be_made_longer() -> None:
     assert none.reasons.tolist() == [["short", "short"], ["", ""]]
     none.reasons[0] += ", and more"
     assert none.reasons.tolist() == [["short, and more"] * 2, ["", ""]]
-
-
-def test_each_target_can_have_a_start_of_its_own() -> None:
-    assert two_targets().nearest_column(np.array([[2.0], [2.0]]), np.array([math.inf])).tolist() == [0, 1]
 
 
 def test_what_is_picked_keeps_branch_reason_family_and_shortfall() -> None:
@@ -83,15 +80,11 @@ def test_a_target_without_solutions_has_each_reason_once() -> None:
     assert np.isnan(none.nearest(np.zeros(3), np.full(3, math.inf))).all()
 
 
-def test_four_digits_are_given_where_they_tell_the_numbers_apart() -> None:
+def test_four_digits_are_given_where_they_tell_the_numbers_apart_and_else_up_to_all() -> None:
     assert format_with_limits(2.71828, -3.14159, 1.0) == ("2.718", "-3.142", "1")
     assert format_with_limits(2.7000001, 2.7) == ("2.7000001", "2.7")
     assert format_with_limits(1.0 + 1e-9, 1.0, 1.0 + 2e-9) == ("1.000000001", "1", "1.000000002")
-
-
-def test_neighbours_are_told_apart_and_equal_ones_have_all_digits_of_a_double() -> None:
-    found = math.nextafter(0.1, 1.0)
-    assert format_with_limits(found, 0.1) == ("0.10000000000000002", "0.10000000000000001")
+    assert format_with_limits(math.nextafter(0.1, 1.0), 0.1) == ("0.10000000000000002", "0.10000000000000001")
     assert format_with_limits(0.1, 0.1) == ("0.10000000000000001", "0.10000000000000001")
 
 

@@ -18,8 +18,7 @@ from urmpipe_models.ik.solutions import SearchOptions, Solutions, Targets, forwa
 from urmpipe_models.ik.solve import Method, solve
 from urmpipe_models.robots.catalogue import load_robot
 
-MET = 1e-9
-"""What the iterative solver stops at; the closed forms are at 1e-12."""
+MET = 1e-9  # what the iterative solver stops at; the closed forms are at 1e-12
 
 
 def poses(chain: Chain, count: int, seed: int = 0) -> tuple[FloatArray, Targets]:
@@ -76,19 +75,14 @@ def test_a_joint_that_a_singular_pose_leaves_free_is_taken_from_the_start() -> N
     assert aligned.chosen.startswith("wrist_3_joint as near")
 
 
-def test_without_a_start_the_one_solution_is_near_the_start_of_the_robot() -> None:
-    chain = load_robot("ur5e")
-    targets = forward_targets(chain, np.array([chain.start]))
-    found = solve(chain, targets)
-    np.testing.assert_allclose(found.q[0, 0], chain.start, atol=1e-7)  # three singular families meet there
-
-
 def test_solutions_are_in_the_turn_nearest_to_the_start_that_the_limits_allow() -> None:
     chain = load_robot("ur5e")
     q, targets = poses(chain, 20)
     start = q + np.array([2.0 * math.pi, 0.0, 0.0, 0.0, 0.0, 2.0 * math.pi]) * np.where(q < 0.0, 1.0, -1.0)
     found = solve(chain, targets, start=start)
     np.testing.assert_allclose(found.q[:, 0], start, atol=1e-8)
+    home = np.array([chain.start])  # the start by default; three singular families meet there
+    np.testing.assert_allclose(solve(chain, forward_targets(chain, home)).q[0], home, atol=1e-7)
     beyond = solve(chain, targets, start=start + 4.0 * math.pi)
     assert_met(chain, targets, beyond)
     assert beyond.reached.all() and (beyond.q[:, 0] > -1e-9).all()  # the last turn that +-2 pi allows
@@ -115,18 +109,12 @@ def test_where_limits_refuse_the_choice_of_a_free_joint_they_choose(
         assert ((found.reasons != "") == ~found.reached).all()
         aligned = [one for one in found.singular if one.family == "wrist aligned"]
         assert aligned and (aligned[0].where & found.reached).any()
+        if start is None:
+            assert aligned[0].chosen.endswith(", or what the limits of the joints allow")
         distinct = np.round(found.q[0][found.reached[0]], 4)
         assert len(np.unique(distinct, axis=0)) == len(distinct)
     here = solve(chain, targets, start=np.array(q))
     np.testing.assert_allclose(here.q[0, 0], q, atol=1e-9)
-
-
-def test_limits_that_chose_a_free_joint_are_told() -> None:
-    chain = limited(load_robot("arm6"), -2.0, 2.0)
-    (aligned,) = solve(
-        chain, forward_targets(chain, np.array([[0.4, 0.6, 0.5, 1.2, 0.0, 1.8]])), every=True
-    ).singular
-    assert aligned.chosen.endswith(", or what the limits of the joints allow")
 
 
 def test_limits_leave_out_branches_and_say_which_joint() -> None:
@@ -261,20 +249,13 @@ def test_the_iterative_way_finds_what_the_closed_form_finds(name: str) -> None:
     assert iterative.branches == ("1",)
 
 
-def test_positions_alone_are_solved_iteratively() -> None:
-    chain = load_robot("ur5e")
-    _, targets = poses(chain, 10)
-    only = Targets(targets.position)
-    found = solve(chain, only)
-    assert found.reached.all()
-    assert_met(chain, only, found)
-
-
-def test_redundant_arms_are_solved_iteratively() -> None:
-    chain = load_robot("panda")
+@pytest.mark.parametrize(("name", "pose"), [("ur5e", False), ("panda", True)])
+def test_positions_and_redundant_arms_are_solved_iteratively(name: str, pose: bool) -> None:
+    chain = load_robot(name)
     _, targets = poses(chain, 5)
+    targets = targets if pose else Targets(targets.position)
     found = solve(chain, targets, search=SearchOptions(restarts=40))
-    assert found.reached.all() and found.q.shape == (5, 1, 7)
+    assert found.reached.all() and found.q.shape == (5, 1, len(chain.coordinates))
     assert_met(chain, targets, found)
 
 

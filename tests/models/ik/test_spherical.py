@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from asserting import there
+from ik_arms import by_shorter_way
 from spherical_arms import (
     SPECIAL,
     assert_explained,
@@ -175,16 +176,14 @@ def test_names_base_tool_and_zeros_change_no_branch(seed: int, special: str) -> 
     # away from where two solutions meet: there a rounding may part or unite them, or move the given digits
     clear = (one.reached.sum(axis=1) == two.reached.sum(axis=1)) & ~_crowded(chain, one.q)
     assert clear.sum() >= 10
-    away = one.q[clear] - zeros - two.q[clear]
-    away -= 2 * math.pi * np.round(away / (2 * math.pi))
+    away = by_shorter_way(one.q[clear] - zeros - two.q[clear])
     np.testing.assert_array_equal(one.reached[clear], two.reached[clear])
     np.testing.assert_allclose(away[one.reached[clear]], 0.0, atol=1e-7)
 
 
 def _crowded(chain: Chain, q: FloatArray) -> NDArray[np.bool_]:
     """Where two solutions of a target are nearer than 0.01 rad in every joint."""
-    away = q[:, :, None] - q[:, None]
-    away -= 2 * math.pi * np.round(away / (2 * math.pi))
+    away = by_shorter_way(q[:, :, None] - q[:, None])
     near = np.nan_to_num(np.abs(away).max(axis=3), nan=9.0) < 1e-2
     near[:, np.arange(q.shape[1]), np.arange(q.shape[1])] = False
     return np.asarray(near.any(axis=(1, 2)))
@@ -201,8 +200,7 @@ def test_an_elbow_joint_that_counts_the_other_way_changes_no_branch(special: str
     q = random_joints(generator, chain, 50)
     one, two = (inverse_of(arm).solve(forward_targets(chain, q)) for arm in (chain, other))
     np.testing.assert_array_equal(one.reached, two.reached)
-    away = one.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0] - two.q
-    away -= 2 * math.pi * np.round(away / (2 * math.pi))
+    away = by_shorter_way(one.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0] - two.q)
     np.testing.assert_allclose(away[one.reached], 0.0, rtol=0, atol=1e-7)
 
 
@@ -347,8 +345,7 @@ def assert_agreement(chain: Chain, q: FloatArray) -> None:
         pose[:3, :3] = there(targets.rotation)[row] @ found.rotation.T
         answer = peer.IK(pose)
         theirs = np.array(answer.Q)[~np.array(answer.is_LS, dtype=bool)]
-        away = ours[:, None] - theirs[None]
-        away -= 2 * math.pi * np.round(away / (2 * math.pi))
+        away = by_shorter_way(ours[:, None] - theirs[None])
         distance = np.abs(away).max(axis=2)
         assert len(ours) == len(theirs)
         assert distance.min(axis=0).max() < AGREEMENT

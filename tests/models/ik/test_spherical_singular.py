@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from urmpipe_models.robots.catalogue import load_robot
 
 ARM = load_robot("arm6")
 FORM = inverse_of(ARM)
+DISTANCES = [10.0**-k for k in range(3, 13)]  # rad
 
 ELBOW = math.atan2(20.0, 130.0) - math.pi
 """theta3 of arm6 where the forearm, 20 mm across and 130 mm along, is in line with the upper arm."""
@@ -141,7 +143,7 @@ def test_all_three_families_at_once() -> None:
     assert solutions.reached[0].tolist() == [True, True, False, False] * 2
 
 
-@pytest.mark.parametrize("distance", [10.0**-k for k in range(3, 13)])
+@pytest.mark.parametrize("distance", DISTANCES)
 def test_just_beside_a_singular_pose_every_solution_still_reaches(distance: float) -> None:
     generator = np.random.default_rng(4)
     rows = []
@@ -162,7 +164,7 @@ def test_just_beside_a_singular_pose_every_solution_still_reaches(distance: floa
     assert solutions.reached.any(axis=1).all()
 
 
-@pytest.mark.parametrize("distance", [10.0**-k for k in range(3, 13)])
+@pytest.mark.parametrize("distance", DISTANCES)
 def test_just_beside_an_aligned_wrist_of_an_arm_askew_every_solution_still_reaches(distance: float) -> None:
     """Axes along no axis of the world: what is nearly along one is no small coordinate."""
     generator = np.random.default_rng(15)
@@ -173,23 +175,27 @@ def test_just_beside_an_aligned_wrist_of_an_arm_askew_every_solution_still_reach
     assert solutions.reached.any(axis=1).all()
 
 
-def with_offset_shoulder() -> Chain:
-    """An arm whose plane passes axis 1 by 0.15 m, on its base."""
-    rows = [
-        DHRow(d=0.4, a=0.05, alpha=math.pi / 2),
-        DHRow(d=0.15, a=0.5),
-        DHRow(a=0.02, alpha=math.pi / 2),
-        DHRow(d=0.4, alpha=-math.pi / 2),
-        DHRow(alpha=math.pi / 2),
-        DHRow(d=0.1),
-    ]
-    return dh_chain("offset", rows)
+def articulated(d: tuple[float, ...], a: tuple[float, ...], slide: float | None = None) -> Chain:
+    """An arm by d1 to d6 and a1 to a3 in [m]; joint 3 slides where its alpha is given in [rad]."""
+    right = math.pi / 2
+    twists = (
+        (right, 0.0, right, -right, right, 0.0)
+        if slide is None
+        else (-right, right, slide, -right, right, 0.0)
+    )
+    rows = [DHRow(d=d[k], a=(*a, 0.0, 0.0, 0.0)[k], alpha=twists[k]) for k in range(6)]
+    if slide is not None:
+        rows[2] = replace(rows[2], kind="prismatic")
+    return dh_chain("articulated", rows)
 
 
-@pytest.mark.parametrize("distance", [0.0, *(10.0**-k for k in range(3, 13))])
+OFFSET_SHOULDER = articulated((0.4, 0.15, 0.0, 0.4, 0.0, 0.1), (0.05, 0.5, 0.02))  # 0.15 m from axis 1
+
+
+@pytest.mark.parametrize("distance", [0.0, *DISTANCES])
 def test_beside_where_right_and_left_meet(distance: float) -> None:
     """The wrist of an arm with an offset shoulder is no farther from axis 1 than the offset."""
-    chain = with_offset_shoulder()
+    chain = OFFSET_SHOULDER
     generator = np.random.default_rng(5)
     q = generator.uniform(-3.0, 3.0, (40, 6))
     x = 0.5 + 0.02 * np.cos(q[:, 2]) + 0.4 * np.sin(q[:, 2])
@@ -213,7 +219,7 @@ def test_beside_where_right_and_left_meet(distance: float) -> None:
 
 
 def test_a_wrist_nearer_to_axis_1_than_the_offset_is_told_with_figures() -> None:
-    chain = with_offset_shoulder()
+    chain = OFFSET_SHOULDER
     targets = forward_targets(chain, np.zeros((1, 6)))
     targets.position[0] = there(targets.rotation)[0] @ np.array([0.0, 0.0, 0.1]) + np.array([0.03, 0.04, 0.6])
     solutions = inverse_of(chain).solve(targets)
@@ -231,55 +237,29 @@ def test_a_wrist_nearer_to_axis_1_than_the_offset_is_told_with_figures() -> None
 )
 def test_a_wrist_out_of_reach_of_the_links_is_told_from_axis_2(distance: float, said: str) -> None:
     """Links of 0.5 and 0.4 m in a plane 0.15 m beside axis 1; as many digits as tell the figures apart."""
-    rows = [
-        DHRow(d=0.4, alpha=math.pi / 2),
-        DHRow(d=0.15, a=0.5),
-        DHRow(alpha=math.pi / 2),
-        DHRow(d=0.4, alpha=-math.pi / 2),
-        DHRow(alpha=math.pi / 2),
-        DHRow(),
-    ]
+    chain = articulated((0.4, 0.15, 0.0, 0.4, 0.0, 0.0), (0.0, 0.5, 0.0))
     places = [
         [math.hypot(0.15, distance), 0.0, 0.4],
         [math.hypot(0.15, 0.6 * distance), 0.0, 0.4 + 0.8 * distance],
     ]
-    found = inverse_of(dh_chain("beside", rows)).solve(
-        Targets(np.array(places), np.tile(np.eye(3), (2, 1, 1)))
-    )
+    found = inverse_of(chain).solve(Targets(np.array(places), np.tile(np.eye(3), (2, 1, 1))))
     assert [found.reason(0), found.reason(1)] == [f"the wrist centre is {said}"] * 2
 
 
 def test_a_wrist_nearer_than_a_slide_can_draw_it_is_told_with_figures() -> None:
     """The slide passes the point where axes 1 and 2 meet."""
-    rows = [
-        DHRow(d=0.4, alpha=-math.pi / 2),
-        DHRow(d=0.15, a=0.1, alpha=math.pi / 2),
-        DHRow(kind="prismatic", a=0.05, alpha=0.3),
-        DHRow(d=0.1, alpha=-math.pi / 2),
-        DHRow(alpha=math.pi / 2),
-        DHRow(),
-    ]
+    chain = articulated((0.4, 0.15, 0.0, 0.1, 0.0, 0.0), (0.0, 0.1, 0.05), slide=0.3)
     # the slide draws the wrist along z of joint 3; across it stand 0.1 + 0.05 and 0.15 less 0.1 sin 0.3
     least = math.hypot(0.1 + 0.05, 0.15 - 0.1 * math.sin(0.3))
     target = Targets(np.array([[0.16, 0.0, 0.4]]), np.eye(3)[None])
-    found = inverse_of(dh_chain("polar", rows)).solve(target).reason(0)
+    found = inverse_of(chain).solve(target).reason(0)
     where = "from the point where axes 1 and 2 meet"
     assert found == f"the wrist centre is 0.160 m {where}, allowed: {least:.3f} m or more"
 
 
 def test_wrist_on_axis_2_leaves_joint_2() -> None:
     """Upper arm and forearm of one length, folded: joint 2 turns the wrist on the spot."""
-    chain = dh_chain(
-        "folded",
-        [
-            DHRow(d=0.4, a=0.1, alpha=math.pi / 2),
-            DHRow(a=0.5),
-            DHRow(alpha=math.pi / 2),
-            DHRow(d=0.5, alpha=-math.pi / 2),
-            DHRow(alpha=math.pi / 2),
-            DHRow(d=0.1),
-        ],
-    )
+    chain = articulated((0.4, 0.0, 0.0, 0.5, 0.0, 0.1), (0.1, 0.5, 0.0))
     q = np.array([[0.3, 0.8, -math.pi / 2, 0.4, 0.7, 0.1]])
     solutions = solved(chain, q)
     found = families(solutions)
@@ -291,7 +271,7 @@ def test_wrist_on_axis_2_leaves_joint_2() -> None:
     assert away_from(chain, near, q).min() < 1e-7
 
 
-@pytest.mark.parametrize("distance", [0.0, *(10.0**-k for k in range(3, 13))])
+@pytest.mark.parametrize("distance", [0.0, *DISTANCES])
 def test_beside_where_the_flips_of_a_wrist_that_is_not_square_meet(distance: float) -> None:
     generator = np.random.default_rng(8)
     chain = random_arm(generator, "like a PUMA", "RRR", alpha4=0.5, alpha5=-0.8, theta5=0.0)
