@@ -373,8 +373,7 @@ def max_stable_step(chain: Chain) -> float:
 def _joint_matrix(drive: JointDrive, inverse_inertia: float) -> FloatArray:
     """Return the matrix of the linear motion of q, q', theta1, theta1', i_a of a joint, by its 1 / J."""
     if isinstance(drive, PassiveJoint):
-        row = [-drive.stiffness * inverse_inertia, -drive.damping * inverse_inertia]
-        return np.array([[0.0, 1.0], row])
+        return np.array([[0.0, 1.0], [-drive.stiffness * inverse_inertia, -drive.damping * inverse_inertia]])
     k, damping, ratio, constant, resistance, inductance, inertia = drive.drive
     torque = np.array([-k, -damping, k, damping, 0.0])
     spring = np.array([-drive.spring.stiffness, 0.0, 0.0, 0.0, 0.0])

@@ -492,10 +492,9 @@ def joint_limited_law(joints: PathJoints, speed: float = np.inf, tangential: flo
         speed: Additional maximum s' in [m/s]; infinity for none.
         tangential: Additional maximum s'' in [m/s2]; infinity for none.
     """
-    path, stops = joints.path, joints.path.stops
-    if path.orientation is not None:
-        stops = np.append(stops, path.at[path.orientation.uneven_rows])
-    stop = np.isin(joints.s, stops)
+    path = joints.path
+    uneven = () if path.orientation is None else path.at[path.orientation.uneven_rows]
+    stop = np.isin(joints.s, np.append(path.stops, uneven))
     stop[joints.rate_steps] = True
     limits = _arm_limits(joints.chain, speed, tangential)
     return time_optimal_law(joints.s, joints.after, joints.before, stop, limits)

@@ -267,3 +267,4 @@ def test_an_arm_without_masses_says_which_key_is_missing() -> None:
     ]  # fmt: skip
     for function, count in functions:
         assert refusal(RobotError, function, chain, *[still] * count) == message
+    assert refusal(RobotError, mass_matrix, replace(chain, mass_faults=("no mass",)), still) == "no mass"

@@ -1,4 +1,4 @@
-"""The stability of sampled controllers against closed forms; tests/fmus holds it against the unit."""
+"""Driven arms at rest: equilibrium, and the stability of sampled controllers against closed forms."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from made_masses import driven
+from made_masses import driven, with_drives, with_masses
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.drives import CounterbalanceSpring, DrivenJoint, Gains, PassiveJoint
-from urmpipe_models.dynamics.driven_arm import spectral_radius
+from urmpipe_models.dynamics.driven_arm import (
+    ArmState,
+    Motor,
+    Spring,
+    find_equilibrium,
+    joint_accelerations,
+    motor_derivatives,
+    spectral_radius,
+)
+from urmpipe_models.dynamics.links import Wrench
+from urmpipe_models.robots.catalogue import load_robot
 
 PERIOD = 5e-3
 MASS, RADIUS = 2.0, 0.5
@@ -18,6 +28,21 @@ GRAVITY = 9.81
 
 EXACT = 1e-7
 """Of values of about 1: eigenvalues of rates up to 1e3 / s; differences of gravity, 1e-16 / 1e-5."""
+
+
+@pytest.mark.parametrize("wrench", [None, Wrench((3.0, 2.0, -1.0), (0.1, 0.2, 0.3))])
+def test_nothing_accelerates_in_equilibrium(wrench: Wrench | None) -> None:
+    chain = with_drives(with_masses(load_robot("urm6")), held=("phi5",))
+    joints = find_equilibrium(chain, wrench)
+    actuators = [
+        Spring(drive.stiffness, drive.damping, joint.rest)
+        if isinstance(drive, PassiveJoint)
+        else Motor(drive.drive, joint.rest, 0.0, joint.current, joint.voltage)
+        for drive, joint in zip(chain.drives, joints, strict=True)
+    ]
+    state = ArmState([joint.q for joint in joints], [0.0] * 6, actuators)
+    rates = [*joint_accelerations(chain, state, wrench), *np.ravel([*motor_derivatives(state).values()])]
+    np.testing.assert_allclose(rates, 0.0, atol=1e-8)  # equilibrium to 1e-12 rad by 2500 N.m/rad over M
 
 
 def two_slides(held: PassiveJoint, *periods: float) -> Chain:

@@ -25,7 +25,11 @@ from urmpipe_models.math3d import from_offset
 QUICK = {1: (2, 11, 14), 2: (2, 8), 3: (2, 8, 19), 4: (19,)}
 """Seeds of arms by their number of coordinates."""
 
-CASES = [(count, seed) for count, seeds in QUICK.items() for seed in seeds]
+CASES = [
+    pytest.param(count, seed, marks=pytest.mark.slow if count > 1 else ())
+    for count, seeds in QUICK.items()
+    for seed in seeds
+]
 
 
 def seeded_arm(count: int, seed: int) -> Chain:
@@ -60,7 +64,6 @@ def test_the_arms_turn_slide_follow_and_have_parallel_axes_and_others() -> None:
     assert len(parallel) - parallel.count(0) >= 3
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("count", "seed"), CASES)
 def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
     count: int, seed: int, tmp_path: Path
@@ -120,7 +123,6 @@ def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -
     assert weights @ powers == pytest.approx(energy(2.0) - energy(0.0), abs=1e-11 * scale)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("count", "seed"), CASES)
 def test_the_reduction_adds_no_operation(count: int, seed: int) -> None:
     for one in seeded_form(count, seed).costs:

@@ -248,8 +248,7 @@ def test_a_joint_without_room_gives_no_freedom() -> None:
     assert (np.abs(found.dq[:, :3]).max(axis=0) > 0.1).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ["poses", pytest.param("positions", marks=pytest.mark.slow)])
 def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
     """Also where s'' steps, in the middle of an interval: by five times as many places as the grid has."""
     joints = limited(case, 1.0, 2.0)

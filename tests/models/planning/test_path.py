@@ -16,7 +16,7 @@ from random_paths import by_first_points, corner_rows
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError, PathError
 from urmpipe_models.math3d import angle_between, from_offset, to_matrices, to_quaternions
-from urmpipe_models.planning.from_rows import rows_to_path
+from urmpipe_models.planning.from_rows import rows_to_path, validate_rows
 from urmpipe_models.planning.path import PLANES, LineArcPath, PathRows, cube_rows
 
 some = settings(max_examples=40)
@@ -36,6 +36,7 @@ def test_the_papers_contour() -> None:
     """Five lines and four arcs that close; lengths after errata of the paper."""
     path = rows_to_path(PathRows(np.array(CONTOUR), 0.03))
     assert path.kinds == ["line", "arc"] * 4 + ["line"]
+    assert len(path) == 9
     arc = 0.015 * np.pi
     np.testing.assert_allclose(path.length, [0.27, arc, 0.54, arc, 0.54, arc, 0.54, arc, 0.27], atol=ROUNDING)
     assert path.total == pytest.approx(2.348496, abs=5e-7)  # the printed digits
@@ -237,8 +238,10 @@ def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[floa
 
 
 def faults(points: Sequence[Sequence[float]], radius: Sequence[float], corner: bool = False) -> list[str]:
+    rows = PathRows(points, radius, corner=corner)
     with pytest.raises(PathError) as raised:
-        rows_to_path(PathRows(np.array(points, dtype=float), np.array(radius), corner=corner))
+        rows_to_path(rows)
+    assert list(raised.value.findings) == validate_rows(rows)
     return [str(one) for one in raised.value.findings]
 
 
