@@ -492,50 +492,30 @@ def test_four_steps_on_either_side_tell_how_fast_the_joint_moves(offset: int) ->
     assert beside_a_wrap(MIN_DISTANCE_RATIO * 16.0, slower, {STILL + offset: 32.0}) == [STILL] * (not counts)
 
 
-def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
-    q = np.array([-508.0, -508.0, -508.0, 508.0, 512.0 - 33.0, -508.0, -508.0, -508.0])
-    x = q + 1024.0 * np.array([1, 1, 1, 0, 0, 1, 1, 1])
-    # the joint goes 8 a sample there: 33 is more than four times that
-    assert find(q, x, None, 3, 5) == [4]
-
-
-def test_a_sample_with_a_wrap_on_either_side_is_none() -> None:
-    """It goes over the limit and comes back, or goes two turns on."""
-    for after, turns in ((16.0, 0), (2048.0, -2)):  # between its neighbours, and far off their line
-        q = np.array([0.0, 0.0, after / 2.0 - 200.0 * (turns != 0), after, after])
-        x = q + 1024.0 * np.array([0, 0, -1, turns, turns])
-        assert find(q, x, None, 2, 3) == []
-    q = np.array([-508.0, -508.0, 300.0, 508.0, 508.0])
-    x = q + 1024.0 * np.array([0, 0, 0, -1, -1])
-    assert find(q, x, None, 3) == [2]
-
-
-def test_a_wrap_that_comes_late_is_clean() -> None:
-    """A file of a little more than a period: it goes back by more than one, and noise brings it on again."""
-    q = np.array([520.0, 520.0, 520.0, -516.0, -504.0, -504.0, -504.0])
-    x = q + 1024.0 * np.array([0, 0, 0, 1, 1, 1, 1])
-    assert find(q, x, None, 3) == []
-
-
-def test_the_second_sample_is_told_by_the_first() -> None:
-    """It stands 100 off the line; the first step is the motion around the next one, 100 a sample."""
-    q = np.array([508.0, 408.0, -516.0, -516.0, -516.0])
-    x = q + 1024.0 * np.array([0, 0, 1, 1, 1])
-    assert find(q, x, None, 2) == [1]
-    q = np.array([8.0, 508.0, 508.0, 408.0, -516.0, -516.0, -516.0, -516.0])
-    x = q + 1024.0 * np.array([0, 0, 0, 0, 1, 1, 1, 1])
-    assert find(q, x, None, 4) == []
-    assert find(q[1:], x[1:], None, 3) == [2]
-
-
-def test_the_first_and_the_last_sample_have_no_neighbours_at_the_other_end() -> None:
-    """Between the last sample and the second stands the first; the last but one is told by the last."""
-    q = np.array([300.0, -516.0, -516.0, -516.0, -516.0, -516.0, -516.0, 508.0])
-    x = np.r_[300.0, np.full(7, 508.0)]
-    assert find(q, x, None, 1, 7) == []
-    q = np.r_[np.full(6, 508.0), 300.0, -516.0]
-    x = np.r_[np.full(6, 508.0), 300.0, 508.0]
-    assert find(q, x, None, 7) == [6]
+@pytest.mark.parametrize(
+    ("q", "turns", "wraps", "samples"),
+    [
+        # a wrap leads to its neighbour: the joint moves 8 per sample there, 33 is more than four times that
+        ([-508, -508, -508, 508, 512 - 33, -508, -508, -508], [1, 1, 1, 0, 0, 1, 1, 1], [3, 5], [4]),
+        # a wrap on either side: over the limit and back, or two turns; then one wrap alone
+        ([0, 0, 8, 16, 16], [0, 0, -1, 0, 0], [2, 3], []),
+        ([0, 0, 824, 2048, 2048], [0, 0, -1, -2, -2], [2, 3], []),
+        ([-508, -508, 300, 508, 508], [0, 0, 0, -1, -1], [3], [2]),
+        # a late wrap is clean: the log covers a little more than a period, and noise continues it
+        ([520, 520, 520, -516, -504, -504, -504], [0, 0, 0, 1, 1, 1, 1], [3], []),
+        # the second sample is 100 off the line; so is the first step, if there is a step before
+        ([508, 408, -516, -516, -516], [0, 0, 1, 1, 1], [2], [1]),
+        ([8, 508, 508, 408, -516, -516, -516, -516], [0, 0, 0, 0, 1, 1, 1, 1], [4], []),
+        ([508, 508, 408, -516, -516, -516, -516], [0, 0, 0, 1, 1, 1, 1], [3], [2]),
+        # first and last sample have no neighbour; the last but one is judged by the last
+        ([300, -516, -516, -516, -516, -516, -516, 508], [0, 1, 1, 1, 1, 1, 1, 0], [1, 7], []),
+        ([508, 508, 508, 508, 508, 508, 300, -516], [0, 0, 0, 0, 0, 0, 0, 1], [7], [6]),
+    ],
+)
+def test_only_a_sample_between_neighbours_and_far_off_their_line_is_found(
+    q: list[float], turns: list[int], wraps: list[int], samples: list[int]
+) -> None:
+    assert find(q, np.array(q) + 1024.0 * np.array(turns), None, *wraps) == samples
 
 
 def test_what_can_be_perceived_is_more_than_a_share_of_the_period() -> None:
@@ -600,23 +580,24 @@ def test_continuous_vectors_are_the_same_rotations(vectors: list[tuple[float, ..
     np.testing.assert_allclose(same, 1.0, rtol=0, atol=1e-12)
 
 
-def test_a_flip_at_pi_is_undone_and_a_rest_keeps_its_axis() -> None:
-    v = np.array([[0.0, 0.0, 3.1], [0.0, 0.0, -3.1], [np.nan] * 3, [0.0, 0.0, -0.1], [0.0, 0.0, 0.0]])
-    full = 2 * np.pi
-    expected = [[0, 0, 3.1], [0, 0, full - 3.1], [np.nan] * 3, [0, 0, full - 0.1], [0, 0, full]]
-    np.testing.assert_allclose(unwrap_rotation_vectors(v), expected, rtol=0, atol=2e-15)
+FULL = 2 * np.pi
 
 
-def test_a_record_that_begins_with_rests_goes_on_about_the_first_axis_that_there_is() -> None:
-    v = np.array([[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0, 3.0 - 2 * np.pi, 0.0], [0.0] * 3])
-    expected = [[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0, 3.0, 0.0], [0.0] * 3]
-    np.testing.assert_allclose(unwrap_rotation_vectors(v), expected, rtol=0, atol=1e-15)
-
-
-def test_a_vector_goes_on_by_a_turn_though_none_of_its_components_is_large() -> None:
-    """From (1, 1, 1) to (-1, -1, -1): two square roots of 3 back, or a turn less so much on."""
-    v = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0]])
-    expected = [[1.0] * 3, [2 * np.pi / np.sqrt(3.0) - 1.0] * 3]
+@pytest.mark.parametrize(
+    ("recorded", "expected"),
+    [
+        # a flip at pi, a missing sample, and a rest, which keeps its axis
+        ([[0, 0, 3.1], [0, 0, -3.1], [np.nan] * 3, [0, 0, -0.1], [0, 0, 0]],
+         [[0, 0, 3.1], [0, 0, FULL - 3.1], [np.nan] * 3, [0, 0, FULL - 0.1], [0, 0, FULL]]),
+        # a log that begins with rests: the first axis counts
+        ([[0] * 3, [0] * 3, [0, 3, 0], [0, 3 - FULL, 0], [0] * 3],
+         [[0] * 3, [0] * 3, [0, 3, 0], [0, 3, 0], [0] * 3]),
+        # none of its components is large: two square roots of 3 back, or a turn less that
+        ([[1.0] * 3, [-1.0] * 3], [[1.0] * 3, [FULL / np.sqrt(3.0) - 1.0] * 3]),
+    ],
+)  # fmt: skip
+def test_vectors_continue_by_whole_turns(recorded: list[list[float]], expected: list[list[float]]) -> None:
+    v = np.array(recorded, dtype=float)
     np.testing.assert_allclose(unwrap_rotation_vectors(v), expected, rtol=0, atol=1e-15)
 
 
