@@ -30,6 +30,7 @@ from urmpipe_models.ik.task import column_squares, dot_product, product, transpo
 from urmpipe_models.math3d import Transform, to_quaternions, to_rotation_vectors
 from urmpipe_models.networks.joint_motion import (
     MEASURED_QUANTITIES,
+    ElementMeasurement,
     Twists,
     constraint_twists,
     joint_frame,
@@ -40,6 +41,7 @@ from urmpipe_models.networks.joint_motion import (
     wrap_rotation_vector,
 )
 from urmpipe_models.networks.mechanism import (
+    Configuration,
     Mechanism,
     Placements,
     Pose,
@@ -61,6 +63,32 @@ TRANSLATION_SCREWS: Twists = [  # twists (w, v) of a body that translates along 
     ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 ]
+
+
+class MechanismState(NamedTuple):
+    """A mechanism at a configuration: variables, poses of bodies, values of controls with gradients."""
+
+    mechanism: Mechanism
+    x: Configuration
+    placements: Placements
+    controls: dict[str, ValueWithGradient]
+
+    def joint_values(self, joint: Joint) -> list[ValueWithGradient]:
+        """Return the value of each variable of a joint; of a user joint the entries of m, n and a."""
+        return self.mechanism.joint_values(joint, self.x, self.controls)
+
+    def joint_elements(self, joint: Joint) -> list[Element]:
+        """Return the same without gradients."""
+        return [value.value for value in self.joint_values(joint)]
+
+    def measure(self, element: ConstraintElement) -> ElementMeasurement:
+        """Return what an element that is no pair measures between its bodies."""
+        return measure_element(element, *(self.placements.bodies[name].frame for name in element.bodies))
+
+
+def evaluate_state(mechanism: Mechanism, x: Configuration) -> MechanismState:
+    """Return a mechanism at a configuration of any elements."""
+    return MechanismState(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
 
 
 # ---------------------------------------------------------------------------------------- residual, Jacobian
@@ -106,12 +134,11 @@ class _Equation(NamedTuple):
 
 def evaluate_closure(mechanism: Mechanism, x: FloatArray) -> Closure:
     """Return residual and Jacobian at configurations x, shape (variables, n), in [m] and [rad]."""
-    n = x.shape[1]
-    posed, controls = mechanism.placements(x), mechanism.control_values(x)
-    twists = _mover_twists(mechanism, x, posed, controls)
+    n, state = x.shape[1], evaluate_state(mechanism, x)
+    twists = _mover_twists(state, n)
     residual = np.zeros((mechanism.rows, n))
     jacobian = np.zeros((mechanism.rows, len(mechanism.variables), n))
-    for equation in _equations(mechanism, x, posed, controls):
+    for equation in _equations(state, n):
         residual[equation.rows] = equation.residual
         for mover, sign in equation.movers.items():
             places, mover_twists = twists[mover]
@@ -130,33 +157,27 @@ def evaluate_scaled_closure(mechanism: Mechanism, x: FloatArray) -> Closure:
     return Closure(closure.residual * rows, closure.jacobian * scales)
 
 
-def _equations(
-    mechanism: Mechanism, x: FloatArray, posed: Placements, controls: dict[str, ValueWithGradient]
-) -> Iterator[_Equation]:
+def _equations(state: MechanismState, n: int) -> Iterator[_Equation]:
     """Yield the equations of each cut joint, then of each element."""
-    n = x.shape[1]
+    mechanism, bodies = state.mechanism, state.placements.bodies
     for k, cut in enumerate(mechanism.graph.cuts):
         joint = mechanism.network.joints[cut]
-        moved = joint_frame(joint, [value.value for value in mechanism.joint_values(joint, x, controls)])
-        expected = posed.joints[joint.name] @ moved
-        body = posed.bodies[joint.bodies[1]].frame
-        error = pose_error(expected.inverse() @ body @ joint.frames[1], n)
-        movers = relative_movers(posed.bodies, joint.bodies, joint.name)
+        expected = state.placements.joints[joint.name] @ joint_frame(joint, state.joint_elements(joint))
+        error = pose_error(expected.inverse() @ bodies[joint.bodies[1]].frame @ joint.frames[1], n)
+        movers = relative_movers(bodies, joint.bodies, joint.name)
         yield _Equation(slice(6 * k, 6 * k + 6), error, _pose_twist_map(expected, error), movers, {}, {})
     for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
         rows = slice(row, row + 1)
         if element.is_pair:
-            pair, rates = mechanism.pair_error(element, x, controls)
+            pair, rates = mechanism.pair_error(element, state.x, state.controls)
             slopes = {place: -slope for place, slope in pair.gradient.items()}
             residual, no_wrench = stack_elements((pair.value,), n), np.zeros((1, 6, n))
             yield _Equation(rows, residual, no_wrench, {}, slopes, rates)
             continue
-        length = evaluate_expression(element.length, controls)
-        measured = measure_element(element, *(posed.bodies[name].frame for name in element.bodies))
+        measured, length = state.measure(element), evaluate_expression(element.length, state.controls)
         wrench = stack_elements((*measured.moment, *measured.force), n)[np.newaxis]
         excess = stack_elements((measured.distance - length.value,), n)
-        movers = relative_movers(posed.bodies, element.bodies)
-        yield _Equation(rows, excess, wrench, movers, length.gradient, {})
+        yield _Equation(rows, excess, wrench, relative_movers(bodies, element.bodies), length.gradient, {})
 
 
 def pose_error(error: Transform, n: int) -> FloatArray:
@@ -190,25 +211,23 @@ def relative_movers(posed: dict[str, Pose], bodies: tuple[str, str], cut: str = 
     return {name: sign for name, sign in signs.items() if sign}
 
 
-def _mover_twists(
-    mechanism: Mechanism, x: FloatArray, posed: Placements, controls: dict[str, ValueWithGradient]
-) -> dict[str, tuple[IndexArray, FloatArray]]:
+def _mover_twists(state: MechanismState, n: int) -> dict[str, tuple[IndexArray, FloatArray]]:
     """Return of each joint and free body the numbers of the variables that move it, and their twists.
 
     A twist is the angular velocity in [rad] and the velocity in [m] of the point at the ground's origin, per
     unit of the variable, shape (6, k, n).
     """
-    n = x.shape[1]
+    mechanism, x, placements, _ = state
     twists = {}
     for joint in mechanism.network.joints:
-        values = mechanism.joint_values(joint, x, controls)
-        screws = joint_twists(joint, [value.value for value in values], posed.joints[joint.name])
+        values = state.joint_values(joint)
+        screws = joint_twists(joint, [value.value for value in values], placements.joints[joint.name])
         twists[joint.name] = _twists_by_variable(screws, values, n)
     for name in mechanism.graph.roots[1:]:
         first = mechanism.variable_index[name, 0]
         values = [ValueWithGradient(None, {first + k: 1.0}) for k in range(6)]
         vector = (x[first + 3], x[first + 4], x[first + 5])
-        p = posed.bodies[name].frame.translation
+        p = placements.bodies[name].frame.translation
         turning = [(axis, cross(p, axis)) for axis in left_jacobian(vector)]
         twists[name] = _twists_by_variable([*TRANSLATION_SCREWS, *turning], values, n)
     return twists
@@ -244,13 +263,12 @@ def iter_release_columns(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[
     The column [-] is scaled by `row_scales` and `column_scales`, shape (rows,). The variables x have the
     shape (variables,), in [m], [rad] and as controls are given.
     """
-    at = x[:, np.newaxis]
-    posed, controls = mechanism.placements(at), mechanism.control_values(at)
-    equations = list(_equations(mechanism, at, posed, controls))
+    state = evaluate_state(mechanism, x[:, np.newaxis])
+    equations = list(_equations(state, 1))
     for joint in mechanism.network.joints:
-        values = [value.value for value in mechanism.joint_values(joint, at, controls)]
+        values, frame = state.joint_elements(joint), state.placements.joints[joint.name]
         driven = iter([k for k, drive in enumerate(joint.drives) if drive is not None])
-        for constraint, unit, (w, v) in constraint_twists(joint, values, posed.joints[joint.name]):
+        for constraint, unit, (w, v) in constraint_twists(joint, values, frame):
             size = mechanism.length if unit == "m" else 1.0
             twist = stack_elements((*w, *v), 1)[:, 0] * size
             column = np.zeros(mechanism.rows)
@@ -270,10 +288,10 @@ def body_twists(mechanism: Mechanism, x: FloatArray) -> dict[str, FloatArray]:
     Angular velocity in [rad], then the velocity in [m] of the point at the origin of the ground. The
     variables x have the shape (variables, n), in [m], [rad] and as controls are given.
     """
-    posed, controls = mechanism.placements(x), mechanism.control_values(x)
-    mover_twists = _mover_twists(mechanism, x, posed, controls)
+    state = evaluate_state(mechanism, x)
+    mover_twists = _mover_twists(state, x.shape[1])
     twists = {}
-    for name, pose in posed.bodies.items():
+    for name, pose in state.placements.bodies.items():
         twists[name] = np.zeros((6, len(mechanism.variables), x.shape[1]))
         for mover, sign in pose.movers.items():
             places, unit_twists = mover_twists[mover]
@@ -291,7 +309,7 @@ def iter_twist_maps(
     """
     cuts = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
     constraints: list[Joint | ConstraintElement] = [*cuts, *mechanism.network.elements]
-    equations = _equations(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
+    equations = _equations(evaluate_state(mechanism, x), x.shape[1])
     for constraint, equation in zip(constraints, equations, strict=True):
         yield constraint, equation.rows, equation.twist_map
 

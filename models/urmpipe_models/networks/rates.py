@@ -58,7 +58,9 @@ from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.closure import (
     MIN_DAMPING,
     TRANSLATION_SCREWS,
+    MechanismState,
     evaluate_scaled_closure,
+    evaluate_state,
     iter_chunks,
     relative_movers,
     stack_elements,
@@ -68,10 +70,9 @@ from urmpipe_models.networks.joint_motion import (
     joint_frame,
     joint_twists,
     left_jacobian,
-    measure_element,
     wrap_rotation_vector,
 )
-from urmpipe_models.networks.mechanism import Mechanism, Placements, ValueWithGradient, evaluate_expression
+from urmpipe_models.networks.mechanism import Mechanism, evaluate_expression
 from urmpipe_models.networks.mobility import IdleSpin, find_idle_spins, spin_angles
 from urmpipe_models.networks.motion import BranchDerivatives
 
@@ -92,7 +93,7 @@ def closure_residual(mechanism: Mechanism, x: Sequence[Element]) -> Column:
     which is sin(a) u of a rotation by a about u; then of each element its error, of a pair in its own unit.
     The variables x are in [m], [rad] and as controls are given, one element each.
     """
-    return _residual(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
+    return _residual(evaluate_state(mechanism, x))
 
 
 def largest_residual(mechanism: Mechanism, x: Sequence[Element]) -> Element:
@@ -103,15 +104,13 @@ def largest_residual(mechanism: Mechanism, x: Sequence[Element]) -> Element:
 
 def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]:
     """Return the derivatives of `closure_residual` by free variables, exact where the network is closed."""
-    return _jacobian(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
+    return _jacobian(evaluate_state(mechanism, x))
 
 
-def _residual(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> Column:
-    per_length = 1.0 / mechanism.length
+def _residual(state: MechanismState) -> Column:
+    mechanism, per_length = state.mechanism, 1.0 / state.mechanism.length
     rows: Column = []
-    for first, second in iter_cut_frames(mechanism, x, posed, controls):
+    for first, second in _cut_frames(state):
         rows += scale(per_length, subtract(second.translation, first.translation))
         # of small turns d the sum over the axes c of c x (c + d x c) is 2 d
         pairs = zip(first.columns, second.columns, strict=True)
@@ -119,74 +118,66 @@ def _residual(
     scales = mechanism.row_scales[len(rows) :].tolist()
     for element, per_unit in zip(mechanism.network.elements, scales, strict=True):
         if element.is_pair:
-            rows.append(times(per_unit, mechanism.pair_error(element, x, controls)[0].value))
+            rows.append(times(per_unit, mechanism.pair_error(element, state.x, state.controls)[0].value))
             continue
-        frames = (posed.bodies[name].frame for name in element.bodies)
-        length = evaluate_expression(element.length, controls).value
-        rows.append(times(per_length, minus(measure_element(element, *frames).distance, length)))
+        length = evaluate_expression(element.length, state.controls).value
+        rows.append(times(per_length, minus(state.measure(element).distance, length)))
     return rows
 
 
-def _jacobian(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> list[Column]:
+def _jacobian(state: MechanismState) -> list[Column]:
+    mechanism, bodies = state.mechanism, state.placements.bodies
     per_length, scales = 1.0 / mechanism.length, mechanism.column_scales
-    screws = _free_screws(mechanism, x, posed, controls)
+    twists = _free_twists(state)
     first_free = len(mechanism.controls)
     columns: list[Column] = [[0.0] * mechanism.rows for _ in mechanism.free]
     cut_joints = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
-    frames = iter_cut_frames(mechanism, x, posed, controls)
-    for row, (joint, (here, _)) in enumerate(zip(cut_joints, frames, strict=True)):
-        for mover, sign in relative_movers(posed.bodies, joint.bodies, joint.name).items():
-            for k, w, v in screws[mover]:
+    for row, (joint, (here, _)) in enumerate(zip(cut_joints, _cut_frames(state), strict=True)):
+        for mover, sign in relative_movers(bodies, joint.bodies, joint.name).items():
+            for k, w, v in twists[mover]:
                 factor = sign * float(scales[k])
                 velocity = add(v, cross(w, here.translation))
                 entries = (*scale(factor * per_length, velocity), *scale(factor, w))
                 columns[k - first_free][6 * row : 6 * row + 6] = entries
     for row, element in enumerate(mechanism.network.elements, 6 * len(cut_joints)):
         if element.is_pair:
-            error, _ = mechanism.pair_error(element, x, controls)
+            error, _ = mechanism.pair_error(element, state.x, state.controls)
             for k in error.gradient.keys() & set(mechanism.free.tolist()):
                 factor = float(scales[k] * mechanism.row_scales[row])
                 columns[k - first_free][row] = times(factor, error.gradient[k])
             continue
-        measured = measure_element(element, *(posed.bodies[name].frame for name in element.bodies))
-        for mover, sign in relative_movers(posed.bodies, element.bodies).items():
-            for k, w, v in screws[mover]:
+        measured = state.measure(element)
+        for mover, sign in relative_movers(bodies, element.bodies).items():
+            for k, w, v in twists[mover]:
                 rate = plus(dot(measured.moment, w), dot(measured.force, v))
                 columns[k - first_free][row] = times(sign * float(scales[k]) * per_length, rate)
     return columns
 
 
-def iter_cut_frames(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> Iterator[tuple[Transform, Transform]]:
+def _cut_frames(state: MechanismState) -> Iterator[tuple[Transform, Transform]]:
     """Yield the frame of each cut joint in the ground, once from each of its two bodies."""
-    for cut in mechanism.graph.cuts:
-        joint = mechanism.network.joints[cut]
-        moved = joint_frame(joint, [value.value for value in mechanism.joint_values(joint, x, controls)])
-        yield posed.joints[joint.name] @ moved, posed.bodies[joint.bodies[1]].frame @ joint.frames[1]
+    for cut in state.mechanism.graph.cuts:
+        joint = state.mechanism.network.joints[cut]
+        here = state.placements.joints[joint.name] @ joint_frame(joint, state.joint_elements(joint))
+        yield here, state.placements.bodies[joint.bodies[1]].frame @ joint.frames[1]
 
 
-def _free_screws(
-    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
-) -> dict[str, list[tuple[int, Vector, Vector]]]:
+def _free_twists(state: MechanismState) -> dict[str, list[tuple[int, Vector, Vector]]]:
     """Return the free variables of each mover by number, with the twist in the ground of one unit of each."""
+    mechanism, x, placements, _ = state
     twists: dict[str, list[tuple[int, Vector, Vector]]] = {}
     for joint in mechanism.network.joints:
-        drives = joint.drives
         screws: Twists = []
-        if any(drive is None for drive in drives):
-            values = [value.value for value in mechanism.joint_values(joint, x, controls)]
-            screws = joint_twists(joint, values, posed.joints[joint.name])
+        if any(drive is None for drive in joint.drives):
+            screws = joint_twists(joint, state.joint_elements(joint), placements.joints[joint.name])
         twists[joint.name] = [
             (mechanism.variable_index[joint.name, index], *screw)
-            for index, (drive, screw) in enumerate(zip(drives, screws, strict=False))
+            for index, (drive, screw) in enumerate(zip(joint.drives, screws, strict=False))
             if drive is None
         ]
     for name in mechanism.graph.roots[1:]:
         first = mechanism.variable_index[name, 0]
-        p = posed.bodies[name].frame.translation
+        p = placements.bodies[name].frame.translation
         axes = left_jacobian((x[first + 3], x[first + 4], x[first + 5]))
         screws = [*TRANSLATION_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
         twists[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
@@ -216,10 +207,9 @@ def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> lis
     closed = list(x)
     scales = mechanism.column_scales
     for _ in range(steps if len(mechanism.free) else 0):
-        posed, controls = mechanism.placements(closed), mechanism.control_values(closed)
-        residual = _residual(mechanism, closed, posed, controls)
-        columns = _jacobian(mechanism, closed, posed, controls)
-        step = damped_normal_step(columns, residual)
+        state = evaluate_state(mechanism, closed)
+        residual = _residual(state)
+        step = damped_normal_step(_jacobian(state), residual)
         longest = reduce(np.maximum, (np.abs(change) for change in step))
         part_taken = MAX_STEP / np.maximum(longest, MAX_STEP)
         for k, change in zip(mechanism.free, step, strict=True):
@@ -552,7 +542,7 @@ def compute_rates(
 def _in_joint_frames(mechanism: Mechanism, x: FloatArray, rows: FloatArray) -> FloatArray:
     """Return rows of `closure_residual`, along the axes of the ground, along those of `scaled_closure`."""
     turned = np.array(rows)
-    frames = iter_cut_frames(mechanism, list(x), mechanism.placements(x), mechanism.control_values(x))
+    frames = _cut_frames(evaluate_state(mechanism, x))
     for k, (here, _) in enumerate(frames):
         for first in (6 * k, 6 * k + 3):
             for axis, column in enumerate(here.columns):

@@ -15,9 +15,12 @@ from asserting import refusal
 from random_networks import matrix, motion
 from test_shipped import Answer, Rssr, Tables, bennett, rccc, rssr, slider_crank, tables_of
 from test_shipped import four_bar as four_bar_answers
+from test_tracing import KINDS
 from urmpipe import NetworkError, load_network, network_drive
 from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.networks.driving import find_driven_variables
 from urmpipe_models.networks.file import network_names
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_pipeline.networks.network_motion import NetworkMotion
 
 PI, TURN, Z = math.pi, 2 * math.pi, [0, 0, 1]
@@ -239,6 +242,24 @@ def test_a_control_is_not_driven_beyond_its_range() -> None:
     assert line == "drives: found crank = 3, allowed: 0 to 2"
     line = refusal(NetworkError, network_drive, tables, {"theta4": (1.48, "110deg")})
     assert line == "drives: found theta4 = 1.91986, allowed: 0 to 1.9"
+
+
+def test_every_drive_that_cannot_be_is_refused_at_once() -> None:
+    mechanism = build_mechanism(load_network(KINDS))
+    wrong = {
+        "u": "u is a function of other controls", "F": "F is a user joint without variables",
+        "E": "E has 3 variables, allowed: E[1], E[2], E[3]", "E[4]": "allowed: a number from 1 to 3",
+        "C[2]": "C[2] is a function of controls, allowed: the controls", "Z": "drive",
+    }  # fmt: skip
+    with pytest.raises(NetworkError) as caught:
+        find_driven_variables(mechanism, list(wrong))
+    for finding, text in zip(caught.value.findings, wrong.values(), strict=True):
+        assert text in finding.sentence()
+    line = refusal(NetworkError, find_driven_variables, mechanism, ["E[2]", "B", "E[2]"])
+    assert line == "drives: E[2] is driven twice, allowed: once"
+    driven = find_driven_variables(mechanism, ["s", "B", "C[1]", "E[2]"])
+    assert [mechanism.labels[k] for k in driven.places] == ["s", "B", "C", "E[2]"]
+    assert driven.units == ("", "m", "rad", "rad")
 
 
 def test_a_joint_drives_by_its_name_in_place_of_the_control() -> None:
