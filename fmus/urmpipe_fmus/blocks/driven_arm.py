@@ -1,6 +1,15 @@
-"""The drives of an arm as variables: arrays over its driven and over its held joints, by kind of joint.
+"""Block of a robot with masses, an elastic drive and a sampled controller on each joint.
 
-An arm with a flexible drive and a sampled controller on each joint, as one unit.
+Dynamics, drives and controllers are one function with one integrator ([Iso9283]_ eq. 13-20):
+
+    M(q) q'' + h(q, q') + g(q) - J^T F = Mk + Ms            Ms: counterbalance springs
+    Mk = k (theta1 - q) + l (omega1 - q')                   drives; I1 omega1' + Mk = i_p C i_a
+    Mk = k_held (rest - q) - l_held q'                      passive joints, on a spring and a damper
+
+1. `DriveGroup`: the drives and springs of the revolute joints as arrays of variables, and those of the
+   prismatic joints, whose names end in _s.
+2. `driven_arm`: the block. It starts at rest at the start pose, in equilibrium with gravity; `start_values`
+   are those of an equilibrium with a force on the tool.
 """
 
 from __future__ import annotations
@@ -63,6 +72,13 @@ from urmpipe_models.dynamics.links import Wrench
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.robots.toml import chain_from_dict
 
+DRIVEN_ARM_OPTIONS: Mapping[str, str] = {
+    "robot": "a robot with masses and drives: a .toml file with [drives.NAME]",
+}
+
+MAX_INTERNAL_STEP = 5e-4  # s
+
+# Constants of drive and controller by their names in robot files: description and unit.
 _CONSTANTS = {
     "k": ("Rigidity of the shaft", "{torque}/{way}"),
     "l": ("Damping of the shaft", "{torque}.s/{way}"),
@@ -75,18 +91,17 @@ _CONSTANTS = {
     "Kw": ("Voltage that a sample adds for an error of velocity", "V.s/{way}"),
     "Keps": ("Voltage that a sample adds for an error of acceleration", "V.s2/{way}"),
 }
-"""The constants of drive and controller, by the names of robot files: description and unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveGroup:
-    """The drives of all joints of a kind: their variables have names that end in `suffix`.
+    """The drives of all joints of a kind as variables.
 
     Attributes:
-        kind: Of the joints.
-        robot: The arm.
-        driven: By index of the coordinate, each joint with a drive and what holds it at rest.
-        passive: By index of the coordinate, each joint with a spring and what holds it at rest.
+        kind: The kind of the coordinates.
+        robot: The robot.
+        driven: By index of the coordinate, each joint with a drive, and its equilibrium.
+        passive: By index of the coordinate, each joint on a spring and a damper, and its equilibrium.
     """
 
     kind: CoordinateKind
@@ -96,48 +111,50 @@ class DriveGroup:
 
     @property
     def suffix(self) -> str:
-        """Nothing for joints that turn, "_s" for those that slide."""
+        """The end of the names: "" for revolute joints, "_s" for prismatic ones."""
         return "" if self.kind.kind == "revolute" else "_s"
 
     @property
     def counterbalanced(self) -> bool:
-        """Whether a spring relieves any of the drives."""
-        return any(one.spring != NO_SPRING for one, _ in self.driven.values())
+        """Whether any drive has a counterbalance spring."""
+        return any(joint.spring != NO_SPRING for joint, _ in self.driven.values())
 
     @property
     def _limit(self) -> str:
-        """Name of the voltage limit: u_max, u_s_max."""
         return f"u{self.suffix}_max"
 
     def parameters(self) -> Iterator[Parameter]:
         """Yield the constants of the drives and the springs; the periods are fixed."""
-        joints = [one for one, _ in self.driven.values()]
+        joints = [joint for joint, _ in self.driven.values()]
+        stiffness_unit, position_unit = self._unit("{torque}/{way}"), self.kind.unit
         if joints:
-            constants = zip(*((*one.drive, *one.gains) for one in joints), strict=True)
+            constants = zip(*((*joint.drive, *joint.gains) for joint in joints), strict=True)
             for key, values in zip((*DRIVE_KEYS, *GAIN_KEYS), constants, strict=True):
                 description, unit = _CONSTANTS[key]
-                least = -np.inf if key in GAIN_KEYS else MIN_CONSTANT
-                yield self._parameter(key, description, self._unit(unit), values, least)
-            periods, largest = zip(*((one.period, one.largest_voltage) for one in joints), strict=True)
+                minimum = -np.inf if key in GAIN_KEYS else MIN_CONSTANT
+                yield self._parameter(key, description, self._unit(unit), values, minimum)
+            periods, voltages = zip(*((joint.period, joint.largest_voltage) for joint in joints), strict=True)
             period = self._parameter("period", "Time between two samples", "s", periods, MIN_PERIOD)
             yield replace(period, tunable=False)
-            yield replace(self._parameter("u_max", "Largest voltage", "V", largest, 0.0), name=self._limit)
+            yield replace(self._parameter("u_max", "Largest voltage", "V", voltages, 0.0), name=self._limit)
             if self.counterbalanced:
-                stiffness, rests = zip(*(one.spring for one in joints), strict=True)
-                described = "Rigidity of the spring beside the drive"
-                form = self._unit("{torque}/{way}")
-                yield self._parameter(SPRING_KEYS[0], described, form, stiffness, 0.0)
-                described = "Where the spring beside the drive gives no torque"
-                yield self._parameter(SPRING_KEYS[1], described, self.kind.unit, rests, -np.inf)
+                stiffness, rests = zip(*(joint.spring for joint in joints), strict=True)
+                text = "Rigidity of the spring beside the drive"  # plain: ok
+                yield self._parameter(SPRING_KEYS[0], text, stiffness_unit, stiffness, 0.0)
+                text = "Where the spring beside the drive gives no torque"  # plain: ok
+                yield self._parameter(SPRING_KEYS[1], text, position_unit, rests, -np.inf)
         if self.passive:
-            springs = ((one.stiffness, one.damping, rest.rest) for one, rest in self.passive.values())
-            k, l_held, rest = zip(*springs, strict=True)
-            for name, description, unit, values, least in (
-                ("k_held", "Rigidity of the spring", self._unit("{torque}/{way}"), k, MIN_CONSTANT),
-                ("l_held", "Damping of the spring", self._unit("{torque}.s/{way}"), l_held, 0.0),
-                ("rest", "Where the spring gives no torque", self.kind.unit, rest, -np.inf),
+            springs = (
+                (joint.stiffness, joint.damping, equilibrium.rest)
+                for joint, equilibrium in self.passive.values()
+            )
+            k, damping, rest = zip(*springs, strict=True)
+            for name, description, unit, values, minimum in (
+                ("k_held", "Rigidity of the spring", stiffness_unit, k, MIN_CONSTANT),
+                ("l_held", "Damping of the spring", self._unit("{torque}.s/{way}"), damping, 0.0),
+                ("rest", "Where the spring gives no torque", position_unit, rest, -np.inf),
             ):
-                yield self._parameter(name, description, unit, values, least, self.passive)
+                yield self._parameter(name, description, unit, values, minimum, self.passive)
 
     def inputs(self) -> Iterator[Input]:
         """Yield the set points."""
@@ -146,7 +163,7 @@ class DriveGroup:
             if starts:
                 yield Input(
                     name=f"set_{kind.name}{dots}",
-                    description=f"Set {word} {self._of(self.driven)}",
+                    description=f"Set {word} {self._joints(self.driven)}",
                     unit=kind.unit + per,
                     display_unit=kind.display_unit + per,
                     start=0.0 if dots else starts,
@@ -158,59 +175,60 @@ class DriveGroup:
         if self.driven:
             yield Output(
                 name=f"u{self.suffix}",
-                description=f"Voltages of the armatures {self._of(self.driven)}",
+                description=f"Voltages of the armatures {self._joints(self.driven)}",
                 unit="V",
                 size=len(self.driven),
             )
-        every = sorted((*self.driven, *self.passive))
+        indices = sorted((*self.driven, *self.passive))
         yield Output(
             name=f"Mk{self.suffix}",
-            description=f"Torques of shafts and springs {self._of(every)}",
+            description=f"Torques of shafts and springs {self._joints(indices)}",
             unit=self.kind.effort_unit,
-            size=len(every),
+            size=len(indices),
         )
 
     def states(self) -> Iterator[State]:
-        """Yield the states of the drives, which start where they hold the arm."""
-        rests = [one for _, one in self.driven.values()]
-        way, seen = self.kind.unit, self.kind.display_unit
-        for name, description, unit, display_unit, start in (
-            ("theta1", "Angles of the gears' output shafts", way, seen, [one.rest for one in rests]),
-            ("omega1", "Rates of these shafts", f"{way}/s", f"{seen}/s", [0.0 for _ in rests]),
-            ("i_a", "Currents of the armatures", "A", "", [one.current for one in rests]),
+        """Yield the states of the drives, which start in equilibrium."""
+        equilibria = [equilibrium for _, equilibrium in self.driven.values()]
+        angles = tuple(equilibrium.rest for equilibrium in equilibria)
+        currents = tuple(equilibrium.current for equilibrium in equilibria)
+        position, display = self.kind.unit, self.kind.display_unit
+        for name, description, unit, display_unit, starts in (
+            ("theta1", "Angles of the gears' output shafts", position, display, angles),
+            ("omega1", "Rates of these shafts", f"{position}/s", f"{display}/s", (0.0,) * len(equilibria)),
+            ("i_a", "Currents of the armatures", "A", "", currents),
         ):
-            if rests:
+            if equilibria:
                 yield State(
                     name=f"{name}{self.suffix}",
-                    description=f"{description} {self._of(self.driven)}",
+                    description=f"{description} {self._joints(self.driven)}",
                     unit=unit,
                     display_unit=display_unit,
-                    start=tuple(start),
-                    size=len(rests),
+                    start=starts,
+                    size=len(equilibria),
                     output=True,
                 )
 
     def memories(self) -> Iterator[Memory]:
-        """Yield what the controllers remember."""
-        rests = [one for _, one in self.driven.values()]
-        if rests:
+        """Yield the memories of the controllers."""
+        if self.driven:
             yield Memory(
                 name=f"last{self.suffix}",
                 description="Voltages of the samples before",
                 unit="V",
-                start=tuple(one.voltage for one in rests),
-                size=len(rests),
+                start=tuple(equilibrium.voltage for _, equilibrium in self.driven.values()),
+                size=len(self.driven),
             )
             yield Memory(
                 name=f"sample{self.suffix}",
                 description="Numbers of the last samples; before the first -2^53",
                 start=NO_SAMPLE,
-                size=len(rests),
+                size=len(self.driven),
             )
 
     def actuators(self, v: Values) -> dict[int, Actuator]:
-        """Return what gives each joint its torque, with the held voltage, by index of the coordinate."""
-        found: dict[int, Actuator] = {}
+        """Return the source of torque of each joint, with the held voltage, by index of the coordinate."""
+        actuators: dict[int, Actuator] = {}
         for j, k in enumerate(self.driven):
             drive = Drive(*(self._read(v, key)[j] for key in DRIVE_KEYS))
             angle, rate, current, voltage = (
@@ -219,41 +237,41 @@ class DriveGroup:
             spring = NO_SPRING
             if self.counterbalanced:
                 spring = CounterbalanceSpring(*(self._read(v, key)[j] for key in SPRING_KEYS))
-            found[k] = Motor(drive, angle, rate, current, voltage, spring)
+            actuators[k] = Motor(drive, angle, rate, current, voltage, spring)
         for j, k in enumerate(self.passive):
             stiffness, damping, rest = (self._read(v, key)[j] for key in ("k_held", "l_held", "rest"))
-            found[k] = Spring(stiffness, damping, rest)
-        return found
+            actuators[k] = Spring(stiffness, damping, rest)
+        return actuators
 
     def voltages(
         self, v: Values, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
     ) -> list[Element]:
         """Return the voltages from the communication point on."""
-        found = []
+        voltages = []
         for j, k in enumerate(self.driven):
             gains = Gains(*(self._read(v, key)[j] for key in GAIN_KEYS))
             name = f"set_{self.kind.name}"
-            wanted = JointMotion(*(getattr(v, name + dots)[j] for dots in ("", "d", "dd")))
+            setpoint = JointMotion(*(getattr(v, name + dots)[j] for dots in ("", "d", "dd")))
             last, period, sample = (self._read(v, key)[j] for key in ("last", "period", "sample"))
             limit = getattr(v, self._limit)[j]
-            fresh = control_voltage(last, gains, wanted, JointMotion(q[k], qd[k], qdd[k]), limit)
-            found.append(sampled_voltage(v.time, period, sample, fresh, last))
-        return found
+            fresh = control_voltage(last, gains, setpoint, JointMotion(q[k], qd[k], qdd[k]), limit)
+            voltages.append(sampled_voltage(v.time, period, sample, fresh, last))
+        return voltages
 
     def outputs(self, state: ArmState, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:
-        """Return voltages and torques."""
+        """Return voltages and torques by variable."""
         torques = shaft_torques(state)
-        found = {f"Mk{self.suffix}": tuple(torques[k] for k in sorted((*self.driven, *self.passive)))}
-        return found | ({f"u{self.suffix}": tuple(voltages)} if self.driven else {})
+        of_joints = {f"Mk{self.suffix}": tuple(torques[k] for k in sorted((*self.driven, *self.passive)))}
+        return of_joints | ({f"u{self.suffix}": tuple(voltages)} if self.driven else {})
 
     def derivatives(self, rates: Mapping[int, MotorDerivatives]) -> dict[str, tuple[Element, ...]]:
-        """Return how the states of the drives change, of the rates by index of the coordinate."""
-        own = [rates[k] for k in self.driven]
-        names = ("theta1", "omega1", "i_a") if own else ()
-        return {f"{name}{self.suffix}": tuple(one[place] for one in own) for place, name in enumerate(names)}
+        """Return the derivatives of the states by variable, from those by index of the coordinate."""
+        motors = [rates[k] for k in self.driven]
+        names = ("theta1", "omega1", "i_a") if motors else ()
+        return {f"{name}{self.suffix}": tuple(motor[i] for motor in motors) for i, name in enumerate(names)}
 
     def samples(self, v: Values, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:
-        """Return what the controllers remember from the communication point on."""
+        """Return the next values of the memories by variable."""
         if not self.driven:
             return {}
         numbers = (
@@ -263,8 +281,8 @@ class DriveGroup:
         return {f"last{self.suffix}": tuple(voltages), f"sample{self.suffix}": tuple(numbers)}
 
     def _read(self, v: Values, name: str) -> tuple[Element, ...]:
-        found: tuple[Element, ...] = getattr(v, name + self.suffix)
-        return found
+        elements: tuple[Element, ...] = getattr(v, name + self.suffix)
+        return elements
 
     def _parameter(
         self,
@@ -273,89 +291,80 @@ class DriveGroup:
         unit: str,
         start: Sequence[float],
         minimum: float,
-        joints: Iterable[int] | None = None,
+        indices: Iterable[int] | None = None,
     ) -> Parameter:
-        """Return a tunable parameter of some joints, of the driven ones by default."""
+        """Return a tunable parameter of joints, by default the driven ones."""
         return Parameter(
             name=name + self.suffix,
-            description=f"{description} {self._of(self.driven if joints is None else joints)}",
+            description=f"{description} {self._joints(self.driven if indices is None else indices)}",
             unit=unit,
             start=tuple(map(float, start)),
             minimum=minimum,
             size=len(start),
         )
 
-    def _unit(self, form: str) -> str:
-        turns = self.kind.kind == "revolute"
-        return form.format(
+    def _unit(self, template: str) -> str:
+        is_revolute = self.kind.kind == "revolute"
+        return template.format(
             torque=self.kind.effort_unit,
             way=self.kind.unit,
-            ratio="" if turns else "rad/m",
-            inertia="kg.m2" if turns else "kg",
+            ratio="" if is_revolute else "rad/m",
+            inertia="kg.m2" if is_revolute else "kg",
         )
 
-    def _of(self, indices: Iterable[int]) -> str:
+    def _joints(self, indices: Iterable[int]) -> str:
         return format_joints(self.robot, indices)
 
 
-def drive_groups(robot: Chain, rests: Sequence[JointEquilibrium]) -> list[DriveGroup]:
-    """Return the drives and springs of an arm by kind of joint.
+def drive_groups(robot: Chain, equilibria: Sequence[JointEquilibrium]) -> list[DriveGroup]:
+    """Return the drives and springs of a robot by kind of joint.
 
     Args:
-        robot: The arm, with one of `drives` for every coordinate.
-        rests: What holds it at rest, in the order of its coordinates.
+        robot: The robot, with one of `drives` for every coordinate.
+        equilibria: The equilibrium of each joint, in the order of the coordinates.
     """
-    by_joint = {one.joint: one for one in robot.drives}
-    found = []
+    drives = {drive.joint: drive for drive in robot.drives}
+    groups = []
     for kind in coordinate_kinds(robot):
         driven: dict[int, tuple[DrivenJoint, JointEquilibrium]] = {}
-        held: dict[int, tuple[PassiveJoint, JointEquilibrium]] = {}
+        passive: dict[int, tuple[PassiveJoint, JointEquilibrium]] = {}
         for k in kind.indices(robot):
-            own = by_joint[robot.coordinates[k]]
-            if isinstance(own, DrivenJoint):
-                driven[k] = own, rests[k]
+            drive = drives[robot.coordinates[k]]
+            if isinstance(drive, DrivenJoint):
+                driven[k] = drive, equilibria[k]
             else:
-                held[k] = own, rests[k]
-        found.append(DriveGroup(kind, robot, driven, held))
-    return found
-
-
-DRIVEN_ARM_OPTIONS: Mapping[str, str] = {
-    "robot": "a robot with masses and drives: a .toml file with [drives.NAME]",
-}
-
-
-MAX_INTERNAL_STEP = 5e-4
-"""The longest step of the integrator in [s]."""
+                passive[k] = drive, equilibria[k]
+        groups.append(DriveGroup(kind, robot, driven, passive))
+    return groups
 
 
 def driven_arm(robot: Chain) -> BlockModel:
-    """Return the unit: set points of the driven joints and a force on the tool in; the arm's motion out.
+    """Return the block: set points of the driven joints and a force on the tool in; the arm's motion out.
 
-    Dynamics of the arm, drives and controllers are one function with one integrator: nothing is held between
-    them but the voltage between two samples. It starts at rest at the robot's start pose, held against
-    gravity: shafts twisted, currents and voltages set. A joint with `{ k, l }` alone is held by a spring and
-    a damper. A spring beside a drive may carry a part of its load. The controllers measure the driven side,
-    and sample as `drive_controller` does.
+    Nothing is held between dynamics, drives and controllers but the voltage between two samples. The arm
+    starts at rest at the robot's start pose, in equilibrium with gravity: shafts twisted, currents and
+    voltages set. A joint with `{ k, l }` alone is passive, on a spring and a damper. A spring parallel to a
+    drive may carry a part of its load. The controllers measure the driven side, and sample as
+    `drive_controller` does.
 
     Args:
-        robot: The arm, with masses and a drive or a spring for every joint.
+        robot: The robot, with masses and a drive or a spring for every joint.
 
     Raises:
-        UnitError: If the robot is none.
+        UnitError: If `robot` is no robot.
         RobotError: If it has no masses, a joint has neither drive nor spring, or a voltage cannot hold it.
 
     Source: [Iso9283]_ eq. 13-20, eq. 20 with the corrected sign.
     """
     check_robot("driven_arm", robot)
-    model = _Model(robot, chain_to_masses(robot), drive_groups(robot, find_equilibrium(robot)))
+    arm = _DrivenArm(robot, chain_to_masses(robot), drive_groups(robot, find_equilibrium(robot)))
     return BlockModel(
         name="driven_arm",
         description=f"{robot.name or 'An arm'} with its drives and controllers",
-        variables=tuple(model.variables()),
-        outputs=model.outputs,
-        derivatives=model.derivatives,
-        update=model.update if any(group.driven for group in model.groups) else None,
+        variables=tuple(arm.variables()),
+        outputs=arm.outputs,
+        derivatives=arm.derivatives,
+        update=arm.update if any(group.driven for group in arm.groups) else None,
         internal_step=min(MAX_INTERNAL_STEP, 0.5 * max_stable_step(robot)),
         equations=(
             "M(q) q'' + h(q, q') + g(q) - J^T F = Mk + Ms    (eq. 13, 19; F acts on the tool from outside)",
@@ -372,21 +381,14 @@ def driven_arm(robot: Chain) -> BlockModel:
 
 
 @dataclass(frozen=True, slots=True)
-class _Model:
-    """The functions of the unit.
-
-    Attributes:
-        robot: The arm.
-        masses: Its masses as parameters.
-        groups: Its drives and springs as variables.
-    """
+class _DrivenArm:
+    """The variables and functions of the block."""
 
     robot: Chain
     masses: Masses
     groups: Sequence[DriveGroup]
 
     def variables(self) -> Iterator[Variable]:
-        """Yield the variables of the unit."""
         yield from self.masses.parameters
         for group in self.groups:
             yield from (*group.parameters(), *group.inputs())
@@ -404,27 +406,27 @@ class _Model:
 
     def outputs(self, v: Values) -> Mapping[str, Any]:
         """Return accelerations, voltages, torques of shafts and springs, and the energy."""
-        found: dict[str, Any] = dict(scatter(self.robot, self._accelerations(v), "dd"))
+        results: dict[str, Any] = dict(scatter(self.robot, self._accelerations(v), "dd"))
         for group in self.groups:
-            found |= group.outputs(self._state(v), self._voltages(group, v))
-        return {**found, "energy_stored": arm_energy(self.masses.arm_at(v).chain, self._state(v))}
+            results |= group.outputs(self._state(v), self._voltages(group, v))
+        return {**results, "energy_stored": arm_energy(self.masses.arm_at(v).chain, self._state(v))}
 
     def derivatives(self, v: Values) -> Mapping[str, Any]:
-        """Return how the states change."""
+        """Return the derivatives of coordinates, drives and energies."""
         state = self._state(v)
-        found: dict[str, Any] = dict(scatter(self.robot, state.qd))
-        found |= scatter(self.robot, self._accelerations(v), "d")
+        results: dict[str, Any] = dict(scatter(self.robot, state.qd))
+        results |= scatter(self.robot, self._accelerations(v), "d")
         for group in self.groups:
-            found |= group.derivatives(motor_derivatives(state))
+            results |= group.derivatives(motor_derivatives(state))
         flows = power_flow(self.robot, state, read_wrench(v))
-        return {**found, "energy_in": flows.supplied, "energy_lost": flows.dissipated}
+        return {**results, "energy_in": flows.supplied, "energy_lost": flows.dissipated}
 
     def update(self, v: Values) -> Mapping[str, Any]:
-        """Take the samples that are due."""
-        found: dict[str, Any] = {}
+        """Return voltages and indices of the samples that are due."""
+        results: dict[str, Any] = {}
         for group in self.groups:
-            found |= group.samples(v, self._voltages(group, v))
-        return found
+            results |= group.samples(v, self._voltages(group, v))
+        return results
 
     def _state(self, v: Values) -> ArmState:
         """Return the arm with the held voltages."""
@@ -435,36 +437,35 @@ class _Model:
         return ArmState(q, read_coordinates(self.robot, v, "d"), [actuators[k] for k in range(len(q))])
 
     def _accelerations(self, v: Values) -> list[Element]:
-        """Return q''; no voltage goes into them at once."""
+        """Return q'', which does not depend on the present voltages."""
         chain, links = self.masses.arm_at(v)
         return joint_accelerations(chain, self._state(v), read_wrench(v), links)
 
     def _voltages(self, group: DriveGroup, v: Values) -> list[Element]:
-        """Return the voltages of a group from the communication point on."""
         state = self._state(v)
         return group.voltages(v, state.q, state.qd, self._accelerations(v))
 
 
 def from_robot_toml(robot: str) -> BlockModel:
-    """Return `driven_arm` of the arm that a text of `robot_toml` describes, bit by bit."""
+    """Return `driven_arm` of the robot in a text of `robot_toml`, equal to the bit."""
     return driven_arm(chain_from_dict(tomllib.loads(robot)))
 
 
 def start_values(robot: Chain, force: Vector) -> dict[str, tuple[Element, ...]]:
-    """Return start values of `driven_arm` by name: at rest at the start pose, a force on the tool.
+    """Return start values of `driven_arm` by name: in equilibrium with a force on the tool.
 
-    What a spring holds has yielded to the force; the drives hold their joints where they were.
+    Passive joints have yielded to the force; driven joints are at the start pose.
 
     Args:
-        robot: The arm, with masses and a drive or a spring for every joint.
+        robot: The robot, with masses and a drive or a spring for every joint.
         force: In [N], along the axes of the world.
 
     Raises:
         RobotError: If a voltage cannot hold the arm so, or the springs cannot.
     """
-    rests = find_equilibrium(robot, Wrench(force))
-    found: dict[str, tuple[Element, ...]] = {"force": force, "moment": (0.0, 0.0, 0.0)}
-    for group in drive_groups(robot, rests):
-        found |= {one.name: one.starts for one in (*group.states(), *group.memories())}
-        found[group.kind.name] = tuple(rests[k].q for k in group.kind.indices(robot))
-    return found
+    equilibria = find_equilibrium(robot, Wrench(force))
+    starts: dict[str, tuple[Element, ...]] = {"force": force, "moment": (0.0, 0.0, 0.0)}
+    for group in drive_groups(robot, equilibria):
+        starts |= {variable.name: variable.starts for variable in (*group.states(), *group.memories())}
+        starts[group.kind.name] = tuple(equilibria[k].q for k in group.kind.indices(robot))
+    return starts
