@@ -1,8 +1,7 @@
-"""The units that urmpipe ships, by name.
+"""The blocks that urmpipe ships, by name.
 
-The unit NAME is made by the function NAME of a module of `urmpipe_fmus.blocks`. The module's constant
-NAME_OPTIONS has a line of help for each argument of the function. A new unit is such a function and a line
-below.
+The block NAME is made by the function NAME of a module of `urmpipe_fmus.blocks`, whose constant NAME_OPTIONS
+has a line of help for each argument of the function. A new block is such a function and a line below.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ from typing import Any, cast
 from urmpipe_fmus.block import BlockModel
 from urmpipe_models.errors import UnitError, format_suggestion, format_unknown_name
 
-# Of each unit its module, and what it does.
-_UNITS: dict[str, tuple[str, str]] = {
+# Module and summary of each block.
+_BLOCKS: dict[str, tuple[str, str]] = {
     "kinematic_chain": (
         "kinematic_chain",
         "points of an arm, and velocities and angles of its sensors, from the joints",
@@ -39,68 +38,74 @@ _UNITS: dict[str, tuple[str, str]] = {
 
 
 def block_names() -> tuple[str, ...]:
-    """Return the names of the units."""
-    return tuple(_UNITS)
+    """Return the names of the blocks."""
+    return tuple(_BLOCKS)
 
 
 def normalise_block_name(name: str) -> str:
-    """Return the name of a unit whose words are joined by - or _; what is no unit's name as it is."""
+    """Return the name of a block whose words are joined by - or _; any other text unchanged."""
     joined = name.replace("-", "_")
-    return joined if joined in _UNITS else name
+    return joined if joined in _BLOCKS else name
 
 
 def block_summary(name: str) -> str:
-    """Return what a unit does, in a line.
+    """Return what a block does, in one line.
 
     Raises:
-        UnitError: If there is no such unit.
+        UnitError: If there is no such block.
     """
-    return _UNITS[_known(name)][1]
+    return _BLOCKS[_find_name(name)][1]
 
 
 def block_option_help(name: str) -> Mapping[str, str]:
-    """Return a line of help for each option of a unit.
+    """Return a line of help for each option of a block.
 
     Raises:
-        UnitError: If there is no such unit.
+        UnitError: If there is no such block.
     """
-    known = _known(name)
-    return cast("Mapping[str, str]", getattr(_module(known), f"{known.upper()}_OPTIONS", {}))
+    name = _find_name(name)
+    return cast("Mapping[str, str]", getattr(_module(name), f"{name.upper()}_OPTIONS", {}))
 
 
 def make_block(name: str, /, **options: Any) -> BlockModel:
-    """Return a unit.
+    """Return a block.
 
     Args:
         name: Its name.
         options: See `block_option_help`.
 
     Raises:
-        UnitError: If there is no such unit, or with all that is wrong with its options.
+        UnitError: If there is no such block, or with all errors of its options.
     """
-    name = _known(name)
+    name = _find_name(name)
     known = block_option_help(name)
     make = cast("Callable[..., BlockModel]", getattr(_module(name), name))
-    needed = [one.name for one in signature(make).parameters.values() if one.default is Parameter.empty]
+    parameters = signature(make).parameters.values()
+    required = [parameter.name for parameter in parameters if parameter.default is Parameter.empty]
     allowed = ", ".join(known) or "none, it has no options"
     faults = [
-        f"option {one}: found{format_suggestion(one, known)}, allowed: {allowed}; a parameter is set where"
-        f" the unit runs, in a system by start = {{ {one} = ... }}, in another tool as the FMU's start value"
-        for one in options
-        if one not in known
+        f"option {option}: found{format_suggestion(option, known)}, allowed: {allowed}; a parameter is set"
+        f" where the unit runs, in a system by start = {{ {option} = ... }}, in another tool as the FMU's"
+        " start value"
+        for option in options
+        if option not in known
     ]
-    faults += [f"option {one}: not found, it needs {known[one]}" for one in needed if one not in options]
+    faults += [
+        f"option {option}: not found, it needs {known[option]}"
+        for option in required
+        if option not in options
+    ]
     if faults:
         raise UnitError(*(f"unit {name}: {fault}" for fault in faults))
     return make(**options)
 
 
+def _find_name(name: str) -> str:
+    """Return the name of a block; `UnitError` if there is none."""
+    if (normal := normalise_block_name(name)) not in _BLOCKS:
+        raise UnitError(f"unit: {format_unknown_name(name, _BLOCKS)}, or a .py file with a unit in it")
+    return normal
+
+
 def _module(name: str) -> ModuleType:
-    return import_module(f"{__name__}.{_UNITS[name][0]}")
-
-
-def _known(name: str) -> str:
-    """Return the name of a unit; `UnitError` if there is none."""
-    if (found := normalise_block_name(name)) not in _UNITS:
-        raise UnitError(f"unit: {format_unknown_name(name, _UNITS)}, or a .py file with a unit in it")
-    return found
+    return import_module(f"{__name__}.{_BLOCKS[name][0]}")

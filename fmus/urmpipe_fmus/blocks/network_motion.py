@@ -1,4 +1,11 @@
-"""The motion of a kinematic network as a unit: its controls in, its joints and points out."""
+"""Block of the motion of a kinematic network: its controls in; joints, bodies and points out.
+
+With controls c and free variables x, e(x, c) = 0 are the closure equations ([KinematicSystems]_ section 3).
+At each communication point x starts on the line through the last two, and is refined by a fixed number of
+Newton steps x := x - (J^T J + mu I)^-1 J^T e, J = de/dx.
+
+`network_motion` reads the options and assembles the start; `_Motion` has the variables and functions.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +15,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Recipe, Values, Variable
-from urmpipe_fmus.blocks.coordinates import check_count
+from urmpipe_fmus.blocks.coordinates import check_count, option_error
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import UnitError, format_unknown_name, format_value
 from urmpipe_models.measure_units import WRITTEN, quantity_to_si
@@ -38,9 +45,9 @@ NEWTON = 3  # 100 values of the control per turn: within 3e-10 rad of what is cl
 
 DISPLAY = {"rad": "deg", "m": "mm", "": ""}
 
+# The memories: of controls and of free variables, in the order of the variables of a mechanism.
 LAST = ("control_values", "free_variables")
 CHANGES = ("control_changes", "free_changes")
-"""The memories: of controls and of free variables, in the order of the variables of a mechanism."""
 
 
 def network_motion(
@@ -51,7 +58,7 @@ def network_motion(
     points: Mapping[str, Any] | Sequence[str] | str | None = None,
     newton: int = NEWTON,
 ) -> BlockModel:
-    """Return the unit that computes how a network follows its controls.
+    """Return the block that computes the motion of a network by its controls.
 
     Inputs are the controls that can be set: in [rad] or [m] if a control is an angle or a length, else the
     number that its functions take. They have no limits, as the joints of `kinematic_chain` have none. Outputs
@@ -72,21 +79,25 @@ def network_motion(
 
     Source: [KinematicSystems]_ section 3.
     """
-    loaded = network if isinstance(network, Network) else load_network(_network_source(network))
+    if not isinstance(network, (Network, str, Path, Mapping)):
+        raise option_error("network_motion", "network", network, "a name, a file, or tables")
+    loaded = network if isinstance(network, Network) else load_network(network)
     for option, value in (("controls", controls), ("start", start)):
         if value is not None and not isinstance(value, Mapping):
-            raise _option_error(option, f"found {format_value(value)}, allowed: a table of names and values")
+            raise option_error("network_motion", option, value, "a table of names and values")
     for name, number in (controls or {}).items():
         if not (isinstance(number, str) or is_number(number)):
-            message = f"found {name} = {format_value(number)}, allowed: a number, or a text with a unit"
-            raise _option_error("controls", message)
+            raise UnitError(
+                f"unit network_motion: option controls: found {name} = {format_value(number)},"
+                " allowed: a number, or a text with a unit"
+            )
     mechanism = build_mechanism(_at_joint_values(loaded, start or {}))
     values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}
     assembled = assemble(mechanism, {} if start is None else values)
     if start is None and values and assembled.assemblies:  # on the branch of the network's own start
-        x, own = start_configuration(mechanism, values), mechanism.controls
+        x, indices = start_configuration(mechanism, values), mechanism.controls
         limits = np.tile((-np.inf, np.inf), (len(x), 1))
-        x, branch = move_to(mechanism, assembled.x_nearest, own, x[own], mechanism.free, limits)
+        x, branch = move_to(mechanism, assembled.x_nearest, indices, x[indices], mechanism.free, limits)
         is_reached = branch is None or branch.complete
         assembled = single_assembly(mechanism, x, "") if is_reached else assemble(mechanism, values)
     if not assembled.assemblies:
@@ -95,27 +106,30 @@ def network_motion(
             f"unit network_motion: {loaded.name} does not close: found a gap of {gap.metres:g} m and"
             f" {gap.radians:g} rad at {gap.name}, allowed: {CLOSED_TOLERANCE:g}; see urmpipe network check"
         )
-    return _unit(with_start(loaded, assembled.x[:, 0].tolist()), points, newton)
+    return _build_block(with_start(loaded, assembled.x[:, 0].tolist()), points, newton)
 
 
 def from_tables(network: str, points: Mapping[str, Any], newton: int) -> BlockModel:
     """Return `network_motion` of a JSON text of `network_tables`, assembled where it starts."""
-    return _unit(load_network(json.loads(network)), points, newton)
+    return _build_block(load_network(json.loads(network)), points, newton)
 
 
-def _unit(network: Network, points: Any, newton: int) -> BlockModel:
-    """Return the unit of a network whose start is assembled."""
+def _build_block(network: Network, points: Any, newton: int) -> BlockModel:
+    """Return the block of a network whose start is assembled."""
     check_count("network_motion", "newton", newton)
-    model = _Model(network, build_mechanism(network), _read_points(network, points), newton)
-    if not model.inputs:
-        raise _option_error("network", f"found {network.name} without a control to set, allowed: one or more")
-    remembers = len(model.mechanism.free) > 0
+    motion = _Motion(network, build_mechanism(network), _read_points(network, points), newton)
+    if not motion.inputs:
+        raise UnitError(
+            f"unit network_motion: option network: found {network.name} without a control to set,"
+            " allowed: one or more"
+        )
+    remembers = len(motion.mechanism.free) > 0
     return BlockModel(
         name="network_motion",
         description=f"Motion of {network.name} by its controls",
-        variables=tuple(model.variables()),
-        outputs=model.outputs,
-        update=model.update if remembers else None,
+        variables=tuple(motion.variables()),
+        outputs=motion.outputs,
+        update=motion.update if remembers else None,
         equations=(
             "e(x, c) = 0: gaps of cut joints (p2 - p1 and the skew part of R2 R1^T), errors of elements,",
             "      with c the controls and x the free variables, in lengths of the mechanism and rad",
@@ -129,16 +143,15 @@ def _unit(network: Network, points: Any, newton: int) -> BlockModel:
             "from_tables",
             {
                 "network": json.dumps(network_tables(network), allow_nan=False),
-                "points": {name: {"body": body, "point": list(place)} for name, body, place in model.points},
+                "points": {name: {"body": body, "point": list(place)} for name, body, place in motion.points},
                 "newton": newton,
             },
         ),
     )
 
 
-@dataclass(frozen=True)
-class _Control:
-    """An input: the name of its variable and of its control, its unit, and how much of that one of it is."""
+class _Control(NamedTuple):
+    """An input: its variable and control, its unit, and the factor from the control's unit to it."""
 
     variable: str
     control: str
@@ -146,9 +159,8 @@ class _Control:
     factor: float
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Variables of a joint or a body that are one output: their owner, indices and unit."""
+class _Group(NamedTuple):
+    """Variables of a joint or a body that are one output."""
 
     variable: str
     owner: str
@@ -158,15 +170,8 @@ class _Group:
 
 
 @dataclass(frozen=True)
-class _Model:
-    """The functions of the unit.
-
-    Attributes:
-        network: The network.
-        mechanism: The same in numbers.
-        points: Name, body and place in the body in [m] of each point.
-        newton: Newton steps per evaluation.
-    """
+class _Motion:
+    """The variables and functions of the block; points: name, body and place in the body in [m]."""
 
     network: Network
     mechanism: Mechanism
@@ -175,7 +180,7 @@ class _Model:
 
     @cached_property
     def _names(self) -> dict[str, str]:
-        """The names of the variables of controls, joints and bodies, by theirs in the network."""
+        """The names of variables of controls, joints and bodies, by their names in the network."""
         taken = {"time", "table", "residual", *LAST, *CHANGES, *(name for name, _, _ in self.points)}
         owners = dict.fromkeys(variable.owner for variable in self.mechanism.variables)
         names: dict[str, str] = {}
@@ -215,7 +220,6 @@ class _Model:
         return tuple(groups)
 
     def variables(self) -> Iterator[Variable]:
-        """Yield the variables of the unit."""
         starts = self.mechanism.start
         for control, start in zip(self.inputs, starts, strict=False):
             yield Input(
@@ -285,13 +289,6 @@ class _Model:
         change = [element for name in CHANGES for element in getattr(v, name)]
         predicted = predict_variables(self.mechanism, self._last(v), change, controls)
         return close_network(self.mechanism, predicted, self.newton)
-
-
-def _network_source(network: Any) -> str | Path | Mapping[str, Any]:
-    """Return a name, a file or tables of a network."""
-    if isinstance(network, (str, Path, Mapping)):
-        return network
-    raise _option_error("network", f"found {format_value(network)}, allowed: a name, a file, or tables")
 
 
 def _at_joint_values(network: Network, start: Mapping[str, Any]) -> Network:
@@ -371,7 +368,3 @@ def _forms(identifier: str) -> set[str]:
 
 def _output(name: str, description: str, unit: str, size: int | None) -> Output:
     return Output(name=name, description=description, unit=unit, display_unit=DISPLAY[unit], size=size)
-
-
-def _option_error(option: str, message: str) -> UnitError:
-    return UnitError(f"unit network_motion: option {option}: {message}")

@@ -227,8 +227,8 @@ def test_an_import_from_beside_the_file_is_refused(tmp_path: Path, monkeypatch: 
     (tmp_path / "gains.py").write_text("GAIN = 2.0\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)  # as `python -m` does with the working folder
     why = (
-        "which stands beside it; allowed: installed packages, and all else in the one file, the only one that"
-        " the FMU carries"
+        "a neighbouring file, which the FMU does not contain: move its code into the block's file, or install"
+        " it as a package"
     )
     assert said(written(tmp_path, "import gains\n" + UNIT.replace("OUT", "gains.GAIN * v.u"))) == [
         f"own.py:1: imports gains, {why}"
