@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
@@ -302,7 +301,7 @@ def assert_same_space(first: FloatArray, second: FloatArray, atol: float) -> Non
     np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=0.0, atol=atol)
 
 
-def assert_close(found: ArrayLike, expected: ArrayLike, atol: float) -> None:
+def assert_close(found: FloatArray | float, expected: FloatArray | float, atol: float) -> None:
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=atol)
 
 

@@ -226,7 +226,7 @@ def test_the_driven_length_of_an_element_is_followed() -> None:
     x = np.array([0.25, 0.4])  # 0.5^2 = 0.4^2 + 0.3^2
     closure = evaluate_closure(mechanism, x[:, np.newaxis])
     assert abs(closure.residual[0, 0]) < 1e-15
-    assert_close(closure.jacobian[0, :, 0], [-2.0, 0.8], 1e-15)
+    assert_close(closure.jacobian[0, :, 0], np.array([-2.0, 0.8]), 1e-15)
 
 
 def test_points_and_lines_of_elements_are_fixed_to_their_bodies() -> None:

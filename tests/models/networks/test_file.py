@@ -156,7 +156,9 @@ EXPECTED = Network(
 
 
 def test_a_file_and_its_tables_are_made_si(network: Any) -> None:
-    assert network(ALL_KINDS) == load_network(tomllib.loads(ALL_KINDS)) == EXPECTED
+    found = network(ALL_KINDS)
+    assert found == load_network(tomllib.loads(ALL_KINDS)) == EXPECTED
+    assert (found.length_unit, found.angle_unit) == ("mm", "deg")
 
 
 def test_a_network_without_a_name_has_that_of_its_file(network: Any) -> None:
