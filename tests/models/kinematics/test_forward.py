@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
+from scipy.linalg import expm
 
 from asserting import there
 from differences import assert_slope
@@ -473,6 +474,9 @@ def test_screws_stand_in_the_world_base_and_tool_included() -> None:
     np.testing.assert_array_equal(found.rotation, [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_array_equal(found.position, [1.0, 2.0, 3.5])
     assert found.size == 2.0 + 3.0  # from axis to axis, and to the tip
+    for names in (("a",), ("a", "b", "c")):  # each screw has a name
+        with pytest.raises(ValueError, match="zip"):
+            screws_to_chain(found, names)
 
 
 def test_a_joint_that_follows_another_is_no_screw() -> None:
@@ -484,13 +488,6 @@ def test_screws_are_floats_whatever_numbers_describe_the_arm() -> None:
     found = there(chain_to_screws(whole))
     for one in (found.direction, found.point, found.rotation, found.position):
         assert one.dtype == np.float64
-
-
-def test_each_screw_of_a_chain_has_a_name() -> None:
-    found = there(chain_to_screws(SLIDING_ARM))
-    for names in (("a",), ("a", "b", "c")):
-        with pytest.raises(ValueError, match="zip"):
-            screws_to_chain(found, names)
 
 
 def random_arm(rng: np.random.Generator) -> Chain:
@@ -523,35 +520,19 @@ def test_a_chain_of_the_screws_is_the_same_arm() -> None:
         np.testing.assert_allclose(got.rotation, expected.rotation, rtol=0.0, atol=1e-14)
 
 
-LED_BY_NONE = [
-    name for name in robot_names() if all(joint.mimic is None for joint in load_robot(name).joints)
-]
-"""The arms of the catalogue whose joints follow no other."""
-
-
-def exponential(direction: FloatArray, point: FloatArray, revolute: bool, q: float) -> FloatArray:
-    """Return exp(xi q) of a screw by the series of its 4x4 matrix."""
-    twist = np.zeros((4, 4))
-    if revolute:
-        x, y, z = direction
-        twist[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-        twist[:3, 3] = -np.cross(direction, point)
-    else:
-        twist[:3, 3] = direction
-    term, total = np.eye(4), np.eye(4)
-    for k in range(1, 40):
-        term = term @ twist * (q / k)
-        total = total + term
-    return total
+LED_BY_NONE = [name for name in robot_names() if chain_to_screws(load_robot(name))]  # no mimics
 
 
 def product_of_exponentials(arm: Screws, q: FloatArray) -> FloatArray:
-    """Return T(q) = exp(xi_1 q_1) ... exp(xi_n q_n) T(0), shape (4, 4)."""
-    pose = np.eye(4)
-    for each in zip(arm.direction, arm.point, arm.revolute, q.tolist(), strict=True):
-        pose = pose @ exponential(*each)
-    zero = np.eye(4)
+    """Return T(q) = exp(xi_1 q_1) ... exp(xi_n q_n) T(0), shape (4, 4), by SciPy's matrix exponential."""
+    pose, zero = np.eye(4), np.eye(4)
     zero[:3, :3], zero[:3, 3] = arm.rotation, arm.position
+    for (x, y, z), point, revolute, value in zip(arm.direction, arm.point, arm.revolute, q, strict=True):
+        twist = np.zeros((4, 4))
+        if revolute:
+            twist[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+        twist[:3, 3] = np.cross(point, (x, y, z)) if revolute else (x, y, z)
+        pose = pose @ expm(twist * value)
     return pose @ zero
 
 
@@ -586,9 +567,6 @@ def test_so_it_is_of_any_chain_without_mimics_and_of_the_chain_made_of_its_screw
 
 
 def test_the_size_is_the_way_from_axis_to_axis_to_the_tip_and_never_0() -> None:
-    arm = chain_to_screws(
-        Chain("l", (Joint("a"), Joint("b", origin=translation(0.3, 0.0, 0.4))), translation(0, 2, 0))
-    )
-    assert there(arm).size == 2.5
-    point = there(chain_to_screws(Chain("point", (Joint("a"),))))
-    assert point.size == 1.0
+    joints = (Joint("a"), Joint("b", origin=translation(0.3, 0.0, 0.4)))
+    assert there(chain_to_screws(Chain("l", joints, translation(0, 2, 0)))).size == 2.5
+    assert there(chain_to_screws(Chain("point", (Joint("a"),)))).size == 1.0

@@ -62,9 +62,8 @@ def test_urm_modules_in_mm_and_deg(robot: Any) -> None:
         "two", (0.243215, 0.21243, 0.042215), (math.radians(52), math.pi / 2), directions=(1, -1),
         start=(0.0, math.pi), description="two modules", source="a test",
     ).placed(from_offset([0, 0, 1, 0, 0, math.pi / 2]), translation(0.0, 0.0, 0.15))  # fmt: skip
-    limits = {"upper": 2 * math.pi, "acceleration": 4 * math.pi}
     modules = (
-        replace(joint, velocity=velocity, **limits)
+        replace(joint, upper=2 * math.pi, velocity=velocity, acceleration=4 * math.pi)
         for joint, velocity in zip(bare.moving, (math.pi, math.pi / 2), strict=True)
     )
     assert robot(text) == replace(bare, joints=(*modules, bare.joints[-1]))
