@@ -283,12 +283,10 @@ class Link:
     Attributes:
         connection: The connection of the system.
         scalars: Each input with its source.
-        unit: The unit of its values; empty if it has none.
     """
 
     connection: Connection
     scalars: tuple[tuple[Port, Port], ...]
-    unit: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -359,7 +357,7 @@ class Wiring:
         scalars = tuple(zip(input_ports, output_ports, strict=True))
         for port, source in scalars:
             self._feed(port, str(source))
-        return Link(connection, scalars, outputs[0].unit or inputs[0].unit)
+        return Link(connection, scalars)
 
     def _elements(self, table: str, port: Port, causality: str) -> Sequence[Variable]:
         """Return the scalars at a port, if they exist and have a causality."""

@@ -16,7 +16,6 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -141,11 +140,6 @@ class System:
     faults: tuple[Finding, ...] = ()
     unusable_blocks: frozenset[str] = frozenset()
 
-    @cached_property
-    def by_name(self) -> dict[str, Block]:
-        """The blocks by name."""
-        return {block.name: block for block in self.blocks}
-
 
 def system_names() -> tuple[str, ...]:
     """Return the names of the shipped systems."""
@@ -207,7 +201,7 @@ def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     values = _merge_arguments(defaults, arguments or {}, faults, shipped=path.parent == SYSTEMS_FOLDER)
     tables = {key: value for key, value in {**tables, **resolved}.items() if key != "arguments"}
     system = _SystemReader(path, _substitute_arguments(tables, values, faults), faults).read()
-    unusable = {name for name in system.by_name if _has_fault(f"blocks.{name}", faults)}
+    unusable = (block.name for block in system.blocks if _has_fault(f"blocks.{block.name}", faults))
     placed_faults = add_line_numbers(path, str(name_or_path), faults) if faults else ()
     return replace(system, arguments=values, faults=placed_faults, unusable_blocks=frozenset(unusable))
 

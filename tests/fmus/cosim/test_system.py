@@ -92,7 +92,7 @@ def test_names_of_units_and_columns_are_no_files(folder: Path) -> None:
     for name in ("log_source", "u"):
         (folder / name).touch()
     system = load_system(folder / "two.toml")
-    assert system.by_name["source"].unit == "log_source"
+    assert system.blocks[0].unit == "log_source"
     assert system.inputs[0].column == "u"
 
 
