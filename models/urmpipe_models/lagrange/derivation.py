@@ -39,21 +39,17 @@ TERMS: tuple[TermName, ...] = get_args(TermName)  # in the order of eq. 13
 Equation = dict[TermName, Polynomial]  # the terms of a coordinate, in [N.m], or in [N] if it is prismatic
 
 
-class AxisRotation(NamedTuple):
+class _AxisRotation(NamedTuple):
     """Rotation Rot(axis, angle) inner: by the sum of the angles of joints with parallel axes.
 
-    Attributes:
-        axis: Unit vector in the frame of the first of these joints [-].
-        angle: The factors of the coordinates in the angle.
-        inner: A constant rotation.
+    The axis is a unit vector in the frame of the first of these joints [-], inner a constant rotation.
     """
 
     axis: Vector
     angle: Angle
     inner: Transform = Transform()
 
-    def __matmul__(self, rotation: Transform) -> AxisRotation:
-        """Return the product with a constant rotation."""
+    def __matmul__(self, rotation: Transform) -> _AxisRotation:
         return self._replace(inner=_round_rotation(self.inner @ Transform(rotation.rotation)))
 
 
@@ -71,17 +67,17 @@ class JointStep(NamedTuple):
     """
 
     joint: Joint
-    before: AxisRotation
-    at: AxisRotation
+    before: _AxisRotation
+    at: _AxisRotation
     begins: bool
-    after: AxisRotation
+    after: _AxisRotation
     value: Angle
     offset: float
 
 
 def iter_joint_steps(chain: Chain) -> Iterator[JointStep]:
     """Yield the joints of an arm from the base to the tip, with the rotations before and after each."""
-    rotation = AxisRotation((0.0, 0.0, 1.0), (0.0,) * len(chain.coordinates))
+    rotation = _AxisRotation((0.0, 0.0, 1.0), (0.0,) * len(chain.coordinates))
     for joint in chain.joints:
         name, factor, offset = joint.name, 1.0, 0.0
         if joint.mimic is not None:
@@ -95,7 +91,7 @@ def iter_joint_steps(chain: Chain) -> Iterator[JointStep]:
             sign = _parallel_sign(at, joint)
             begins = sign == 0
             if begins:
-                rotation = AxisRotation(
+                rotation = _AxisRotation(
                     joint.axis, value, _round_rotation(rotation_about(joint.axis, offset))
                 )
             else:
@@ -104,7 +100,7 @@ def iter_joint_steps(chain: Chain) -> Iterator[JointStep]:
         yield JointStep(joint, before, at, begins, rotation, value, offset)
 
 
-def _parallel_sign(rotation: AxisRotation, joint: Joint) -> int:
+def _parallel_sign(rotation: _AxisRotation, joint: Joint) -> int:
     """Return 1 or -1 for a joint parallel or antiparallel to the axis of a rotation, else 0."""
     cosine = dot(rotation.inner.rotate(joint.axis), rotation.axis)
     pairs = zip(rotation.inner.rotate(joint.axis), rotation.axis, strict=True)
@@ -329,7 +325,7 @@ def _iter_bodies(chain: Chain, variables: Variables) -> Iterator[_Body]:
         )
 
 
-def _rotation(rotation: AxisRotation, variables: Variables) -> Matrix:
+def _rotation(rotation: _AxisRotation, variables: Variables) -> Matrix:
     """Return Rot(axis, angle) inner: c 1 + s [a]x + (1 - c) a a^T of a unit vector a, times a constant."""
     c, s = variables.cosine_sine(rotation.angle)
     axis = x, y, z = rotation.axis
@@ -355,7 +351,7 @@ def _shift(origin: Triple, rotation: Matrix, shift: Triple, variables: Variables
     return [variables.sum(pair) for pair in zip(origin, variables.multiply(rotation, shift), strict=True)]
 
 
-def _propagate_omega(rotation: AxisRotation, omega: Triple, variables: Variables) -> Triple:
+def _propagate_omega(rotation: _AxisRotation, omega: Triple, variables: Variables) -> Triple:
     """Return the angular velocity after a rotation, in the axes of the rotated body."""
     rate = variables.rate(rotation.angle)
     added = [
