@@ -89,7 +89,15 @@ def closed_form(chain: Chain) -> ClosedForm | None:
     screws = chain_to_screws(chain)
     if exact is not None or screws is None:
         return exact
-    return near_closed_form(chain, screws)
+    names = chain.coordinates
+    wrists = ((ideal, spherical_wrist(ideal, names)) for ideal in iter_spherical_wrists(screws))
+    planes = ((ideal, parallel_axes(ideal, names)) for ideal in iter_parallel_axes(screws))
+    for ideal, form in (*wrists, *planes):
+        if form is not None:
+            joints = tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in chain.joints)
+            unlimited = replace(chain, joints=joints)  # limits are not considered in closed forms
+            return NearClosedForm(unlimited, form, _deviation(chain, ideal))
+    return None
 
 
 @lru_cache(maxsize=32)
@@ -104,24 +112,6 @@ def exact_closed_form(chain: Chain) -> ClosedForm | None:
         return None
     names = chain.coordinates
     return spherical_wrist(screws, names) or parallel_axes(screws, names)
-
-
-def near_closed_form(chain: Chain, screws: Screws) -> NearClosedForm | None:
-    """Return the inverse of an arm that almost has a closed form; None of any other.
-
-    Args:
-        chain: The arm.
-        screws: Of its joints.
-    """
-    names = chain.coordinates
-    wrists = ((ideal, spherical_wrist(ideal, names)) for ideal in iter_spherical_wrists(screws))
-    planes = ((ideal, parallel_axes(ideal, names)) for ideal in iter_parallel_axes(screws))
-    for ideal, form in (*wrists, *planes):
-        if form is not None:
-            joints = tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in chain.joints)
-            unlimited = replace(chain, joints=joints)  # limits are not considered in closed forms
-            return NearClosedForm(unlimited, form, _deviation(chain, ideal))
-    return None
 
 
 def _deviation(chain: Chain, ideal: Screws) -> tuple[float, float]:

@@ -360,7 +360,7 @@ def _step(rows: _ActiveRows, options: DescentOptions) -> _ActiveRows:
     if options.method == "dls":
         step = damped_step(J, rows.error.vector, (options.damping * rows.error.length) ** 2)
     else:
-        step = pseudoinverse_step(J, rows.error.vector)
+        step = _pseudoinverse_step(J, rows.error.vector)
     step *= np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(axis=0), MAX_STEP))
     q = options.clip(rows.q + step)
     return replace(rows, q=q, error=rows.task.error(q))
@@ -403,16 +403,8 @@ def damped_step(J: FloatArray, error: FloatArray, damping: FloatArray | float) -
     return factor(gram(J.transpose(1, 0, 2)), damping).solve(transposed_product(J, error))
 
 
-def pseudoinverse_step(J: FloatArray, error: FloatArray) -> FloatArray:
-    """Return dq = J^+ e, J^+ the Moore-Penrose pseudoinverse by singular values.
-
-    Args:
-        J: In metres per unit of each joint, [m/rad] or [-], shape (m, joints, n).
-        error: e in [m], shape (m, n).
-
-    Returns:
-        dq in [rad] or [m], shape (joints, n).
-    """
+def _pseudoinverse_step(J: FloatArray, error: FloatArray) -> FloatArray:
+    """Return dq = J^+ e in [rad] or [m], shape (joints, n), J^+ by singular values."""
     inverse = np.linalg.pinv(J.transpose(2, 0, 1), rcond=RANK_CUTOFF).transpose(1, 2, 0)
     return product(np.asarray(inverse, dtype=np.float64), error)
 

@@ -247,10 +247,10 @@ def _follow_branches(
     for poses in solutions.singular:
         where = poses.where[rows, walk.column] & reached
         families[poses.family] = families.get(poses.family, False) | where
-    shortfall = np.zeros(len(solutions))
+    motion = _Motion(walk.q, branch, reasons, np.zeros(len(solutions)), families)
     if search.tolerance is not None and not reached.all():
-        _approach_missed(chain, targets, start, search, _Motion(walk.q, branch, reasons, shortfall, families))
-    return _Motion(walk.q, branch, reasons, shortfall, families)
+        _approach_missed(chain, targets, start, search, motion)
+    return motion
 
 
 def _approach_missed(

@@ -4,7 +4,7 @@
 solver, and restores the order of the targets:
 
 1. Closed form (`closed`): all branches, shifted into limits; where a pose leaves joints free and limits
-   exclude the one that was chosen, another one is searched for (`choose_free_joints`). Of all branches the
+   exclude the one that was chosen, another one is searched for (`_choose_free_joints`). Of all branches the
    one nearest to `start`, if not `every` one is requested.
 2. Iterative (`restarts`): positions, arms without a closed form, and targets that a closed form misses, where
    that is requested (a tolerance) or possible (an arm that has one nearly).
@@ -113,7 +113,7 @@ class _Request(NamedTuple):
         self, form: ClosedForm, targets: Targets, start: FloatArray, near: FloatArray | None
     ) -> Solutions:
         """Return the branches within limits, or the nearest; those that are not reached are searched for."""
-        solutions = choose_free_joints(self.chain, targets, form.solve(targets, near), start)
+        solutions = _choose_free_joints(self.chain, targets, form.solve(targets, near), start)
         if not self.every:
             column = solutions.nearest_column(start, joint_periods(self.chain))
             solutions = solutions.select(column, NEAREST)
@@ -129,17 +129,11 @@ class _Request(NamedTuple):
         return solve_iteratively(self.chain, targets, start=start, every=self.every, search=self.search)
 
 
-def choose_free_joints(chain: Chain, targets: Targets, solutions: Solutions, near: FloatArray) -> Solutions:
+def _choose_free_joints(chain: Chain, targets: Targets, solutions: Solutions, near: FloatArray) -> Solutions:
     """Return solutions within limits (`limit_solutions`), with free joints chosen so that limits allow them.
 
-    Where a pose leaves joints free, a branch is a continuum of solutions, and a closed form returns one
-    of it. If limits exclude that one, another is searched for from the limits that it is beyond.
-
-    Args:
-        chain: The arm.
-        targets: n of them.
-        solutions: Of a closed form, limits not considered.
-        near: Joint values in [rad] or [m], shape (n, joints).
+    Where a pose leaves joints free, a branch is a continuum of solutions, and a closed form returns one of
+    it. If limits exclude that one, another is searched for from the limits that it is beyond.
     """
     limited = limit_solutions(chain, solutions, near)
     free = np.any([poses.where for poses in solutions.singular if poses.free], axis=0)
