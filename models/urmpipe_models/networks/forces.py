@@ -174,9 +174,9 @@ class _Equilibrium:
             ground_wrenches[constraint.name] = wrench
             if len(twist_map) == 1:
                 reactions[constraint.name] = multipliers[rows]
-        posed = self.mechanism.placements(self.x)
+        placements = self.mechanism.placements(self.x)
         cut_names = {network.joints[cut].name for cut in self.mechanism.graph.cuts}
-        for joint, wrench in self._pair_wrenches(multipliers, posed):
+        for joint, wrench in self._pair_wrenches(multipliers, placements):
             if joint.name in cut_names:  # a cut joint, whose multipliers hold its variable, too
                 ground_wrenches[joint.name] = ground_wrenches[joint.name] - wrench
             else:
@@ -188,11 +188,11 @@ class _Equilibrium:
             on_bodies[branch.parent] = on_bodies[branch.parent] - needed
             ground_wrenches[joint.name] = needed * branch.sign
         for joint in network.joints:
-            reactions[joint.name] = _at_frame(ground_wrenches[joint.name], posed.joints[joint.name])
+            reactions[joint.name] = _at_frame(ground_wrenches[joint.name], placements.joints[joint.name])
         return reactions
 
     def _pair_wrenches(
-        self, multipliers: FloatArray, posed: Placements
+        self, multipliers: FloatArray, placements: Placements
     ) -> Iterator[tuple[Joint, FloatArray]]:
         """Yield what pairs exert along the variables of their joints, on second bodies, in the ground.
 
@@ -204,7 +204,7 @@ class _Equilibrium:
         for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
             rates = mechanism.pair_error(element, self.x, controls)[1] if element.is_pair else {}
             for (name, index), rate in rates.items():
-                joint, at = joints[name], posed.joints[name]
+                joint, at = joints[name], placements.joints[name]
                 n = at.columns[1]
                 turns = joint.units[index] == "rad"
                 twist = (*n, 0.0, 0.0, 0.0) if turns else (*cross(at.translation, n), *n)

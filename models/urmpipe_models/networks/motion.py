@@ -420,7 +420,7 @@ class _Tracer:
     def _reach(self, there: Node) -> bool:
         """Add the node at the end of the drive or at a limit before it; return whether to continue."""
         drive, here = self.drive, self.here
-        share, coordinate, value = np.inf, -1, self.end
+        share, coordinate, value = np.inf, -1, self.end  # of the first limit, or of the end of the drive
         if self.sign * (there.z[-1] - self.end) >= 0.0:
             share = _first_share(here, there, -1, self.end)
         limits = drive.limits[drive.free] / drive.scales[:, np.newaxis]

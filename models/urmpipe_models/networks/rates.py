@@ -185,8 +185,13 @@ def _free_twists(state: MechanismState) -> dict[str, list[tuple[int, Vector, Vec
 
 
 def _vector(x: Sequence[Element], part: slice) -> Vector:
-    """Return the three variables that are a rotation vector in [rad]."""
     return x[part.start], x[part.start + 1], x[part.start + 2]
+
+
+def _wrap_rotations(mechanism: Mechanism, x: list[Element]) -> None:
+    """Wrap rotation vectors to half a turn at most, in place."""
+    for part in mechanism.rotations:
+        x[part] = wrap_rotation_vector(_vector(x, part))
 
 
 # ---------------------------------------------------------------------------------------- Newton steps
@@ -214,8 +219,7 @@ def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> lis
         part_taken = MAX_STEP / np.maximum(longest, MAX_STEP)
         for k, change in zip(mechanism.free, step, strict=True):
             closed[k] = plus(closed[k], times(float(scales[k]), times(part_taken, change)))
-        for part in mechanism.rotations:
-            closed[part] = wrap_rotation_vector(_vector(closed, part))
+        _wrap_rotations(mechanism, closed)
     return closed
 
 
@@ -280,8 +284,7 @@ def predict_variables(
     ratio = _product(past, step) / np.maximum(square, MIN_SQUARE)
     ratio = np.maximum(np.minimum(ratio, MAX_RATIO), -MAX_RATIO)
     predicted = [*ahead, *(x[k] + ratio * change[k] for k in mechanism.free)]
-    for part in mechanism.rotations:
-        predicted[part] = wrap_rotation_vector(_vector(predicted, part))
+    _wrap_rotations(mechanism, predicted)
     return predicted
 
 
