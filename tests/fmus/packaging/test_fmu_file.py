@@ -1,13 +1,14 @@
-"""FMUs whose archive or description would fill a disk or a memory, or leave its folder, are refused."""
+"""FMUs as files: platforms, archives, and what is refused before anything is unpacked."""
 
 from __future__ import annotations
 
 import os
+import platform
 import stat
 import struct
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,16 @@ from hypothesis import strategies as st
 from asserting import refusal
 from urmpipe_fmus import fmu_file
 from urmpipe_fmus.check import check_fmu
-from urmpipe_fmus.fmu_file import open_fmu
+from urmpipe_fmus.fmu_file import (
+    binary_suffix,
+    content_guid,
+    find_binary,
+    host_binaries,
+    host_platforms,
+    open_fmu,
+    this_platform,
+    write_fmu,
+)
 from urmpipe_models.errors import FmuError
 
 DESCRIPTION = (
@@ -224,3 +234,104 @@ def test_whatever_bytes_are_changed_it_is_read_or_refused_with_its_name(
         except FmuError as error:
             assert str(error).startswith(f"{path}: ")
         assert {one.name for one in Path(folder).iterdir()} <= {"m.fmu", "m"}
+
+
+FILES = {"sources/b.c": b"int b;", "a.xml": b"<a/>", "binaries/linux64/a.so": bytes(range(256)) * 50}
+
+
+def test_the_same_files_in_any_order_are_the_same_bytes(tmp_path: Path) -> None:
+    write_fmu(tmp_path / "one.fmu", FILES)
+    write_fmu(tmp_path / "two.fmu", dict(reversed(FILES.items())))
+    assert (tmp_path / "one.fmu").read_bytes() == (tmp_path / "two.fmu").read_bytes()
+    with zipfile.ZipFile(tmp_path / "one.fmu") as archive:
+        assert {name: archive.read(name) for name in archive.namelist()} == FILES
+        assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        modes = {one.filename: one.external_attr >> 16 for one in archive.infolist()}
+    assert modes == {"a.xml": 0o644, "binaries/linux64/a.so": 0o755, "sources/b.c": 0o644}
+
+
+def test_a_file_is_replaced_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "one.fmu"
+    path.write_text("old")
+    with path.open() as read:  # who reads it meanwhile reads one or the other, and no mixture
+        write_fmu(path, FILES)
+        assert read.read() == "old"
+    assert zipfile.is_zipfile(path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ("missing/one.fmu", "No such file or directory"),
+        ("file/one.fmu", "Not a directory"),
+        (f"{'n' * 300}/one.fmu", "File name too long"),
+        (f"{'n' * 300}.fmu", "File name too long"),
+    ],
+)
+def test_where_nothing_can_be_written_nothing_is_left(tmp_path: Path, place: str, why: str) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match=why):
+        write_fmu(tmp_path / place, FILES)
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_guid_stays_the_same_from_version_to_version() -> None:
+    """The first 16 bytes of the SHA-256 of name and content, each after its length in 8 bytes."""
+    assert content_guid(FILES) == "{ab89020f-ef2c-b77b-13d8-c877f8ada7a7}"
+
+
+@pytest.mark.slow
+@settings(deadline=None)
+@given(
+    st.dictionaries(st.text(st.characters(codec="utf-8"), max_size=3), st.binary(max_size=3), max_size=3),
+    st.dictionaries(st.text(st.characters(codec="utf-8"), max_size=3), st.binary(max_size=3), max_size=3),
+)
+def test_other_content_has_another_guid(one: dict[str, bytes], other: dict[str, bytes]) -> None:
+    assert (content_guid(one) == content_guid(other)) is (one == other)
+
+
+@pytest.fixture
+def on(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], None]:
+    """Be on a system with a processor."""
+
+    def be(system: str, processor: str) -> None:
+        monkeypatch.setattr(platform, "system", lambda: system)
+        monkeypatch.setattr(platform, "machine", lambda: processor)
+        monkeypatch.setattr("sys.maxsize", 2**63 - 1)
+
+    return be
+
+
+@pytest.mark.parametrize(
+    ("system", "processor", "name", "suffix"),
+    [
+        ("Linux", "x86_64", "linux64", ".so"),
+        ("Windows", "AMD64", "win64", ".dll"),
+        ("Darwin", "x86_64", "darwin64", ".dylib"),
+        ("Linux", "aarch64", "aarch64-linux", ".so"),
+        ("Darwin", "arm64", "aarch64-darwin", ".dylib"),
+        ("Windows", "ARM64", "aarch64-windows", ".dll"),
+        ("Linux", "riscv64", "riscv64-linux", ".so"),
+    ],
+)
+def test_a_platform_has_fmis_name(
+    on: Callable[[str, str], None], system: str, processor: str, name: str, suffix: str
+) -> None:
+    on(system, processor)
+    assert (this_platform(), binary_suffix(name)) == (name, suffix)
+
+
+def test_on_arm_the_binary_under_its_own_name_is_taken_before_that_under_the_short_one(
+    on: Callable[[str, str], None], tmp_path: Path
+) -> None:
+    on("Linux", "x86_64")
+    assert (host_platforms(), host_binaries("arm")) == (("linux64",), ("binaries/linux64/arm.so",))
+    on("Linux", "aarch64")
+    own, short = (tmp_path / one for one in host_binaries("arm"))
+    assert (own.parent.name, short.parent.name) == ("aarch64-linux", "linux64") == host_platforms()
+    assert find_binary(tmp_path, "arm") == own
+    for one in (short, own):
+        one.parent.mkdir(parents=True)
+        one.touch()
+        assert find_binary(tmp_path, "arm") == one

@@ -1,4 +1,4 @@
-"""The drive as a unit: its integrator against SciPy's, its balance of energy, what an instance refuses."""
+"""The blocks of a drive, against closed forms, energy balances and an independent integrator."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from asserting import refusal
 from urmpipe_fmus.block import BlockModel, State, Values
 from urmpipe_fmus.blocks import make_block
-from urmpipe_fmus.dependencies import Dependencies
+from urmpipe_fmus.dependencies import TIME, Dependencies
 from urmpipe_fmus.run import Instance, run
+from urmpipe_models.drives import ramp, step, trapezoid
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 
@@ -185,3 +188,193 @@ def test_a_step_that_diverges_is_refused_and_undone() -> None:
         instance.do_step(0.0, 100.0)
     assert instance.save()[2] == before[2]
     assert instance.time == 0.0
+
+
+GAINS = {"Kphi": 1.0, "Kw": 0.0, "Keps": 0.0}
+
+
+def times(count: int, step: float, begin: float = 0.0) -> NDArray[np.float64]:
+    return np.asarray(begin + np.arange(count) * step, dtype=np.float64)
+
+
+def controller(**starts: float) -> Instance:
+    instance = Instance(make_block("drive_controller"))
+    instance.set([instance.reference(name) for name in starts], list(starts.values()))
+    return instance
+
+
+def voltage(instance: Instance) -> float:
+    return float(instance.get([instance.reference("u")])[0])
+
+
+def put(instance: Instance, name: str, value: float) -> None:
+    instance.set([instance.reference(name)], [value])
+
+
+def test_at_a_sample_the_voltage_follows_its_inputs_at_once_and_then_holds() -> None:
+    instance = controller(**GAINS)
+    put(instance, "set_theta", 2.0)
+    assert voltage(instance) == 2.0
+    put(instance, "set_theta", 3.0)
+    assert voltage(instance) == 3.0
+    instance.do_step(0.0, 1e-3)
+    put(instance, "set_theta", 50.0)
+    assert voltage(instance) == 3.0
+    for k in range(1, 5):
+        instance.do_step(k * 1e-3, 1e-3)
+    assert voltage(instance) == 3.0 + 50.0 - 5.0  # limited to 48: the sample at 5 ms
+
+
+@pytest.mark.parametrize("parts", [1, 2, 5, 7])
+def test_the_communication_step_changes_no_sample(parts: int) -> None:
+    step = 5e-3 / parts
+    t = times(200 * parts + 1, step)
+    wanted = np.sin(17.0 * t)
+    found = run(make_block("drive_controller"), t, {"set_theta": wanted}, GAINS)["u"]
+    samples = np.cumsum(np.sin(17.0 * np.arange(201) * 5e-3))
+    # The limit is not met; the times of a sample differ in their last bit.
+    np.testing.assert_allclose(found, np.repeat(samples, parts)[: len(t)], rtol=0.0, atol=1e-10)
+
+
+def test_a_communication_step_above_the_period_samples_at_every_point() -> None:
+    t = times(6, 0.02)
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(6)}, GAINS)["u"]
+    np.testing.assert_array_equal(found, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+
+
+def test_a_sample_that_no_communication_point_meets_is_taken_at_the_next() -> None:
+    t = times(8, 3e-3)  # samples at 0, 5, 10, 15, 20 ms
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(8)}, GAINS)["u"]
+    np.testing.assert_array_equal(found, [1.0, 1.0, 2.0, 2.0, 3.0, 4.0, 4.0, 5.0])
+
+
+def test_a_run_that_begins_late_takes_one_sample_a_period_from_there() -> None:
+    t = times(11, 1e-3, begin=10.0)
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(11)}, GAINS)["u"]
+    np.testing.assert_array_equal(found, np.repeat([1.0, 2.0, 3.0], [5, 5, 1]))
+
+
+def test_a_run_that_begins_before_0_takes_one_sample_a_period_from_there() -> None:
+    t = times(11, 1e-3, begin=-0.02)
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(11)}, GAINS)["u"]
+    np.testing.assert_array_equal(found, np.repeat([1.0, 2.0, 3.0], [5, 5, 1]))
+
+
+def test_eq_20_weighs_the_three_errors_and_keeps_within_the_limit() -> None:
+    instance = controller(last=10.0)
+    for name, value in (("set_theta", 1.0), ("set_omega", 2.0), ("set_alpha", 30.0)):
+        put(instance, name, value)
+    for name, value in (("real_theta", 0.5), ("real_omega", 3.0), ("real_alpha", 10.0)):
+        put(instance, name, value)
+    # the same sum in another order: the rounding of the last place
+    assert voltage(instance) == pytest.approx(10.0 + 7.5 * 0.5 - 0.75 * 1.0 + 0.01 * 20.0, rel=1e-15)
+    put(instance, "set_theta", 1e6)
+    assert voltage(instance) == 48.0
+    put(instance, "set_theta", -1e6)
+    assert voltage(instance) == -48.0
+
+
+def test_going_back_takes_the_same_sample_again() -> None:
+    instance = controller(**GAINS)
+    put(instance, "set_theta", 2.0)
+    instance.do_step(0.0, 5e-3)
+    saved = instance.save()
+    first = voltage(instance)
+    instance.do_step(5e-3, 5e-3)
+    instance.restore(saved)
+    assert voltage(instance) == first == 4.0
+
+
+def test_the_period_is_fixed_once_it_runs_and_cannot_be_0() -> None:
+    instance = controller()
+    with pytest.raises(UnitError) as error:
+        put(instance, "period", 0.0)
+    assert str(error.value) == ("unit drive_controller: period: found 0, allowed: 1e-06 to inf")
+    instance.do_step(0.0, 5e-3)
+    assert refusal(UnitError, put, instance, "period", 1e-3) == (
+        "unit drive_controller: period: set while it runs, allowed: a fixed parameter before the first step"
+    )
+
+
+TIMES = np.linspace(0.0, 2.0, 41)
+
+
+def constant(value: float) -> np.ndarray:
+    return np.full(len(TIMES), value)
+
+
+def test_without_friction_a_constant_torque_makes_a_parabola() -> None:
+    found = run(make_block("inertia"), TIMES, {"tau": constant(3.0), "tau_ext": constant(-1.0)}, {"J": 4.0})
+    # RK4 is exact for it; sums of 4000 internal steps round.
+    np.testing.assert_allclose(found["theta"], 0.25 * TIMES**2, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(found["omega"], 0.5 * TIMES, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(found["alpha"], constant(0.5))
+
+
+def test_with_friction_the_speed_nears_torque_over_friction() -> None:
+    start = {"J": 2.0, "d": 4.0, "omega": 3.0, "theta": 1.0}
+    found = run(make_block("inertia"), TIMES, {"tau": constant(8.0)}, start)
+    omega = 2.0 + np.exp(-2.0 * TIMES)
+    # (h d / J)^5 / 120 a step of 0.5 ms: far below rounding.
+    np.testing.assert_allclose(found["omega"], omega, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        found["theta"], 1.0 + 2.0 * TIMES + 0.5 * (1.0 - np.exp(-2.0 * TIMES)), rtol=0.0, atol=1e-12
+    )
+    np.testing.assert_allclose(found["alpha"], -2.0 * np.exp(-2.0 * TIMES), rtol=0.0, atol=1e-11)
+
+
+def test_the_acceleration_is_that_of_the_torques_as_they_stand() -> None:
+    assert Dependencies(make_block("inertia")).outputs["alpha"] == {"J", "d", "omega", "tau", "tau_ext"}
+    instance = Instance(make_block("inertia"))
+    for torque in (5.0, -3.0):
+        instance.set([instance.reference("tau")], [torque])
+        # divided by 1: the rounding of the last place
+        assert instance.get([instance.reference("alpha")]) == [pytest.approx(torque, rel=1e-15)]
+
+
+T = np.linspace(0.0, 2.0, 81)
+MOVE = {"begin": 0.25, "initial": 0.5, "target": -1.0, "speed": 1.5, "acceleration": 6.0}
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        (0, step(T, 0.25, 0.5, -1.0)),
+        (1, ramp(T, 0.25, 0.5, -1.0, 1.5)),
+        (2, trapezoid(T, 0.25, 0.5, -1.0, 1.5, 6.0)),
+    ],
+)
+def test_each_kind_is_its_form_for_a_log_and_for_an_instance(
+    kind: int, expected: tuple[np.ndarray, ...]
+) -> None:
+    found = run(make_block("set_point"), T, start=MOVE | {"kind": kind})
+    instance = Instance(make_block("set_point"))
+    names = ("theta", "omega", "alpha")
+    instance.set([instance.reference(name) for name in (*MOVE, "kind")], [*MOVE.values(), float(kind)])
+    for name, column in zip(names, expected, strict=True):
+        np.testing.assert_array_equal(found[name], column)
+    for k in range(3):
+        got = instance.get([instance.reference(name) for name in names])
+        assert got == [column[k] for column in expected]
+        instance.do_step(float(T[k]), float(T[k + 1] - T[k]))
+
+
+def test_it_is_a_function_of_time_and_parameters_alone() -> None:
+    parameters = {"kind", "begin", "initial", "target", "speed", "acceleration"}
+    assert Dependencies(make_block("set_point")).outputs["theta"] == parameters | {TIME}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("kind", 3.0, "found 3, allowed: 0 to 2"),
+        ("kind", 1.5, "found 1.5, allowed: an integer of 32 bits"),
+        ("speed", 0.0, "found 0, allowed: 1e-09 to inf"),
+        ("acceleration", -1.0, "found -1, allowed: 1e-09 to inf"),
+    ],
+)
+def test_what_makes_no_move_is_refused(name: str, value: float, said: str) -> None:
+    instance = Instance(make_block("set_point"))
+    with pytest.raises(UnitError) as error:
+        instance.set([instance.reference(name)], [value])
+    assert str(error.value) == f"unit set_point: {name}: {said}"

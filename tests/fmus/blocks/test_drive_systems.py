@@ -32,7 +32,7 @@ K, DAMPING, RATIO, C, R, L, I1, J = 2500.0, 5.0, 100.0, 0.05, 0.5, 1e-3, 0.5, 1.
 @pytest.fixture(scope="module")
 def figures() -> Mapping[str, Any]:
     """Return the names of docs/drive_figures.py, whose loop couples the units."""
-    return runpy.run_path(str(Path(__file__).parents[2] / "docs" / "drive_figures.py"))
+    return runpy.run_path(str(Path(__file__).parents[3] / "docs" / "drive_figures.py"))
 
 
 def monolithic() -> FloatArray:
