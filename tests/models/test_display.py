@@ -51,6 +51,11 @@ def test_a_notebook_shows_headline_notes_and_the_head_of_the_table() -> None:
     assert Shelf("books", 2)._repr_html_().startswith("<p><b>Shelf</b> books</p><table")
 
 
+def test_a_result_with_a_presentation_shows_its_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Displayable, "page", staticmethod(lambda result: f"<p>{result.headline}</p>"))
+    assert Shelf("books")._repr_html_() == "<p>books</p>"
+
+
 def test_a_table_is_cut_after_its_head_and_says_so() -> None:
     whole, cut = Shelf("books", HEAD_ROWS)._repr_html_(), Shelf("books", HEAD_ROWS + 1)._repr_html_()
     assert whole.endswith("</table>")

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import (
+    BLOCK,
     Element,
     FloatArray,
     Vector,
@@ -21,9 +22,13 @@ from urmpipe_models.elementwise import (
     cosine_sine_table,
     cross,
     dot,
+    map_blocks,
     minus,
     plus,
+    row_blocks,
+    row_norms,
     scale,
+    spread_rows,
     subtract,
     times,
 )
@@ -76,6 +81,17 @@ def test_vectors_are_those_of_numpy(a: Vector, b: Vector, factor: float) -> None
     np.testing.assert_array_equal(scale(factor, a), factor * x)
     np.testing.assert_array_equal(cross(a, b), np.cross(x, y))
     assert dot(a, b) == x @ y
+
+
+def test_long_arrays_are_computed_in_blocks() -> None:
+    rows = np.random.default_rng(1).normal(size=(BLOCK + 1, 3))
+    np.testing.assert_array_equal(row_norms(rows), np.linalg.norm(rows, axis=1))
+    assert row_blocks(5, 2) == [slice(0, 2), slice(2, 4), slice(4, 5)]
+    assert [spread_rows(5, most).tolist() for most in (9, 3, 1)] == [[0, 1, 2, 3, 4], [0, 2, 4], [0]]
+    for threads in (1, 2):
+        assert map_blocks(str, [2, 3], threads) == ["2", "3"]
+        with pytest.raises(ZeroDivisionError):
+            map_blocks(lambda number: 1 / number, [1, 0], threads)
 
 
 def bits(robot: str, q: Sequence[Element]) -> list[list[int]]:

@@ -23,6 +23,8 @@ from urmpipe_models.errors import (
     MAX_LISTED,
     Finding,
     Hint,
+    LogError,
+    OptionError,
     Voice,
     escape_control_characters,
     escape_html,
@@ -33,6 +35,9 @@ from urmpipe_models.errors import (
     format_suggestion,
     format_unknown_name,
     format_value,
+    map_collecting_errors,
+    python_command,
+    shell_quote,
 )
 from urmpipe_models.math3d import Transform
 from urmpipe_pipeline.joint_log import LogWarning
@@ -243,3 +248,27 @@ def test_of_many_names_the_nearest_are_listed() -> None:
     assert len(text.removesuffix(" and 5 others").split(", ")) == MAX_LISTED
     assert format_names("sped", names[:16]) == ", ".join(names[:16])
     assert format_unknown_name("sped", names) == f"found 'sped' (did you mean speed?), allowed: {text}"
+
+
+def test_the_findings_of_all_items_are_one_error_of_the_first_class() -> None:
+    def check(item: int) -> int:
+        if item == 1:
+            raise LogError("odd", "one")
+        if item > 1:
+            raise OptionError("odd")
+        return -item
+
+    assert map_collecting_errors(check, [0, -1]) == [0, 1]
+    with pytest.raises(LogError) as error:
+        map_collecting_errors(check, [0, 1, 2])
+    assert [finding.message for finding in error.value.findings] == ["odd", "one"]
+
+
+@pytest.mark.parametrize(("word", "quoted"), [("a b", "'a b'"), ("it's", "'it''s'"), (r"C:\a", r"C:\a")])
+def test_a_word_is_quoted_for_powershell(word: str, quoted: str) -> None:
+    assert shell_quote(word, "win32") == quoted
+
+
+def test_a_line_of_python_is_in_double_quotes_if_the_shell_leaves_these_alone() -> None:
+    assert python_command("print('a')") == "python -c \"print('a')\""
+    assert shlex.split(python_command('print("$a")')) == ["python", "-c", 'print("$a")']

@@ -1,4 +1,4 @@
-"""TOML as text: what is written reads back, and what is not TOML is told with its line."""
+"""Tables of TOML: written and read back, with all errors at once and their lines."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asserting import refusal
-from urmpipe_models.errors import OptionError
-from urmpipe_models.toml_tables import format_toml, quote_toml, read_toml
+from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 leaves = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | texts
@@ -135,3 +135,42 @@ def test_what_only_looks_deep_is_read(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_text(written, encoding="utf-8")
     assert read_toml(path, OptionError) == tomllib.loads(written)
+
+
+def test_a_checked_table_collects_all_errors_and_continues_with_substitutes() -> None:
+    faults: list[Finding] = []
+    data = {
+        "text": 1, "choice": "ure", "number": "x", "numbers": [1, "a"], "few": [1], "flag": 1, "texts": "a",
+        "mapping": {"a": 1}, "spread": "x", "rows": [1], "table": 1, "tables": [1], "lenght": 1,
+    }  # fmt: skip
+    table = CheckedTable(data, faults, "a.toml")
+    assert (table.text("text"), table.choice("choice", ("ur5e", "panda"))) == ("", "ur5e")
+    assert (table.number("number", si="m"), table.number("missing", 2.0)) == (0.0, 2.0)
+    assert (table.numbers("numbers", 2), table.numbers("few", 2)) == ((0.0, 0.0), (0.0, 0.0))
+    assert (table.flag("flag"), table.texts("texts"), table.mapping("mapping")) == (False, (), {})
+    assert table.spread("spread", 2, 1.0) == (1.0, 1.0)
+    assert table.rows("rows") == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    assert (table.table("table").value("length"), table.tables("tables")) == (None, [])
+    table.text("length")
+    table.report_unknown_keys()
+    assert [str(fault).removeprefix("a.toml: key ").split(", allowed")[0] for fault in faults] == [
+        "text: found 1", "choice: found 'ure'", "number: found 'x'", "numbers[1]: found 'a'",
+        "few: found [1]", "flag: found 1", "texts: found 'a'", "mapping: found {'a': 1}",
+        "spread: found 'x'", "rows: found [1]", "table: found 1", "tables: found [1]", "length: found nothing",
+        "lenght: unknown (did you mean length?); allowed: text, choice, number, missing, numbers, few, flag,"
+        " texts, mapping, spread, rows, table, tables, length",
+    ]  # fmt: skip
+
+
+def test_a_checked_table_converts_units_and_knows_the_place_of_its_tables() -> None:
+    faults: list[Finding] = []
+    data = {"a": {"x": "3mm"}, "b": [{"m": [[1, 0, 0]] * 3, "huge": 10**400}], "list": ["90deg", 2], "all": 3}
+    table = CheckedTable(data, faults, None, key_in_about=True)
+    assert table.table("a").number("x", si="m") == 0.003
+    assert table.numbers("list", None, si=("rad", "m")) == (1.5707963267948966, 2.0)
+    assert (table.spread("all", 2, 0.0), table.mapping("none"), table.flag("none")) == ((3.0, 3.0), {}, False)
+    (inner,) = table.tables("b")
+    assert inner.rows("m") == ((1.0, 0.0, 0.0),) * 3
+    assert inner.number("huge", 1.0) == 1.0
+    table.report_unknown_keys()
+    assert [fault.about for fault in faults] == ["b[0].huge"]
