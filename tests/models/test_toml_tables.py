@@ -156,7 +156,8 @@ def test_a_checked_table_collects_all_errors_and_continues_with_substitutes() ->
     assert [str(fault).removeprefix("a.toml: key ").split(", allowed")[0] for fault in faults] == [
         "text: found 1", "choice: found 'ure'", "number: found 'x'", "numbers[1]: found 'a'",
         "few: found [1]", "flag: found 1", "texts: found 'a'", "mapping: found {'a': 1}",
-        "spread: found 'x'", "rows: found [1]", "table: found 1", "tables: found [1]", "length: found nothing",
+        "spread: found 'x'", "rows: found [1]", "table: found 1", "tables: found [1]",
+        "length: found nothing",
         "lenght: unknown (did you mean length?); allowed: text, choice, number, missing, numbers, few, flag,"
         " texts, mapping, spread, rows, table, tables, length",
     ]  # fmt: skip
