@@ -152,11 +152,9 @@ def open_form(chain: Chain, terms: Sequence[TermName] = TERMS) -> OpenForm:
         raise RobotError(Finding(about=about, found=f"{count} coordinates", allowed=allowed))
     rotations = sum(step.begins for step in iter_joint_steps(chain))
     if count + rotations > MAX_COORDINATES_AND_ROTATIONS:
-        found = (
-            f"{count} coordinates and {rotations} turns about axes that are not parallel to the one before"
-        )
+        size = f"{count} coordinates and {rotations} turns about axes that are not parallel to the one before"
         allowed = f"up to {MAX_COORDINATES_AND_ROTATIONS} of both in the open form"
-        raise RobotError(Finding(about=about, found=found, allowed=allowed))
+        raise RobotError(Finding(about=about, found=size, allowed=allowed))
     variables = chain_to_variables(chain)
     expanded = equations(energies(chain, variables), variables)
     formulas = {

@@ -220,8 +220,10 @@ def _no_arc_fault(rows: PathRows, row: int, tangent: FloatArray, onward: FloatAr
     if perpendicular_towards(tangent, normalise(onward)) is None:
         return _parallel_fault(rows, row, tangent, onward)
     radius, limit = _format_distinct(float(rows.radius[row]), max_arc_radius(tangent, onward))
-    found = f"{radius} m, with row {row + 2} inside its circle"
-    return Finding(row=row + 1, column=_radius_column(rows), found=found, allowed=f"up to {limit} m")
+    return Finding(
+        row=row + 1, column=_radius_column(rows),
+        found=f"{radius} m, with row {row + 2} inside its circle", allowed=f"up to {limit} m",
+    )  # fmt: skip
 
 
 def _format_distinct(value: float, limit: float) -> tuple[str, str]:
