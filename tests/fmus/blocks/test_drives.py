@@ -30,8 +30,12 @@ BEGIN = {"theta1": 0.02, "omega1": -0.5, "i_a": 3.0, "u": 24.0, "theta2": 0.01, 
 
 def instance_of(model: BlockModel, values: Mapping[str, float]) -> Instance:
     instance = Instance(model)
-    instance.set([instance.reference(name) for name in values], list(values.values()))
+    put(instance, **values)
     return instance
+
+
+def put(instance: Instance, **values: float) -> None:
+    instance.set([instance.reference(name) for name in values], list(values.values()))
 
 
 def read(instance: Instance, *names: str) -> FloatArray:
@@ -197,28 +201,18 @@ def times(count: int, step: float, begin: float = 0.0) -> NDArray[np.float64]:
     return np.asarray(begin + np.arange(count) * step, dtype=np.float64)
 
 
-def controller(**starts: float) -> Instance:
-    instance = Instance(make_block("drive_controller"))
-    instance.set([instance.reference(name) for name in starts], list(starts.values()))
-    return instance
-
-
 def voltage(instance: Instance) -> float:
-    return float(instance.get([instance.reference("u")])[0])
-
-
-def put(instance: Instance, name: str, value: float) -> None:
-    instance.set([instance.reference(name)], [value])
+    return float(read(instance, "u")[0])
 
 
 def test_at_a_sample_the_voltage_follows_its_inputs_at_once_and_then_holds() -> None:
-    instance = controller(**GAINS)
-    put(instance, "set_theta", 2.0)
+    instance = instance_of(make_block("drive_controller"), GAINS)
+    put(instance, set_theta=2.0)
     assert voltage(instance) == 2.0
-    put(instance, "set_theta", 3.0)
+    put(instance, set_theta=3.0)
     assert voltage(instance) == 3.0
     instance.do_step(0.0, 1e-3)
-    put(instance, "set_theta", 50.0)
+    put(instance, set_theta=50.0)
     assert voltage(instance) == 3.0
     for k in range(1, 5):
         instance.do_step(k * 1e-3, 1e-3)
@@ -261,22 +255,20 @@ def test_a_run_that_begins_before_0_takes_one_sample_a_period_from_there() -> No
 
 
 def test_eq_20_weighs_the_three_errors_and_keeps_within_the_limit() -> None:
-    instance = controller(last=10.0)
-    for name, value in (("set_theta", 1.0), ("set_omega", 2.0), ("set_alpha", 30.0)):
-        put(instance, name, value)
-    for name, value in (("real_theta", 0.5), ("real_omega", 3.0), ("real_alpha", 10.0)):
-        put(instance, name, value)
+    instance = instance_of(make_block("drive_controller"), {"last": 10.0})
+    put(instance, set_theta=1.0, set_omega=2.0, set_alpha=30.0)
+    put(instance, real_theta=0.5, real_omega=3.0, real_alpha=10.0)
     # the same sum in another order: the rounding of the last place
     assert voltage(instance) == pytest.approx(10.0 + 7.5 * 0.5 - 0.75 * 1.0 + 0.01 * 20.0, rel=1e-15)
-    put(instance, "set_theta", 1e6)
+    put(instance, set_theta=1e6)
     assert voltage(instance) == 48.0
-    put(instance, "set_theta", -1e6)
+    put(instance, set_theta=-1e6)
     assert voltage(instance) == -48.0
 
 
 def test_going_back_takes_the_same_sample_again() -> None:
-    instance = controller(**GAINS)
-    put(instance, "set_theta", 2.0)
+    instance = instance_of(make_block("drive_controller"), GAINS)
+    put(instance, set_theta=2.0)
     instance.do_step(0.0, 5e-3)
     saved = instance.save()
     first = voltage(instance)
@@ -286,12 +278,13 @@ def test_going_back_takes_the_same_sample_again() -> None:
 
 
 def test_the_period_is_fixed_once_it_runs_and_cannot_be_0() -> None:
-    instance = controller()
-    with pytest.raises(UnitError) as error:
-        put(instance, "period", 0.0)
-    assert str(error.value) == ("unit drive_controller: period: found 0, allowed: 1e-06 to inf")
+    instance = Instance(make_block("drive_controller"))
+    change = [instance.reference("period")]
+    assert refusal(UnitError, instance.set, change, [0.0]) == (
+        "unit drive_controller: period: found 0, allowed: 1e-06 to inf"
+    )
     instance.do_step(0.0, 5e-3)
-    assert refusal(UnitError, put, instance, "period", 1e-3) == (
+    assert refusal(UnitError, instance.set, change, [1e-3]) == (
         "unit drive_controller: period: set while it runs, allowed: a fixed parameter before the first step"
     )
 
@@ -375,6 +368,5 @@ def test_it_is_a_function_of_time_and_parameters_alone() -> None:
 )
 def test_what_makes_no_move_is_refused(name: str, value: float, said: str) -> None:
     instance = Instance(make_block("set_point"))
-    with pytest.raises(UnitError) as error:
-        instance.set([instance.reference(name)], [value])
-    assert str(error.value) == f"unit set_point: {name}: {said}"
+    message = refusal(UnitError, instance.set, [instance.reference(name)], [value])
+    assert message == f"unit set_point: {name}: {said}"
