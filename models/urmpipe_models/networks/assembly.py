@@ -200,7 +200,8 @@ def start_configuration(mechanism: Mechanism, controls: Mapping[str, float]) -> 
             faults.append(Finding(f"control {format_unknown_name(name, settable)}", parameter="controls"))
         elif not (math.isfinite(value) and settable[name].lower <= value <= settable[name].upper):
             allowed = f"{settable[name].lower:g} to {settable[name].upper:g}"
-            faults.append(Finding(found=f"{name} = {value:g}", allowed=allowed, parameter="controls"))
+            setting = f"{name} = {value:g}"
+            faults.append(Finding(found=setting, allowed=allowed, parameter="controls"))  # plain: ok
     if controls and not faults:
         parts = mechanism.network.as_parts()
         moved = tuple(
