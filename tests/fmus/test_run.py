@@ -240,6 +240,7 @@ def test_a_step_that_fails_leaves_all_as_it_was() -> None:
     broken = Instance(mixed())
     put(broken, fixed=1.0, u=2.0)
     for failing, time, step, said in (
+        (instance, 0.4, 0.1, "found a step from 0.4 s, allowed: from where it stands, 0.5 s"),
         (instance, 0.5, 0.0, "found a step of 0 s at 0.5 s, allowed: finite, above 0"),
         (instance, 0.5, -1.0, "found a step of -1 s at 0.5 s, allowed: finite, above 0"),
         (instance, math.nan, 1.0, "found a step of 1 s at nan s, allowed: finite, above 0"),

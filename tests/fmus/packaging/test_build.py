@@ -81,6 +81,8 @@ def test_the_guid_is_that_of_the_content(make: Make, tmp_path: Path) -> None:
     assert guid_in(made.path) == made.guid
     found["modelDescription.xml"] = found["modelDescription.xml"].replace(made.guid.encode(), b"")
     assert content_guid(found) == made.guid
+    assert (made.to_dict()["guid"], made.to_dict()["unit"]) == (made.guid, "spring")
+    assert list(made.to_frame()["name"]) == [one.name for one in made.unit.variables]
 
 
 @pytest.mark.slow
