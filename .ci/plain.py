@@ -109,7 +109,7 @@ def main() -> int:
         return 1 if any(counts.values()) else 0
     allowed = RULES["ratchet"]
     changed = {name for name in counts.keys() | allowed.keys() if counts.get(name, 0) != allowed.get(name, 0)}
-    if options.write and all(counts.get(name, 0) <= allowed.get(name, 0) for name in changed):
+    if options.write and all(not allowed or counts.get(name, 0) <= allowed.get(name, 0) for name in changed):
         text = RULES_FILE.read_text(encoding="utf-8")
         lines = "".join(f'"{name}" = {count}\n' for name, count in sorted(counts.items()) if count)
         RULES_FILE.write_text(text[: text.index("[ratchet]\n")] + "[ratchet]\n" + lines, encoding="utf-8")

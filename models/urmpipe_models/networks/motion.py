@@ -269,6 +269,7 @@ class _Tracer:
         self.here = first if self.sign > 0.0 else _reversed(first)
         self.before = self.here
         self.step = FIRST_STEP
+        self.last: Node | None = None  # at the end of the drive, if a segment crosses it
         self.trace = Trace()
 
     def run(self) -> Trace:
@@ -276,6 +277,8 @@ class _Tracer:
         while True:
             there = self._advance()
             if there is None:
+                if self.last is not None and self.sign * (self.last.z[-1] - self.here.z[-1]) > 0.0:
+                    self._append(self.last)
                 return self.trace
             if self.sign * there.tangent[-1] <= 0.0:
                 self._turn_back(there)
@@ -398,8 +401,7 @@ class _Tracer:
             falls = max(before.distance, there.distance) * (high - low)
             if best.distance < SINGULAR or best.distance > 4.0 * falls:
                 break  # at 0, or in a valley above it
-        is_known = any(np.allclose(best.z, node.z, atol=1e-4) for _, node in self.trace.singular)
-        if best.distance < 10.0 * SINGULAR and not is_known:
+        if best.distance < 10.0 * SINGULAR and not self._is_recorded(best):
             passage: Passage = "branches" if self._branches(best, here.tangent) else "goes through"
             self._record(passage, best, here.tangent)
 
@@ -438,16 +440,16 @@ class _Tracer:
         z[coordinate] = value
         solution = drive.correct(z, np.eye(len(z))[coordinate])
         node = there if solution is None else drive.node(solution, here.tangent)
+        if coordinate < 0 and not self.trace.complete and node.distance <= OVERRUN:
+            # a segment across the end: the tangent of a node where branches cross has any direction
+            self.trace.complete, self.end, self.last = True, self.end + self.sign * OVERRUN, node
+            return True
         self._touch(node)
         self._append(node)
         if coordinate >= 0:
             self._stop(coordinate, value, node)
-            return False
-        if self.trace.complete or node.distance > OVERRUN:
-            self.trace.complete = True
-            return False
-        self.trace.complete, self.end = True, self.end + self.sign * OVERRUN
-        return True
+        self.trace.complete |= coordinate < 0
+        return False
 
     def _stop(self, coordinate: int, value: float, node: Node) -> None:
         """Record the limit that ends the trace, unless it is beyond the end of the drive."""
@@ -459,7 +461,12 @@ class _Tracer:
         unit = mechanism.variables[place].unit
         self.trace.stop = LimitStop(mechanism.labels[place], unit, limit, s, x)
 
+    def _is_recorded(self, pose: Node) -> bool:
+        return any(np.allclose(pose.z, node.z, atol=1e-4) for _, node in self.trace.singular)
+
     def _record(self, passage: Passage, node: Node, tangent: FloatArray) -> None:
+        if self._is_recorded(node):  # on the first of two steps across the end of a drive
+            return
         drive, direction = self.drive, np.zeros(len(self.drive.x))
         vectors = np.linalg.svd(node.matrix[: drive.mechanism.rows, :-1])[2]
         followers = vectors[len(drive.free) - 1 - drive.spins]
