@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe_fmus.blocks.drives import dc_drive, drive_controller, inertia, set_point
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 from urmpipe_models.elementwise import Element, FloatArray
 
 PICTURE = Path(__file__).resolve().parent / "pictures" / "drives.svg"

@@ -9,7 +9,7 @@ import numpy as np
 from samples.path import SAMPLES, TIMES, SamplePath, ease
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_log
 from urmpipe_models.math3d import translation

@@ -27,7 +27,7 @@ from urmpipe_models.processes import describe_exit
 MAX_STEPS = 20  # fewer if the default experiment is shorter
 DEFAULT_STEP = 0.005  # s; communication step of an FMU that states none
 MAX_LOG_LINES = 5  # last lines of the log in the problems of an FMU that fails
-START_TIMEOUT = 60.0  # s from the start of the process to the first call of the FMU
+START_TIMEOUT = 60.0  # s from the start of the job (`FmuProcess.run`) to the first call of the FMU
 CO_SIMULATION = "FMI 2.0 for co-simulation, as most tools export it, too"
 PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from urmpipe_fmus.block import BlockModel, Rows
-from urmpipe_fmus.run import Equations
+from urmpipe_fmus.instance import Equations
 from urmpipe_models.errors import Finding, UnitError
 
 TIME = "time"

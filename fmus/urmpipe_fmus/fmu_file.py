@@ -203,9 +203,8 @@ def _read_archive(path: Path) -> tuple[bytes, tuple[str, ...]]:
         raise FmuError(f"found {format_value(str(path))}, allowed: the name of a file")
     try:
         mode = path.stat().st_mode
-        if not stat.S_ISREG(
-            mode
-        ):  # reading a pipe would wait; Windows only reports that folders cannot be read
+        # Reading a pipe would wait; Windows only reports that folders cannot be read.
+        if not stat.S_ISREG(mode):
             kind = "folder" if stat.S_ISDIR(mode) else "pipe or device"
             raise _error(path, f"found a {kind}, allowed: {AN_FMU}")
         with zipfile.ZipFile(path) as archive:

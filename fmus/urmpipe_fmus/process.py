@@ -4,7 +4,7 @@
 The parent process and the process of the FMUs share a temporary folder:
 
 1. The parent starts the process (`FmuProcess`), which loads its libraries while the parent writes the job.
-2. The process waits for the line "begin" (`await_job`). From then on it exits when its parent does.
+2. The process waits for the line "begin" (`await_job`). It exits when its parent does, before and after it.
 3. The parent polls the process (`FmuProcess.run`): it limits what is printed, and ends a process whose call
    does not return (`CallWatchdog`). Each call is noted in shared memory before it is made, with a number.
 4. The end is reported as text: the call that did not return, a signal, or an exit code.
@@ -69,16 +69,20 @@ class FmuProcess:
     def __enter__(self) -> FmuProcess:
         self._temporary = tempfile.TemporaryDirectory(prefix=self._prefix, ignore_cleanup_errors=True)
         self.folder = Path(self._temporary.name)
-        with (self.folder / OUTPUT).open("ab") as output:
-            self.process = subprocess.Popen(
-                module_command(self._module, str(self.folder)),
-                env=module_environment(),
-                stdin=subprocess.PIPE,  # closed when this process ends, however it ends
-                stdout=output if self._keep_stdout else subprocess.DEVNULL,
-                stderr=output,
-                start_new_session=True,
-                bufsize=0,  # so that closing its input writes nothing to a process that has ended
-            )
+        try:
+            with (self.folder / OUTPUT).open("ab") as output:
+                self.process = subprocess.Popen(
+                    module_command(self._module, str(self.folder)),
+                    env=module_environment(),
+                    stdin=subprocess.PIPE,  # closed when this process ends, however it ends
+                    stdout=output if self._keep_stdout else subprocess.DEVNULL,
+                    stderr=output,
+                    start_new_session=True,
+                    bufsize=0,  # so that closing its input writes nothing to a process that has ended
+                )
+        except BaseException:
+            self._temporary.cleanup()
+            raise
         return self
 
     def __exit__(

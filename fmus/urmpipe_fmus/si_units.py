@@ -18,9 +18,7 @@ from functools import cache
 
 from urmpipe_models.errors import UnitError
 
-FACTOR_TOLERANCE = (
-    1e-9  # relative; tools write pi/180 with ten digits or more, and units in use differ by more
-)
+FACTOR_TOLERANCE = 1e-9  # relative; tools write pi/180 with ten digits or more, units differ by more
 
 BASE_NAMES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 

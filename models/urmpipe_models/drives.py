@@ -292,9 +292,7 @@ def _since(time: Element, corner: Element) -> Element:
     return np.where(_is_reached(time, corner), 1.0, 0.0)
 
 
-SAMPLE_SLACK = (
-    1e-6  # of a period, before a sample, from which on it is due: computed, 0.3 / 0.1 is not quite 3
-)
+SAMPLE_SLACK = 1e-6  # of a period; a sample is due this early: 0.3 / 0.1 is computed as a bit less than 3
 
 
 class Gains(NamedTuple):

@@ -418,7 +418,7 @@ class LogError(UrmpipeError):
 
 
 class PathError(UrmpipeError):
-    """The rows of a path make no lines and arcs, or no arm reaches them."""
+    """The rows of a path do not define lines and arcs, or no arm reaches them."""
 
 
 class RecordingError(UrmpipeError):

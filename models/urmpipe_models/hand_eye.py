@@ -185,19 +185,19 @@ class _Rows(NamedTuple):
 
 
 class _Frames(NamedTuple):
-    """R_Z, d and R_X; those of several starts along a first axis."""
+    """R_Z, d and R_X; of several starts, stacked along a first axis."""
 
     base: FloatArray
     offset: FloatArray
     tool: FloatArray
 
     def add_step(self, step: FloatArray) -> _Frames:
-        """Return frames after a step: rotation of the base, offset, and of nine numbers that of the tool."""
+        """Return frames after a step: base rotation, offset, and of nine numbers the tool rotation."""
         tool = self.tool @ _to_matrix(step[..., 6:]) if step.shape[-1] > 6 else self.tool
         return _Frames(_to_matrix(step[..., :3]) @ self.base, self.offset + step[..., 3:6], tool)
 
     def take(self, start: IndexArray | int) -> _Frames:
-        """Return those of some of several starts, or of one."""
+        """Return the frames of some starts, or of one."""
         return _Frames(self.base[start], self.offset[start], self.tool[start])
 
 
@@ -226,7 +226,7 @@ def _with_orientations(rows: _Rows, rotation: FloatArray, measured: FloatArray |
 
 
 def _condense(sides: Sequence[FloatArray]) -> list[FloatArray]:
-    """Return few rows whose products of two columns have the sums that are the means over all rows."""
+    """Return a few rows whose products of two columns sum up to the means of those over all rows."""
     columns = [side.reshape(len(side), prod(side.shape[1:])) for side in sides]
     factor = np.linalg.qr(np.hstack(columns), mode="r") / np.sqrt(max(len(sides[0]), 1))
     parts = np.split(factor, np.cumsum([column.shape[1] for column in columns])[:-1], axis=1)
@@ -236,7 +236,7 @@ def _condense(sides: Sequence[FloatArray]) -> list[FloatArray]:
 def _bases_by_orientations(rows: _Rows) -> Iterator[FloatArray]:
     """Yield the R_Z of orientations: the first left singular vector of K = sum(R_M kron R_C).
 
-    R_M R_X^T R_C^T = R_Z makes K vec(R_X^T) = n vec(R_Z), and K lengthens no unit vector more.
+    R_M R_X^T R_C^T = R_Z makes K vec(R_X^T) = n vec(R_Z), and K lengthens no other unit vector more.
     """
     if len(rows.turn):
         k = np.einsum("nij,nkl->ikjl", rows.measured_turn, rows.turn).reshape(9, 9)
@@ -245,7 +245,7 @@ def _bases_by_orientations(rows: _Rows) -> Iterator[FloatArray]:
 
 
 def _fit_tool_rotation(rows: _Rows, frames: _Frames) -> _Frames:
-    """Return frames with the R_X of the least squared angles."""
+    """Return frames with the R_X of the least sum of squared angles."""
     rotated = frames.base[..., np.newaxis, :, :] @ rows.turn
     crossed = np.einsum("...nji,njk->...ik", rotated, rows.measured_turn)
     return frames._replace(tool=fit_rotation(crossed)[0]) if len(rows.turn) else frames

@@ -40,7 +40,7 @@ def aligned(rows: int, length: int) -> FloatArray:
 
 
 def fill_over_log(function: Function, q: FloatArray, targets: Sequence[FloatArray]) -> None:
-    """Write what a function makes of the columns of a log: one element a target, constants spread.
+    """Write the elements that a function returns for the columns of a log, one per target; constants fill it.
 
     Args:
         function: Of one element per coordinate, by + - *, their like among NumPy's ufuncs, and `cosine_sine`.
@@ -63,7 +63,7 @@ def fill_over_log(function: Function, q: FloatArray, targets: Sequence[FloatArra
 
 
 class Tape:
-    """The operations of a function in order, each with a choice of its arrays among those of all.
+    """The operations of a function in order, each with the choice of its arrays from the list of all.
 
     All are the inputs, the outputs, the arrays in between, and the constants.
 
@@ -110,7 +110,7 @@ class Tape:
         return self._turns[angle.at]
 
     def _placed(self, places: dict[int, int], first: int) -> tuple[list[Operation], int]:
-        """Return the operations with their arrays, and how many arrays from the first in between they need.
+        """Return the operations with their arrays, and the number of intermediate arrays from `first`.
 
         An array is free again after the last operation that needs its value; the one freed last is taken
         first, while the cache has it. A ufunc may write over its operands, cosine and sine may not.

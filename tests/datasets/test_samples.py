@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_log
 

@@ -14,7 +14,7 @@ import pytest
 from asserting import there
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.cosim import load_system
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "drives.md").read_text(encoding="utf-8")

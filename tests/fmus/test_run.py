@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from asserting import refusal
 from random_units import PATIENT, random_columns, random_starts, random_units
 from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Input, Memory, Output, Parameter, State, Variable
-from urmpipe_fmus.run import Equations, Instance, run
+from urmpipe_fmus.instance import Equations, Instance
+from urmpipe_fmus.run import run
 from urmpipe_models.errors import UnitError
 
 

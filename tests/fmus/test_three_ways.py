@@ -23,8 +23,9 @@ from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Table, Variable
 from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
+from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_unavailable_reason
-from urmpipe_fmus.run import Instance, run
+from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot

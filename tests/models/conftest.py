@@ -24,7 +24,7 @@ from urmpipe_models.arm.chain import (
     Sphere,
     Visual,
 )
-from urmpipe_models.arm.geometric_models import DHRow
+from urmpipe_models.arm.denavit_hartenberg import DHRow
 from urmpipe_models.drives import (
     NO_SPRING,
     CounterbalanceSpring,

@@ -103,7 +103,9 @@ def test_beyond_two_half_turns_a_constant_is_an_angle_as_any(quarters: int) -> N
     angle = quarters * math.pi / 2
     cosine = rotation_z(angle).rotation[0][0]
     assert cosine != 0.0
-    assert abs(cosine - math.cos(angle)) < 1e-24  # what is left of pi is known to that: `sine_cosine`
+    assert (
+        abs(cosine - math.cos(angle)) < 1e-24
+    )  # what is left of pi is known to that: `elementwise.cosine_sine`
 
 
 @settings(max_examples=40, deadline=None)

@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.arm.geometric_models import DHRow, articulated_6r, dh_chain, modified_dh_chain, urm_chain
+from urmpipe_models.arm.denavit_hartenberg import (
+    DHRow,
+    articulated_6r,
+    dh_chain,
+    modified_dh_chain,
+    urm_chain,
+)
 from urmpipe_models.drives import (
     Drive,
     Gains,

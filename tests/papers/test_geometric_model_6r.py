@@ -50,7 +50,7 @@ from geometric_6r import (
     model,
     vector,
 )
-from urmpipe_models.arm.geometric_models import GeometricModelRow, articulated_6r, articulated_6r_rows
+from urmpipe_models.arm.denavit_hartenberg import GeometricModelRow, articulated_6r, articulated_6r_rows
 from urmpipe_models.kinematics.forward import forward
 
 # --- the model and the chain -----------------------------------------------------------------------

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain, Inertial
-from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain
 from urmpipe_models.dynamics.equations import inverse_dynamics, mass_matrix, torque_terms
 from urmpipe_models.dynamics.links import Wrench, kinetic_energy, mass_motions, potential_energy
 from urmpipe_models.elementwise import FloatArray

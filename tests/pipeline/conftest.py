@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from asserting import refusal
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asserting import INCREASE
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.errors import LogError, OptionError, UrmpipeError
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.results import write_recording

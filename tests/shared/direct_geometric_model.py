@@ -8,7 +8,7 @@ from itertools import accumulate
 from operator import matmul
 from typing import TypeAlias
 
-from urmpipe_models.arm.geometric_models import AXES, GeometricModelRow
+from urmpipe_models.arm.denavit_hartenberg import AXES, GeometricModelRow
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, scale
 from urmpipe_models.math3d import Transform, euler_zxz, rotation_about
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy import cos, sin
 
 from direct_geometric_model import GeometricModel, geometric_model
-from urmpipe_models.arm.geometric_models import articulated_6r_rows
+from urmpipe_models.arm.denavit_hartenberg import articulated_6r_rows
 from urmpipe_models.elementwise import FloatArray
 
 ROUNDING = 1e-14

@@ -10,7 +10,7 @@ from closed_forms import form_by
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import ClosedForm
-from urmpipe_models.ik.parallel import parallel_axes
+from urmpipe_models.ik.parallel_axes import parallel_axes
 from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets, pose_errors
 from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.math3d import from_offset

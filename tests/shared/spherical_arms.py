@@ -9,7 +9,7 @@ import numpy as np
 
 from closed_forms import form_by
 from urmpipe_models.arm.chain import Chain, Joint, JointKind
-from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Solutions, Targets, pose_errors
 from urmpipe_models.ik.spherical import SphericalWrist, spherical_wrist

@@ -37,7 +37,7 @@ def build_fmu(
     """Package a unit as an FMU (FMI 2.0 co-simulation).
 
     Args:
-        unit: A name of `urmpipe_fmus.blocks`, a Python file with a unit in it, or a unit.
+        unit: A name of `urmpipe_fmus.blocks`, a Python file with a unit in it, or a `BlockModel`.
         robot: Name, file (TOML, URDF) or chain of the arm, for a unit that has one.
         log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
         options: Further options of the unit by name; see `urmpipe fmu list`.

@@ -16,7 +16,7 @@ from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.cosim.plan import LogColumn, prepare
 from urmpipe_fmus.cosim.simulation import simulate
 from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import CosimulationError, UnitError
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion

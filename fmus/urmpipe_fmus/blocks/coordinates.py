@@ -1,8 +1,9 @@
 """Options of the blocks, and the coordinates of a robot as variables.
 
-Options come from a file or a command line, so each `check_` function reports a value that does not fit. The
-coordinates are two arrays, as their units differ: `phi` of the revolute joints and `s` of the prismatic ones,
-each from the base outwards. `read_coordinates` and `scatter` convert between these arrays and joint order.
+Options come from a file or a command line, so the functions `check_...` raise `UnitError` for a value that
+does not fit. The coordinates are two arrays, as their units differ: `phi` of the revolute joints and `s` of
+the prismatic ones, each from the base outwards. `read_coordinates` and `scatter` convert between these arrays
+and joint order.
 """
 
 from __future__ import annotations
@@ -168,5 +169,5 @@ def acceleration_outputs(robot: Chain) -> Iterator[Output]:
 
 
 def robot_recipe(module: str, robot: Chain, **options: Any) -> Recipe:
-    """Return the recipe of a block of a robot: the robot as text, without meshes of other files."""
+    """Return the recipe of a block of a robot: the robot as text, without visuals, which may name files."""
     return Recipe(module, "from_robot_toml", {"robot": robot_toml(replace(robot, visuals=())), **options})

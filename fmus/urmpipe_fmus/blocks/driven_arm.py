@@ -95,7 +95,7 @@ _CONSTANTS = {
 
 @dataclass(frozen=True, slots=True)
 class DriveGroup:
-    """The drives of all joints of a kind as variables.
+    """The drives of all joints of a kind as variables, whose names end in `suffix`.
 
     Attributes:
         kind: The kind of the coordinates.

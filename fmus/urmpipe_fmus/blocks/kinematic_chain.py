@@ -24,7 +24,7 @@ from urmpipe_fmus.blocks.coordinates import (
 )
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.chain import Parameter as ArmParameter
-from urmpipe_models.arm.geometric_models import SEGMENT_SOURCE, TILT_SOURCE
+from urmpipe_models.arm.denavit_hartenberg import SEGMENT_SOURCE, TILT_SOURCE
 from urmpipe_models.errors import UnitError
 from urmpipe_models.kinematics.forward import Motion, forward, iter_point_motions
 from urmpipe_models.math3d import Transform, euler_zyx, from_rpy, matrix_to_rpy

@@ -211,7 +211,7 @@ def _repolarizer_update(v: Values) -> Mapping[str, Sequence[Element]]:
 
 
 def delta_meter() -> BlockModel:
-    """Return the block that measures the deviation of a point from its reference.
+    """Return the block that measures the deviation of a point: delta = reference - actual, in [m].
 
     Source: [UrmArm2021]_ eq. 19-21, 23.
     """

@@ -22,7 +22,7 @@ import numpy as np
 
 from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.dependencies import Dependencies
-from urmpipe_fmus.run import Equations
+from urmpipe_fmus.instance import Equations
 from urmpipe_models.errors import Finding, UnitError, UrmpipeError
 from urmpipe_models.files import read_contents
 

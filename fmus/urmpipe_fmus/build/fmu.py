@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 DOCUMENTATION = "documentation/index.html"  # path in an FMU
-ROBOT_FILE = "resources/robot.toml"  # path in an FMU; systems draw the robot of it
+ROBOT_FILE = "resources/robot.toml"  # path in an FMU; a system draws this robot
 
 PACKAGES = ("urmpipe_fmus", "urmpipe_models", "urmpipe_datasets")
 SUFFIXES = (".py", ".c", ".h", ".jinja", ".toml", ".urdf")  # of files of PACKAGES that may go into an FMU
@@ -170,7 +170,7 @@ def _add_description(
     model: BlockModel, backend: Backend, files: dict[str, bytes], source_files: Sequence[str]
 ) -> tuple[dict[str, bytes], str]:
     """Return files with robot, documentation and description, and the GUID of their content."""
-    robot = model.recipe.arguments.get("robot") if model.recipe else None
+    robot = model.recipe.arguments.get("robot")
     files = files | ({ROBOT_FILE: robot.encode()} if isinstance(robot, str) else {})
     files |= {DOCUMENTATION: documentation(model).encode()}
     text = model_description(model, "", backend, source_files)

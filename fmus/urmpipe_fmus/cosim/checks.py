@@ -1,7 +1,7 @@
-"""Interface of an FMU (variables, dependencies, abilities), and the checks of a system's connections.
+"""The interface of an FMU (variables, dependencies, abilities), and the checks of a system's connections.
 
-1. `read_interface` reads an FMU's description. It is not validated, as in `check_fmu`: many FMUs that are not
-   quite valid run.
+1. `read_interface` reads an FMU's description. It does not validate it, unlike `check_fmu`: many FMUs that
+   are not quite valid run.
 2. `Wiring` resolves the connections, inputs from logs and start values of a system to scalars. It checks
    names, causality, sizes, types, units (by their dimensions in SI), ranges, that no input has two sources,
    and that each has one. What depends on a block or column that could not be read counts as right.
@@ -17,6 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.cosim.job import TYPES
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
 from urmpipe_fmus.fmu_file import host_binaries, open_fmu
 from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, is_same_unit, parse_unit
@@ -24,7 +25,6 @@ from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 
 ELEMENT = re.compile(r"(.+)\[(\d+(?:,\s*\d+)*)\]")  # name of an array's element: `phi[1]`, `M[1,2]`
-NUMBERS = ("Real", "Integer", "Boolean")  # types that are exchanged and recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class Interface:
     @cached_property
     def outputs(self) -> tuple[Variable, ...]:
         """Its outputs that are numbers, in order."""
-        return tuple(v for v in self.variables.values() if v.causality == "output" and v.type in NUMBERS)
+        return tuple(v for v in self.variables.values() if v.causality == "output" and v.type in TYPES)
 
     @cached_property
     def arrays(self) -> Mapping[str, tuple[Variable, ...]]:
@@ -171,7 +171,7 @@ class Interface:
 
 
 def read_interface(path: Path) -> Interface:
-    """Read the interface of an FMU.
+    """Read the interface of an FMU, without the validation that `check_fmu` does.
 
     Raises:
         FmuError: If its archive or its description cannot be read.
@@ -407,7 +407,7 @@ class Wiring:
         self._sources[port] = source
 
     def _check_log_input(self, port: Port, unit: str | None) -> bool:
-        """Return whether an input from a log exists, and is a number of its unit; None if not read."""
+        """Return whether a log can feed an input; its unit is compared, None if the log was not read."""
         table = f"inputs.{port}"
         elements = self._elements(table, port, "input")
         if not elements:

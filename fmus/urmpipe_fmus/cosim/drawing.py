@@ -96,7 +96,7 @@ class Box:
         layer: Its column, from the left.
         x: Its left edge in [px].
         y: Its upper edge in [px].
-        log: Whether it is a log that inputs follow, no block.
+        log: Whether it is a log that inputs follow, and not a block.
     """
 
     name: str

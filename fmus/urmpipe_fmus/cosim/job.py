@@ -1,4 +1,4 @@
-"""Job of the process that runs the FMUs of a system: numbers, places and paths, without names to resolve.
+"""The job of the process that runs the FMUs of a system: numbers, places and paths, without names to resolve.
 
 The values of a system are one vector per type. Its places are, in this order: inputs from logs, outputs in
 the order in which they are read, and torn inputs of algebraic loops. Values read together are neighbours.

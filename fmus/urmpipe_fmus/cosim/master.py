@@ -54,7 +54,7 @@ MAX_ITERATIONS = 50  # Newton's method needs a handful
 DIFFERENCE = 1e-7  # relative step of the differences: about the root of the precision of a double
 MAX_STEP_HALVINGS = 6  # of a step that makes the residual larger
 MAX_FINITE_HALVINGS = 40  # of a step to where values are not finite
-MAX_RESIDUAL_RATIO = 0.25  # of a step; a larger residual is a reason to find the Jacobian again
+MAX_RESIDUAL_RATIO = 0.25  # residual after / before a step; above it the Jacobian is found again
 TIME_TOLERANCE = 1e-9  # s; times that differ by no more are equal: rows are recorded in whole ns
 
 PreparedCall = tuple[int, Call]  # code of the call, and the call

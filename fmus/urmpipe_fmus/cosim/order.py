@@ -1,4 +1,4 @@
-"""Order in which inputs are set and outputs are read at a communication point.
+"""The order in which inputs are set and outputs are read at a communication point.
 
 An output that depends on an input at once can be read only after that input is set for the same instant.
 So outputs are read in topological order of their dependencies, as many of a block together as possible.

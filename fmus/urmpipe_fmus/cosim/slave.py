@@ -51,7 +51,7 @@ def status_name(status: int) -> str:
 
 
 class FmuCallError(Exception):
-    """Call of an FMU function failed.
+    """A call of an FMU function failed.
 
     Attributes:
         code: Block and function, see `encode_call`.

@@ -393,7 +393,7 @@ class _SystemReader:
         log, column = table.text("log"), table.text("column")
         for key in ("log", "column"):
             if values.get(key) == "":
-                table.add_error(key, "found '', allowed: a text")
+                table.add_error(key, "found '', allowed: a text that is not empty")
         interpolate = table.flag("interpolate")
         table.report_unknown_keys()
         log = "" if _has_fault(where, self.faults) else log

@@ -1,4 +1,4 @@
-"""The native backend: a unit as C sources under a small runtime, and compiled for one platform or several."""
+"""The native backend: a block model as C sources with a small runtime, compiled for one or more platforms."""
 
 from urmpipe_fmus.fmu_file import this_platform
 from urmpipe_fmus.native.compile import (

@@ -35,9 +35,7 @@ FLAGS = (
     "-shared", "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-s",
     "-Wall", "-Wextra", "-Wfatal-errors",
 )  # fmt: skip
-RESOURCES_SOURCE = (
-    "sources/resources.c"  # compiled alone: names of Windows' headers may collide with a model's
-)
+RESOURCES_SOURCE = "sources/resources.c"  # compiled alone: names in Windows' headers may be a model's
 TEMPORARY = ("TMPDIR", "TMP", "TEMP", "ZIG_LOCAL_CACHE_DIR")  # variables that compilers read
 MAX_ERROR_LINES = 12
 
@@ -101,9 +99,8 @@ def _model_code(model: BlockModel) -> str:
         f"const Variable model_variables[] = {{\n{''.join(table)}}};\n",
     ]
     for name, variables in (("output", model.computed), ("state", model.states), ("memory", model.memories)):
-        references = (
-            ", ".join(map(str, _references(model, variables))) or "-1 /* none */"
-        )  # C: no empty arrays
+        # C has no empty arrays.
+        references = ", ".join(map(str, _references(model, variables))) or "-1 /* none */"
         parts.append(f"const int model_{name}_references[] = {{{references}}};\n")
     for name, function, result in zip(
         functions._fields, functions, ("outputs", "derivatives", "next"), strict=True

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from urmpipe_fmus.block import BlockModel, Rows
+from urmpipe_fmus.instance import Equations
 from urmpipe_fmus.native.symbols import Symbol, exact_expressions, expression
-from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import UnitError
 
 ARGUMENTS = ("time", "v[{}]", "rows->before[{}]", "rows->after[{}]", "rows->fraction")

@@ -16,7 +16,7 @@ from math import isfinite
 from typing import Any, ClassVar, NamedTuple
 
 from urmpipe_fmus.block import MAX_INTEGER, BlockModel, ValueType
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 from urmpipe_models.errors import UnitError
 
 ERROR = 3

@@ -68,7 +68,7 @@ def inverse_dynamics(
 ) -> list[Element]:
     """Return the joint torques that a motion needs.
 
-    Outward, in the frame of each link: omega, alpha and a as in `kinematics.motion`, a of the base being -g.
+    Outward, in the frame of each link: omega, alpha and a as in `kinematics.forward`, a of the base being -g.
     Inward: f = m a + alpha x h + omega x (omega x h), n = I alpha + omega x I omega + h x a, plus those of
     the next link; a revolute joint needs z . n, a prismatic one z . f. The torque of a mimic joint counts,
     times its multiplier, for the joint that it follows.

@@ -1,7 +1,7 @@
 """Closed forms: which arm has one, and arms that have one except for small deviations.
 
 1. `closed_form` recognises an arm by its screws: the last three axes meet in a point (`spherical`), or axes
-   2, 3 and 4 are parallel (`parallel`): exactly (`exact_closed_form`), or nearly.
+   2, 3 and 4 are parallel (`parallel_axes`): exactly (`exact_closed_form`), or nearly.
 2. Nearly: its file is rounded, or it is measured as built. `iter_spherical_wrists` and `iter_parallel_axes`
    give ideal arms, whose axes do meet or are parallel.
 3. `NearClosedForm` solves the ideal arm; each of its solutions is the start of a few steps of Levenberg and
@@ -22,7 +22,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
 from urmpipe_models.ik.loop_equations import nearest_point
 from urmpipe_models.ik.numeric import refine
-from urmpipe_models.ik.parallel import ParallelAxes, parallel_axes
+from urmpipe_models.ik.parallel_axes import ParallelAxes, parallel_axes
 from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.spherical import MIN_TILT_SINE, SphericalWrist, meeting_point, spherical_wrist
 from urmpipe_models.ik.trigonometric import wrap_angle
@@ -102,7 +102,7 @@ def closed_form(chain: Chain) -> ClosedForm | None:
 
 @lru_cache(maxsize=32)
 def exact_closed_form(chain: Chain) -> ClosedForm | None:
-    """Return the closed form of an arm that has it to the rounding; None if it has none.
+    """Return the closed form of an arm that has it exactly, except for rounding; None if it has none.
 
     Paths use these alone: near singular poses the branches of an arm that only nearly has one
     are not those of the ideal arm.

@@ -7,7 +7,7 @@
    is separated at joint 2: x = exp(-xi1 q1) w must result from y = exp(xi3 q3) p0 by joint 2 alone. A
    revolute joint 2 keeps k2 . (y - o2) and |y - o2|^2 (the invariants of Pieper), a prismatic one both
    coordinates across it. Either way these are two equations A1 u1 + b1(w) = A3 u3 + b3 in points u1, u3 of
-   a circle or a parabola, with constant matrices. `position_arm` solves them.
+   a circle or a parabola, with constant matrices. `shoulder_elbow` solves them.
 2. `refine_joints`: Newton's rule on joints 1 to 3, for arms that fulfil them only approximately.
 3. `ReachReasons`: why the joints do not reach a wrist centre, as text with figures.
 

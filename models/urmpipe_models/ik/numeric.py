@@ -74,7 +74,7 @@ RANK_CUTOFF = 1e-6  # of the largest singular value; smaller ones count as 0 in 
 
 MOTION_TOLERANCE = 1e-6  # [rad] or [m]; a null-space step t of at most this in every joint counts as 0
 RANK_DAMPING = 1e-13  # of the trace of J J^T: singular values below 3e-7 of the norm belong to the null space
-EXACT = 1e-13  # [m] and [rad]; error after moves: 1e-10 would feign more than a last move gains
+EXACT = 1e-13  # [m] and [rad]; error after moves; with 1e-10 it looks larger than a last move gains
 CORRECTIONS = 6  # Newton steps back onto the target; a move that needs more was too long
 MAX_MOVES = 200  # along the null space, with those that were rejected
 LENGTHS = (0.05, 16.0)  # shortest and longest step to try, in multiples of t
@@ -307,7 +307,7 @@ def _descend(state: _State, task: Task, index: IndexArray, options: DescentOptio
 
 
 def _is_under_way(error: TaskError, options: DescentOptions) -> BoolArray:
-    """Return where the target is neither met nor not a number."""
+    """Return where the target is a number and not yet met."""
     return np.asarray((error.square < np.inf) & ~error.within(options.metres, options.radians))
 
 

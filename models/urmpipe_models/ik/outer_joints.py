@@ -11,7 +11,7 @@
    hold, both linear in the cosine and sine of q1 and of q5. `outer_joints` solves them by the position of
    axes 5 and 6: they meet, are parallel, or pass each other.
 
-`parallel` solves joints 2, 3, 4 and 6.
+`parallel_axes` solves joints 2, 3, 4 and 6.
 """
 
 from __future__ import annotations

@@ -63,9 +63,8 @@ GROWTH = 4  # factor of their number while all are out of reach
 # Results depend on it by 1e-8 rad per step, and by 1e-5 rad near singular poses: what the nanometre leaves
 # open, as the damping depends on the sweeps that a sample took.
 WINDOW_SIZE = 384
-MET = (
-    9e-10  # [m], rotations times `orientation_length`; a nanometre less the last motion of a converged sample
-)
+# [m], rotations times `orientation_length`; a nanometre less the last motion of a converged sample.
+MET = 9e-10
 CONVERGED = 1e-10  # [rad] or [m]; a sample has converged once a sweep moves no joint by more
 NEARLY_CONVERGED = 1e-6  # [rad] or [m]; a remaining error is then one of the damping, not of the sweeps
 DAMPING_FACTOR = 0.1  # for the damping of a sample where it alone keeps the tool from its target ...
@@ -75,9 +74,8 @@ MAX_SWEEPS = 25  # of the sample at the front
 
 DAMPING = 1e-8  # lambda^2 in [m2/rad2]
 SECTION_SHARE = 4  # sections of a recurrence per length: products of matrices cost more than vectors
-RELEASE_TOLERANCE = (
-    1e-10  # [rad] or [m]; a smaller step inwards is rounding, and the joint stays at its limit
-)
+# [rad] or [m]; a smaller step inwards is rounding, and the joint stays at its limit.
+RELEASE_TOLERANCE = 1e-10
 REACH_MARGIN = 1e-3  # [m]; targets nearer to the edge of the reach are left to the search
 
 
@@ -338,7 +336,7 @@ def newton_sweep(
 
 
 def solve_recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
-    """Return c_k = M_k c_{k-1} + a_k with c before the first 0, in any unit, shape (w, m).
+    """Return c_k = M_k c_{k-1} + a_k, with 0 before the first one, in any unit, shape (w, m).
 
     The samples are cut into sections. In parallel each section becomes one map of its initial value: the
     product of its matrices and the sum of its offsets. Only the sections are evaluated one after the other.

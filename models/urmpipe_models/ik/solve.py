@@ -40,13 +40,11 @@ from urmpipe_models.ik.trigonometric import wrap_angle
 Method = Literal["auto", "closed", "iterative"]
 METHODS: tuple[Method, ...] = ("auto", "closed", "iterative")
 
-NEAREST = (
-    "nearest"  # name of the only column of solutions that were selected from the branches of a closed form
-)
+# Name of the only column of solutions that were selected from the branches of a closed form.
+NEAREST = "nearest"
 CHOSEN_BY_LIMITS = ", or what the limits of the joints allow"  # is added to `SingularPoses.chosen`
-SAME_BRANCH_TOLERANCE = (
-    1e-4  # [rad] or [m] of every joint; a solution this near to another branch is that branch
-)
+# [rad] or [m] of every joint; a solution this near to another branch is that branch.
+SAME_BRANCH_TOLERANCE = 1e-4
 
 
 def solve(

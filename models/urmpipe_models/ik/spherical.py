@@ -2,7 +2,7 @@
 
 1. `spherical_wrist` recognises such an arm by its screws.
 2. The tool's pose gives the wrist centre, this joints 1 to 3 in up to four postures: right or left, elbow up
-   or down (`position_arm.PositionArm`).
+   or down (`shoulder_elbow.PositionArm`).
 3. The remaining rotation gives joints 4 to 6, R4 R5 R6 = Q, in up to two: not flipped, flipped (`Wrist`).
 4. Both are combined to up to eight branches, such as "right, elbow up, flipped" (`SphericalWrist`); where
    they lie in singular poses, the families say what is free and what was chosen.
@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray, map_blocks, row_blocks
-from urmpipe_models.ik.position_arm import PositionArm, Postures, position_arm
+from urmpipe_models.ik.shoulder_elbow import PositionArm, Postures, position_arm
 from urmpipe_models.ik.solutions import (
     SingularFamily,
     SingularPoses,
@@ -36,7 +36,7 @@ from urmpipe_models.math3d import rotation_about
 MEETING_TOLERANCE = 1e-11
 MIN_TILT_SINE = 1e-6  # of the angles between axes 4 and 5, and 5 and 6
 # Axes 4 and 6 at a smaller angle than this, in [rad], count as one line. The choice made there turns the
-# tool by less than this; beyond it the angles are accurate to the rounding, as each is computed from those
+# tool by less than this; beyond it the angles are accurate to rounding, as each is computed from those
 # before it.
 ALIGNED_TOLERANCE = 1e-11
 DUPLICATE_TOLERANCE = 1e-5  # [rad]; flips that differ by less in every joint are one

@@ -37,9 +37,8 @@ from urmpipe_models.kinematics.forward import jacobian_over_log, joint_values
 from urmpipe_models.kinematics.singularity import characteristic_length
 from urmpipe_models.math3d import Transform
 
-HALF_TURN_SINE = (
-    1e-6  # below it an angle near pi takes its axis from the symmetric part of the rotation matrix
-)
+# Below it an angle near pi takes its axis from the symmetric part of the rotation matrix.
+HALF_TURN_SINE = 1e-6
 
 Terms: TypeAlias = tuple[tuple[int, float], ...]  # entries of a constant vector that are not 0: index, value
 Columns: TypeAlias = tuple[
@@ -146,7 +145,7 @@ class ToolMotion(NamedTuple):
     Attributes:
         position: In [m], shape (3, n).
         columns: The axes x, y, z of the tool [-], shape (3, 3, n), first index: the axis.
-        jacobian: As `kinematics.jacobian`, in [m/rad] or [-], shape (6, joints, n).
+        jacobian: As `kinematics.forward.jacobian`, in [m/rad] or [-], shape (6, joints, n).
     """
 
     position: FloatArray

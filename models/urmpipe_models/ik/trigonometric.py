@@ -5,7 +5,7 @@
    revolute joint or the parabola (s, s^2) of a prismatic one; they also report where both roots coincide.
 3. `quadric_roots`: A c^2 + B c s + C s^2 + D c + E s + F = 0 with c = cos x, s = sin x, up to four roots:
    the quartic in the tangent of the half angle [Pieper1968]_, by eigenvalues and Newton's rule.
-4. `angle_about`, `angle_between`: angles of directions, accurate to the rounding for any directions.
+4. `angle_about`, `angle_between`: angles of directions, accurate to rounding for any directions.
 """
 
 from __future__ import annotations

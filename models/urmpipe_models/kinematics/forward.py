@@ -112,7 +112,7 @@ def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
 
 
 def tip_position(chain: Chain, q: Sequence[Element]) -> Vector:
-    """Return the tool centre point in the world [m], without its orientation, as `tip_pose` does.
+    """Return the tool centre point in the world [m]; `tip_pose` also returns its orientation.
 
     Args:
         chain: The arm.

@@ -20,9 +20,8 @@ from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.math3d import Transform, rotation_about
 
 MAX_ROUNDING = 1e-15  # entries of constant rotations this close to a whole number are replaced by it
-PARALLEL_TOLERANCE = (
-    1e-12  # difference of the directions of parallel axes; less than the rounding of a torque
-)
+# Difference of the directions of parallel axes; less than the rounding of a torque.
+PARALLEL_TOLERANCE = 1e-12
 NEGLIGIBLE_SUM = 1e-14  # share of the largest summand; a smaller sum is rounding
 
 Angle: TypeAlias = tuple[float, ...]  # a sum of joint values: the factor of each coordinate

@@ -270,7 +270,7 @@ class _Search:
                 pass
 
     def add(self, ends: DescentResult) -> Iterator[bool]:
-        """Yield of each configuration, in turn, whether it closes and is new: then it is kept."""
+        """Yield for each configuration whether it closes and is new; if so, it is kept."""
         gaps = np.where(np.isnan(ends.gap), np.inf, ends.gap)
         best = int(np.argmin(gaps))
         if gaps[best] < self._gap:

@@ -212,7 +212,7 @@ def relative_movers(posed: dict[str, Pose], bodies: tuple[str, str], cut: str = 
 
 
 def _mover_twists(state: MechanismState, n: int) -> dict[str, tuple[IndexArray, FloatArray]]:
-    """Return of each joint and free body the numbers of the variables that move it, and their twists.
+    """Return for each joint and free body the numbers of the variables that move it, and their twists.
 
     A twist is the angular velocity in [rad] and the velocity in [m] of the point at the ground's origin, per
     unit of the variable, shape (6, k, n).
@@ -302,7 +302,7 @@ def body_twists(mechanism: Mechanism, x: FloatArray) -> dict[str, FloatArray]:
 def iter_twist_maps(
     mechanism: Mechanism, x: FloatArray
 ) -> Iterator[tuple[Joint | ConstraintElement, slice, FloatArray]]:
-    """Yield of each cut joint and element its rows, and the matrix from twists in the ground to their rates.
+    """Yield for each cut joint and element its rows, and the matrix from twists in the ground to their rates.
 
     The transpose turns multipliers of the rows, in [N] and [N.m], into the moment and force, about the
     origin of the ground, on the second body. Shape (rows, 6, n), of variables x of the shape (variables, n).

@@ -4,7 +4,7 @@
 2. `split_variables`: which variables follow. Controls without a drive keep their value; if joints are
    driven in their place, controls follow.
 3. `move_to`: from an assembly along a straight line of the drives to where the motion begins.
-4. `drive_rows`: the motion along rows of the drives, on a line (`motion`) or not (`row_motion`).
+4. `drive_rows`: the motion along rows of the drives, on a line (`continuation`) or not (`row_motion`).
 5. `compute_shares`: the place along the line over time.
 """
 
@@ -19,14 +19,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.errors import Finding, NetworkError, format_unknown_name
-from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.mobility import (
-    find_idle_spins,
-    find_spinning_bodies,
-    nearby_mobility,
-    reset_idle_spins,
-)
-from urmpipe_models.networks.motion import (
+from urmpipe_models.networks.continuation import (
     MAX_LENGTH,
     SINGULAR,
     BranchDerivatives,
@@ -36,6 +29,13 @@ from urmpipe_models.networks.motion import (
     Trace,
     sample_branch,
     trace_branch,
+)
+from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.mobility import (
+    find_idle_spins,
+    find_spinning_bodies,
+    nearby_mobility,
+    reset_idle_spins,
 )
 from urmpipe_models.networks.row_motion import follow_rows
 

@@ -28,8 +28,8 @@ from urmpipe_models.networks.closure import (
     iter_twist_maps,
     stack_elements,
 )
+from urmpipe_models.networks.continuation import BranchDerivatives
 from urmpipe_models.networks.mechanism import Mechanism, Placements
-from urmpipe_models.networks.motion import BranchDerivatives
 from urmpipe_models.networks.parts import Joint
 
 UNDETERMINED = 1e-7  # share of a unit multiplier that a component takes from redundant constraints

@@ -341,7 +341,7 @@ class Mechanism:
 
     @cached_property
     def points(self) -> dict[str, list[Vector]]:
-        """Of each body the points in [m] of its joints and elements; a plane or a pair has none."""
+        """The points of the joints and elements of each body, in [m]; a plane or a pair has none."""
         points: dict[str, list[Vector]] = {name: [] for name in self.network.body_names}
         for joint in self.network.joints:
             for name, frame in zip(joint.bodies, joint.frames, strict=True):
@@ -490,7 +490,7 @@ class Mechanism:
 
     @cached_property
     def _child_frames(self) -> list[Transform]:
-        """Of each branch the child in the frame of its joint: A^-1."""
+        """The child in the frame of its joint, for each branch: A^-1."""
         return [
             self.network.joints[branch.joint].frames[branch.sign > 0].inverse()
             for branch in self.graph.branches

@@ -65,6 +65,7 @@ from urmpipe_models.networks.closure import (
     relative_movers,
     stack_elements,
 )
+from urmpipe_models.networks.continuation import BranchDerivatives
 from urmpipe_models.networks.joint_motion import (
     Twists,
     joint_frame,
@@ -74,7 +75,6 @@ from urmpipe_models.networks.joint_motion import (
 )
 from urmpipe_models.networks.mechanism import Mechanism, evaluate_expression
 from urmpipe_models.networks.mobility import IdleSpin, find_idle_spins, spin_angles
-from urmpipe_models.networks.motion import BranchDerivatives
 
 Column: TypeAlias = list[Element]  # one element per row
 
@@ -274,7 +274,7 @@ def predict_variables(
     Args:
         mechanism: The network.
         x: The variables at the last configuration in [m], [rad] and as controls are given, one element each.
-        change: How they have changed from the configuration before, see `changes`.
+        change: How they have changed from the configuration before, see `variable_changes`.
         ahead: The controls that can be set, as they are given.
     """
     scales = mechanism.column_scales
@@ -543,7 +543,7 @@ def compute_rates(
 
 
 def _in_joint_frames(mechanism: Mechanism, x: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return rows of `closure_residual`, along the axes of the ground, along those of `scaled_closure`."""
+    """Return rows of `closure_residual`, along the axes of the ground, in those of the joints."""
     turned = np.array(rows)
     frames = _cut_frames(evaluate_state(mechanism, x))
     for k, (here, _) in enumerate(frames):

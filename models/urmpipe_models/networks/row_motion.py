@@ -4,7 +4,7 @@
    side: each along a straight line of the drives from an earlier row, at most MAX_LINE away.
 2. Such a line may end on another branch than the log does. So each pair of neighbours is verified: their
    difference must agree with the tangents at both, and the Jacobian must keep its orientation. Where a pair
-   fails, the rows between are traced one after another (`motion.trace_branch`), until both agree again.
+   fails, the rows between are traced one after another (`continuation.trace_branch`), until both agree again.
 3. The rows between are solved side by side, from the tangents at both neighbours, and verified likewise.
 """
 
@@ -23,9 +23,7 @@ from urmpipe_models.networks.closure import (
     evaluate_scaled_closure,
     iter_chunks,
 )
-from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.mobility import find_idle_spins, reset_idle_spins
-from urmpipe_models.networks.motion import (
+from urmpipe_models.networks.continuation import (
     ROUNDING,
     Drive,
     LimitStop,
@@ -33,6 +31,8 @@ from urmpipe_models.networks.motion import (
     sample_branch,
     trace_branch,
 )
+from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.mobility import find_idle_spins, reset_idle_spins
 
 MAX_LINE = 3.0  # scaled length of the lines from a row along which others are solved
 COARSE_LENGTH = 0.05  # scaled length of the drives between rows that are solved first

@@ -28,13 +28,12 @@ from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
 from urmpipe_models.planning.laws import PathMotion, Phase, TimeLaw
 from urmpipe_models.planning.path import LineArcPath, segment_index
 
-FINITE_DIFFERENCE_STEP = (
-    1e-6  # of the fastest joint, [rad] or [m], for a Jacobian: error 1e-12, rounding 1e-10
-)
+# Of the fastest joint, [rad] or [m], for a Jacobian: error 1e-12, rounding 1e-10.
+FINITE_DIFFERENCE_STEP = 1e-6
 PATH_TOLERANCE = 1e-14  # [m] and [rad]; the tool within this of its path is on it: rounding
 MAX_NEWTON_STEPS = 4  # three square an error of 1e-2 down to rounding
 REFINEMENT_CUTOFF = 1e-9  # share of the largest singular value; smaller ones are 0 in a step onto the path
-DERIVATIVE_CUTOFF = 1e-15  # the same for derivatives, which shall grow near a singular pose
+DERIVATIVE_CUTOFF = 1e-15  # the same for derivatives, which must grow near a singular pose
 MIN_REGULAR_PIVOT = 1e-5  # share of the largest pivot; a Jacobian with larger ones is far from singular
 
 # The least time along the paper's contour is with these within 0.3 % of finer grids.

@@ -37,7 +37,13 @@ from urmpipe_models.arm.chain import (
     Sphere,
     Visual,
 )
-from urmpipe_models.arm.geometric_models import DHRow, articulated_6r, dh_chain, modified_dh_chain, urm_chain
+from urmpipe_models.arm.denavit_hartenberg import (
+    DHRow,
+    articulated_6r,
+    dh_chain,
+    modified_dh_chain,
+    urm_chain,
+)
 from urmpipe_models.drives import (
     DRIVE_KEYS,
     GAIN_KEYS,

@@ -27,6 +27,7 @@ from urmpipe_models.errors import (
     map_collecting_errors,
 )
 from urmpipe_models.networks.assembly import DEFAULT_RESTARTS, MAX_STARTS, assemble
+from urmpipe_models.networks.continuation import LimitStop, SingularPose
 from urmpipe_models.networks.driving import (
     LAWS,
     DrivenMotion,
@@ -40,7 +41,6 @@ from urmpipe_models.networks.driving import (
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.motion import LimitStop, SingularPose
 from urmpipe_models.networks.rates import Rates, compute_rates
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SourceFile, seconds

@@ -20,11 +20,11 @@ from urmpipe_models.networks.assembly import (
     single_assembly,
     start_configuration,
 )
+from urmpipe_models.networks.continuation import Trace
 from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import Mobility, analyse_mobility, find_blocked_controls
-from urmpipe_models.networks.motion import Trace
 from urmpipe_models.networks.parts import exceeded_limits
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.networks.given_values import parse_start

@@ -20,9 +20,9 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Voice
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.networks.closure import iter_chunks
+from urmpipe_models.networks.continuation import Passage
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.motion import Passage
 from urmpipe_models.networks.rates import Taylor, point_motion
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import NETWORK, JointLog, LogColumn, LogWarning, seconds

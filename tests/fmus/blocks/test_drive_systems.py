@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.cosim import Block, CosimulationRecord, load_system, prepare, simulate
+from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_unavailable_reason
-from urmpipe_fmus.run import Instance
 from urmpipe_models.drives import trapezoid
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward

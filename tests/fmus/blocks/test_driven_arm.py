@@ -23,8 +23,8 @@ from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.driven_arm import start_values
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.cosim import Block, CosimulationRecord, System, load_system, prepare, simulate
+from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_unavailable_reason
-from urmpipe_fmus.run import Instance
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.drives import (
     NO_SPRING,

@@ -15,7 +15,8 @@ from asserting import refusal
 from urmpipe_fmus.block import BlockModel, State, Values
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.dependencies import TIME, Dependencies
-from urmpipe_fmus.run import Instance, run
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.run import run
 from urmpipe_models.drives import ramp, step, trapezoid
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError

@@ -12,9 +12,10 @@ from sliding_arm import sliding_arm
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.kinematic_chain import kinematic_chain
-from urmpipe_fmus.run import Instance, run
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.run import run
 from urmpipe_models.arm.chain import Chain, Sphere, Visual
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log, points_over_log, positions_over_log
 from urmpipe_models.math3d import Transform, from_offset, from_rpy

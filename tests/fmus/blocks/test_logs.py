@@ -15,7 +15,8 @@ from random_units import PATIENT
 from urmpipe_fmus.block import Table
 from urmpipe_fmus.blocks.logs import Column, delta_meter, log_source, repolarizer
 from urmpipe_fmus.dependencies import TIME, Dependencies
-from urmpipe_fmus.run import Instance, run
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 from urmpipe_models.wraps import repolarize

@@ -164,7 +164,7 @@ tolerance = -1.0
         "inputs.a.w.column: found nothing, allowed: a text",
         "inputs.a.w.colunm: unknown (did you mean column?); allowed: log, column, interpolate",
         "inputs.a.x: found 1, allowed: { log = FILE, column = NAME }",
-        "inputs.a.y.log: found '', allowed: a text",
+        "inputs.a.y.log: found '', allowed: a text that is not empty",
         "loops.iterate: found 1, allowed: true or false",
         "loops.tolerance: found -1.0, allowed: a number above 0",
         "surprise: unknown; allowed: system, arguments, blocks, connections, inputs, loops",

@@ -16,8 +16,8 @@ from systems import Block, Scalar, System, Trace, empty_trace
 from urmpipe_fmus.block import Table
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import cached_fmu
+from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import this_platform
-from urmpipe_fmus.run import Instance
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot

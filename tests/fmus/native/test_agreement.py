@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from urmpipe_fmus.block import BlockModel
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 
 
 def assert_same(found: Sequence[float], expected: Sequence[float]) -> None:

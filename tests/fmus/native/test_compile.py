@@ -15,9 +15,9 @@ import pytest
 
 from c_host import GUID, host, ran, script, write
 from urmpipe_fmus.block import BlockModel
+from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_binaries, native_sources, native_unavailable_reason, this_platform
 from urmpipe_fmus.native.compile import TARGETS
-from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError
 
 needs_compiler = pytest.mark.skipif(

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from urmpipe_fmus.block import BlockModel, Input, Output, State
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 from urmpipe_models.errors import UnitError
 
 K, DAMPING, GOAL, ON, GEAR, X, COUNT, FORCE, FAR = 0, 1, 2, 3, 4, 5, 7, 9, 11

@@ -21,8 +21,8 @@ from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.fmu_file import write_fmu
+from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_unavailable_reason, this_platform
-from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError
 
 Make = Callable[..., BlockModel]

@@ -15,7 +15,7 @@ from loaded_fmu import Loaded
 from urmpipe_fmus.block import BlockModel, Input, Parameter, Recipe
 from urmpipe_fmus.blocks.user import block_from_source
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 
 Make = Callable[..., BlockModel]
 HELPERS = str(Path(__file__).parents[1])

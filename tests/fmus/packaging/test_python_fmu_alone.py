@@ -16,7 +16,7 @@ from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.user import block_from_source, load_block_file
 from urmpipe_fmus.build.fmu import build_fmu
-from urmpipe_fmus.run import Instance
+from urmpipe_fmus.instance import Instance
 from urmpipe_models.errors import FmuError, UnitError
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -28,7 +28,7 @@ from urmpipe_models.arm.chain import (
     Visual,
     resolve_mesh_path,
 )
-from urmpipe_models.arm.geometric_models import (
+from urmpipe_models.arm.denavit_hartenberg import (
     DHRow,
     GeometricModelRow,
     articulated_6r,

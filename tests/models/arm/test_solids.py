@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from urmpipe_models.arm.chain import Box, Capsule, Chain, Cylinder, Joint, JointKind, Mesh, Sphere, Visual
-from urmpipe_models.arm.geometric_models import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.kinematics.forward import frames_over_log, positions_over_log

@@ -15,7 +15,7 @@ from ik_arms import limited
 from parallel_arms import apart
 from spherical_arms import KINDS, assert_reached, away_from, random_arm, random_joints
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
-from urmpipe_models.arm.geometric_models import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import (
     LOST_BRANCH_REASON,
@@ -28,7 +28,7 @@ from urmpipe_models.ik.closed import (
     iter_parallel_axes,
     iter_spherical_wrists,
 )
-from urmpipe_models.ik.parallel import parallel_axes
+from urmpipe_models.ik.parallel_axes import parallel_axes
 from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.ik.spherical import spherical_wrist

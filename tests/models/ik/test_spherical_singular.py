@@ -11,7 +11,7 @@ import pytest
 from asserting import there
 from spherical_arms import assert_explained, assert_reached, away_from, inverse_of, random_arm
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets
 from urmpipe_models.ik.spherical import BATCH_SIZE

@@ -19,7 +19,7 @@ from scipy.linalg import expm
 from asserting import there
 from differences import assert_slope
 from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain, urm_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, modified_dh_chain, urm_chain
 from urmpipe_models.elementwise import BLOCK, FloatArray, row_blocks
 from urmpipe_models.kinematics.forward import (
     Screws,

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from arm6 import Arm6Lengths, arm6_determinant
 from asserting import there
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
-from urmpipe_models.arm.geometric_models import DHRow, GeometricModelRow, dh_chain, geometric_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, GeometricModelRow, dh_chain, geometric_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.kinematics.singularity import (

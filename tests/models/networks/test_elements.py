@@ -18,7 +18,7 @@ from asserting import refusal
 from pair_tables import CAM, GEARED, RACK, UNEVEN
 from random_networks import matrix
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, modified_dh_chain
 from urmpipe_models.elementwise import FloatArray, cross
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.kinematics.forward import iter_frames

@@ -17,7 +17,13 @@ from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
 from urmpipe_models.arm.chain import Box, Chain, Inertial, Joint, Mesh, Mimic, Visual
-from urmpipe_models.arm.geometric_models import DHRow, articulated_6r, dh_chain, modified_dh_chain, urm_chain
+from urmpipe_models.arm.denavit_hartenberg import (
+    DHRow,
+    articulated_6r,
+    dh_chain,
+    modified_dh_chain,
+    urm_chain,
+)
 from urmpipe_models.drives import NO_SPRING, CounterbalanceSpring, Drive, DrivenJoint, Gains, PassiveJoint
 from urmpipe_models.errors import RobotError
 from urmpipe_models.math3d import Transform, from_offset, from_rpy, rotation_x, translation

@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
 from urmpipe_models.arm.chain import Box, Capsule, Chain, Cylinder, Inertial, Joint, Sphere, Visual
-from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain
 from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.dynamics.links import chain_to_links
 from urmpipe_models.errors import OutputError, RobotError

@@ -12,7 +12,7 @@ import pytest
 
 from solved import solved
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.kinematics.forward import point_over_log

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.wraps import repolarize

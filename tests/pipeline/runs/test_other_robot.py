@@ -10,7 +10,7 @@ import pytest
 
 from asserting import there
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.math3d import Transform

@@ -10,7 +10,7 @@
 
 #define STEP_SLACK 1e-9         /* a step of n internal steps but for this share of one takes n of them */
 #define TIME_SLACK 1e-6         /* a communication point may differ by this share of the step from the own time */
-#define ROUNDING (4.0 * DBL_EPSILON) /* and by this share of itself, however short the step: see run.py */
+#define ROUNDING (4.0 * DBL_EPSILON) /* and by this share of itself, however short the step: see instance.py */
 #define STOP_SLACK 0.1          /* this share of a step past the stop time is what adding up steps may bring */
 #define MOST_STEPS 2147483647.0 /* internal steps in a step */
 

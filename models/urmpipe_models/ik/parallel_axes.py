@@ -57,9 +57,8 @@ from urmpipe_models.ik.trigonometric import wrap_angle
 from urmpipe_models.kinematics.forward import Screws
 from urmpipe_models.math3d import Transform, rotation_about
 
-NEARLY_ALIGNED = (
-    1e-5  # [rad]; axis 6 nearer to parallel to axis 4 leaves q6 too uncertain for the reach of p4
-)
+# [rad]; axis 6 nearer to parallel to axis 4 leaves q6 too uncertain for the reach of p4.
+NEARLY_ALIGNED = 1e-5
 DUPLICATE_TOLERANCE = 1e-9  # [rad]; solutions of a singular pose that differ by less in every joint are one
 ELBOWS = ("elbow up", "elbow down")
 
@@ -208,7 +207,7 @@ def _wrist(arm: ParallelGeometry, outer: OuterJoints, motion: Transform, near: F
 
 
 def _in_reach(arm: ParallelGeometry, rest: Transform, p4: Vector, wish: FloatArray) -> FloatArray:
-    """Return the q6 nearest to a wish at which the two links reach p4, of a wrist with axis 6 along z.
+    """Return the q6 nearest to `wish` at which the two links reach p4, of a wrist with axis 6 along z.
 
     p4 then runs on a circle: |o + u cos q6 + w sin q6|^2 = o^2 + u^2 + 2 o (u cos q6 + w sin q6).
     """

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from asserting import refusal
 from direct_geometric_model import geometric_model
-from urmpipe_models.arm.geometric_models import (
+from urmpipe_models.arm.denavit_hartenberg import (
     DHRow,
     GeometricModelRow,
     articulated_6r,

@@ -19,7 +19,7 @@ from parallel_arms import EXACT, UR, WRISTS, apart, assert_every_solution_meets,
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.ik.parallel import parallel_axes
+from urmpipe_models.ik.parallel_axes import parallel_axes
 from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.kinematics.singularity import singularity_over_log

@@ -193,6 +193,14 @@ def test_a_four_bar_that_cannot_turn_stops_at_its_limit(end: float, sign: int) -
     # the extreme of s along the arc is found to 1e-13 of its tangent; s itself is flat there
     assert moved.events[0].values["crank"] == pytest.approx(limit, abs=1e-9)
     assert 0 < (limit - column(moved, "theta2")[-1]) / ((end - 0.5) / 50) < 1
+    near = network_drive(
+        planar(0.5, 0.5, 0.5, 1.2, 0.5, sign), {"crank": (0.5, limit * (1 - 1e-9))}, steps=50
+    )
+    assert near.verdict == "pass"
+    apart_at_end = four_bar_at(0.5, 0.5, 0.5, 1.2, limit * (1 - 1e-9), sign) - column(near, "theta4")[-1]
+    assert math.remainder(apart_at_end, TURN) == pytest.approx(
+        0.0, abs=1e-6
+    )  # d theta4 / d crank is 1e4 here
 
 
 @pytest.mark.slow

@@ -140,6 +140,11 @@ class Drive:
         return self.mechanism.column_scales[self.free]
 
     @cached_property
+    def bounds(self) -> FloatArray:
+        """The limits of the variables that follow [-], shape (free, 2)."""
+        return self.limits[self.free] / self.scales[:, np.newaxis]
+
+    @cached_property
     def length(self) -> float:
         """The scaled length of the drive [-]: s times it is the last coordinate of z."""
         return float(np.linalg.norm(self.change / self.mechanism.column_scales))
@@ -277,20 +282,30 @@ class _Tracer:
         while True:
             there = self._advance()
             if there is None:
-                if self.last is not None and self.sign * (self.last.z[-1] - self.here.z[-1]) > 0.0:
-                    self._append(self.last)
-                return self.trace
-            if self.sign * there.tangent[-1] <= 0.0:
-                self._turn_back(there)
-                return self.trace
+                return self._finish()
+            turns_back = self.sign * there.tangent[-1] <= 0.0
+            if turns_back:
+                there = self._find_extreme(there)
             if self._is_beyond(there):
                 if not self._reach(there):
-                    return self.trace
+                    return self._finish()
                 continue
+            if turns_back:
+                self.trace.segments.append((self.here, there))
+                self._record("turns back", there, there.tangent)
+                self.trace.complete |= self.sign * (there.z[-1] - self.end) >= -ROUNDING
+                return self.trace
             self._touch(there)
             self._append(there)
             if not self.trace.complete:
                 self.progress(abs((there.z[-1] - self.begin) / (self.end - self.begin)))
+
+    def _finish(self) -> Trace:
+        """Add the node at the end of the drive if no segment crosses it."""
+        if self.last is not None and self.sign * (self.last.z[-1] - self.here.z[-1]) > 0.0:
+            self._touch(self.last)
+            self._append(self.last)
+        return self.trace
 
     def _append(self, there: Node) -> None:
         """Add a segment, and continue from its end in coordinates that are far from singular."""
@@ -299,12 +314,14 @@ class _Tracer:
         if (z != there.z).any():
             moved = self.drive.wrapped(there.z + 1e-5 * there.tangent) - z
             there = self.drive.node(z, moved)
+            if self.last is not None:
+                self.last = self.drive.node(self.drive.wrapped(self.last.z), there.tangent)
         self.here = there
 
     def _is_beyond(self, there: Node) -> bool:
-        x = self.drive.at(there.z[:, np.newaxis])[self.drive.free, 0]
-        lower, upper = self.drive.limits[self.drive.free].T
-        return bool(((x < lower) | (x > upper)).any() or self.sign * (there.z[-1] - self.end) >= 0.0)
+        lower, upper = self.drive.bounds.T
+        is_outside = ((there.z[:-1] < lower - ROUNDING) | (there.z[:-1] > upper + ROUNDING)).any()
+        return bool(is_outside or self.sign * (there.z[-1] - self.end) >= 0.0)
 
     def _advance(self) -> Node | None:
         """Return the next node; None where no step succeeds."""
@@ -314,7 +331,9 @@ class _Tracer:
             if there is not None and (turn := _angle_between(here, there)) < MAX_TURN:
                 cosine, _ = _orientation(here, there, self.drive.spins)
                 crossing = self._crossing(here, there) if cosine < 0.0 else None
-                if crossing is not None:
+                if crossing is not None and not self._is_recorded(
+                    crossing
+                ):  # on a step across the end before
                     self._record("branches", crossing, there.tangent)
                 if cosine > 0.3 or crossing is not None:
                     self.step = min(self.step * min(2.0, 0.7 * MAX_TURN / max(turn, 1e-9)), MAX_STEP)
@@ -353,12 +372,10 @@ class _Tracer:
         cubics = np.polyfit(steps - middle, [node.z for node in nodes], 3).T
         return self.drive.node(np.array([np.polyval(cubic, root) for cubic in cubics]), here.tangent)
 
-    def _turn_back(self, there: Node) -> None:
-        """End at the pose between two nodes where s has its extreme."""
+    def _find_extreme(self, there: Node) -> Node:
+        """Return the node between two at which s has its extreme."""
         node = self._root(self.here, there, lambda node: self.sign * float(node.tangent[-1]), 1e-13)
-        node = there if node is None else node
-        self.trace.segments.append((self.here, node))
-        self._record("turns back", node, node.tangent)
+        return there if node is None else node
 
     def _root(
         self, here: Node, there: Node, function: Callable[[Node], float], tolerance: float
@@ -425,15 +442,14 @@ class _Tracer:
         share, coordinate, value = np.inf, -1, self.end  # of the first limit, or of the end of the drive
         if self.sign * (there.z[-1] - self.end) >= 0.0:
             share = _first_share(here, there, -1, self.end)
-        limits = drive.limits[drive.free] / drive.scales[:, np.newaxis]
-        for k, (lower, upper) in enumerate(limits.tolist()):
+        for k, (lower, upper) in enumerate(drive.bounds.tolist()):
             for bound, sign in ((lower, -1.0), (upper, 1.0)):
-                if sign * (there.z[k] - bound) > 0.0:  # beyond it there; perhaps here already
+                if sign * (there.z[k] - bound) > ROUNDING:  # beyond it there; perhaps here already
                     is_beyond = sign * (here.z[k] - bound) >= 0.0
                     at = 0.0 if is_beyond else _first_share(here, there, k, bound)
                     if at < share:
                         share, coordinate, value = at, k, bound
-        if share == 0.0:
+        if share == 0.0 and coordinate >= 0:
             self._stop(coordinate, value, here)
             return False
         z = _Cubic.between(here, there).at(np.array([share]))[:, 0]
@@ -442,6 +458,9 @@ class _Tracer:
         node = there if solution is None else drive.node(solution, here.tangent)
         if coordinate < 0 and not self.trace.complete and node.distance <= OVERRUN:
             # a segment across the end: the tangent of a node where branches cross has any direction
+            chord = node.z - here.z
+            chord /= float(np.linalg.norm(chord)) or 1.0
+            node = node._replace(tangent=2.0 * (chord @ here.tangent) * chord - here.tangent)
             self.trace.complete, self.end, self.last = True, self.end + self.sign * OVERRUN, node
             return True
         self._touch(node)
@@ -456,17 +475,19 @@ class _Tracer:
         drive, mechanism = self.drive, self.drive.mechanism
         if self.trace.complete:
             return
+        poses = self.trace.singular  # one in the same step may be beyond the limit
+        self.trace.singular = [pose for pose in poses if self.sign * (pose[1].z[-1] - node.z[-1]) <= 0.0]
         place, x = int(drive.free[coordinate]), drive.at(node.z[:, np.newaxis])[:, 0]
         limit, s = value * float(drive.scales[coordinate]), float(node.z[-1]) / drive.length
         unit = mechanism.variables[place].unit
         self.trace.stop = LimitStop(mechanism.labels[place], unit, limit, s, x)
 
     def _is_recorded(self, pose: Node) -> bool:
-        return any(np.allclose(pose.z, node.z, atol=1e-4) for _, node in self.trace.singular)
+        z = self.drive.wrapped(pose.z)
+        known = (self.drive.wrapped(node.z) for _, node in self.trace.singular)
+        return any(np.allclose(z, other, rtol=0.0, atol=1e-4) for other in known)
 
     def _record(self, passage: Passage, node: Node, tangent: FloatArray) -> None:
-        if self._is_recorded(node):  # on the first of two steps across the end of a drive
-            return
         drive, direction = self.drive, np.zeros(len(self.drive.x))
         vectors = np.linalg.svd(node.matrix[: drive.mechanism.rows, :-1])[2]
         followers = vectors[len(drive.free) - 1 - drive.spins]

@@ -52,9 +52,8 @@ RANK_TOLERANCE = 1e-6
 EXACT_TOLERANCE = 1e-14  # up to this the loop equations hold exactly, and there is nothing to refine
 MAX_RESIDUAL = 2e-11  # of the arm's size; refined joints that leave the wrist centre off by more are dropped
 DUPLICATE_TOLERANCE = 1e-5  # [rad] or of the arm's size; refined postures that differ by less are one
-MIN_HALF_ANGLE_COSINE = (
-    1e-3  # a prismatic joint beyond 1000 arm's sizes is a root at infinity, moved by rounding
-)
+# A prismatic joint beyond 1000 arm's sizes is a root at infinity, moved by rounding.
+MIN_HALF_ANGLE_COSINE = 1e-3
 
 Order = Literal["first", "third", "both"]
 Meeting: TypeAlias = dict[SingularFamily, BoolArray]  # where two postures are one, shape (k, n), by family

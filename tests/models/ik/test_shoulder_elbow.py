@@ -9,7 +9,7 @@ import pytest
 
 from spherical_arms import assert_reached, away_from, inverse_of, random_arm, random_joints
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.position_arm import DUPLICATE_TOLERANCE, Meeting, mask_coincident, mask_duplicates
+from urmpipe_models.ik.shoulder_elbow import DUPLICATE_TOLERANCE, Meeting, mask_coincident, mask_duplicates
 from urmpipe_models.ik.solutions import forward_targets
 
 NEARLY = {
