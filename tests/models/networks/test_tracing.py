@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from urmpipe_models.networks.elements import element_frame
 from urmpipe_models.networks.file import Network, load_network, network_names
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 
@@ -54,3 +55,19 @@ def test_poses_of_symbols_numbers_and_columns_are_the_same(network: Network) -> 
         # sums of products of numbers near 1: rounding
         np.testing.assert_allclose(columns[:, k], numbers, atol=1e-14)
         np.testing.assert_allclose(np.array(traced(*x[:, k])).ravel(), numbers, atol=1e-14)
+
+
+def test_the_frame_of_an_element_of_symbols_is_that_of_numbers() -> None:
+    import casadi as ca
+
+    row = (0.3, -0.7, 0.2, 2.5)
+    symbols = [ca.SX.sym(f"x{k}") for k in range(4)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        frame = element_frame(*symbols)
+        traced = ca.Function("frame", symbols, [ca.vertcat(*frame.rotation[0], *frame.translation)])
+    frame = element_frame(*row)
+    expected = [*frame.rotation[0], *frame.translation]
+    np.testing.assert_allclose(
+        np.array(traced(*row)).ravel(), expected, atol=1e-15
+    )  # rounding of numbers near 1
