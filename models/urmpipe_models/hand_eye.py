@@ -68,7 +68,7 @@ _CUBE_ROTATIONS = [
 
 
 @dataclass(frozen=True, slots=True)
-class Untold:  # plain: ok
+class UnobservableDirection:
     """A direction of the frames that poses do not determine, or only weakly.
 
     Attributes:
@@ -94,14 +94,14 @@ class HandEye:
         base_position: p_Z in [m], shape (3,).
         tool_rotation: R_X [-], shape (3, 3); the identity without measured orientations.
         tool_position: d = p_X in [m], shape (3,).
-        untold: Unobservable and weakly observable directions.
+        unobservable: Unobservable and weakly observable directions.
     """
 
     base_rotation: FloatArray
     base_position: FloatArray
     tool_rotation: FloatArray
     tool_position: FloatArray
-    untold: tuple[Untold, ...]  # plain: ok
+    unobservable: tuple[UnobservableDirection, ...]
 
 
 def solve_hand_eye(
@@ -366,7 +366,7 @@ def _minimise_unobservable(rows: _Rows, frames: _Frames, length: float) -> _Fram
     return frames
 
 
-def _iter_unobservable(rows: _Rows, frames: _Frames) -> Iterator[Untold]:
+def _iter_unobservable(rows: _Rows, frames: _Frames) -> Iterator[UnobservableDirection]:
     """Yield the unobservable directions, then the weakly observable ones."""
     jacobian = _residuals(rows, frames, 1.0)[1]
     sensitivity, steps = _sensitivities(rows, frames)
@@ -384,5 +384,5 @@ def _iter_unobservable(rows: _Rows, frames: _Frames) -> Iterator[Untold]:
             named = rest @ mixed[:count].T / shares[:count]
             for axis, step in zip(axes.T, named.T, strict=False):
                 x, y, z = (axis * np.sign(axis[np.argmax(np.abs(axis))])).tolist()
-                yield Untold(part, (x, y, z), float(np.linalg.norm(jacobian @ step)))
+                yield UnobservableDirection(part, (x, y, z), float(np.linalg.norm(jacobian @ step)))
             rest = rest @ mixed[count:].T

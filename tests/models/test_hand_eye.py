@@ -77,7 +77,7 @@ def rms(values: FloatArray) -> float:
 
 
 def assert_found(found: HandEye, truth: Truth, *, turned: bool) -> None:
-    assert found.untold == ()
+    assert found.unobservable == ()
     np.testing.assert_allclose(found.base_rotation, truth.base, atol=ROUNDING)
     np.testing.assert_allclose(found.base_position, truth.shift, atol=ROUNDING)
     np.testing.assert_allclose(found.tool_position, truth.offset, atol=ROUNDING)
@@ -168,8 +168,10 @@ def test_orientations_tell_what_positions_on_a_line_leave_open() -> None:
     apart = RADIAN_LENGTH / np.sqrt(2) * (turns - found.base_rotation @ truth.rotation @ found.tool_rotation)
     left = (misfit(found, truth, measured) ** 2).sum() + (apart**2).sum()
     assert left == pytest.approx(2 * best.cost, rel=1e-9)
-    assert [direction.part for direction in found.untold] == ["tool offset"]  # along the axis of all turns
-    np.testing.assert_allclose(np.abs(found.untold[0].axis), [1.0, 0.0, 0.0], atol=1e-9)
+    assert [direction.part for direction in found.unobservable] == [
+        "tool offset"
+    ]  # along the axis of all turns
+    np.testing.assert_allclose(np.abs(found.unobservable[0].axis), [1.0, 0.0, 0.0], atol=1e-9)
 
 
 RNG = np.random.default_rng(0)
@@ -201,9 +203,9 @@ def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
     truth = placed(position, rotation)
     for parts, with_turns in ((alone, False), (turned, True)):
         found = solve(truth, turned=with_turns)
-        assert [direction.part for direction in found.untold] == parts
+        assert [direction.part for direction in found.unobservable] == parts
         np.testing.assert_allclose(misfit(found, truth, truth.measured), 0.0, atol=1e-9)
-        for direction in found.untold:
+        for direction in found.unobservable:
             assert np.linalg.norm(direction.axis) == pytest.approx(1.0)
             assert direction.seen < 1e-7  # the root of rounding
             if direction.part == "tool offset":
@@ -217,7 +219,7 @@ def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
 
 def test_the_axis_of_all_turns_is_the_one_along_which_the_tool_is_open() -> None:
     found = solve(placed(POINTS, ABOUT_Z @ TURNS[0]), turned=False)
-    assert abs(TURNS[0, 2] @ found.untold[0].axis) == pytest.approx(1.0)
+    assert abs(TURNS[0, 2] @ found.unobservable[0].axis) == pytest.approx(1.0)
     assert found.tool_rotation.tolist() == np.eye(3).tolist()
 
 
@@ -226,8 +228,8 @@ def test_a_tool_that_hardly_turns_is_found_and_said_to_be_hardly_told() -> None:
     truth = placed(POINTS, small @ TURNS[0])
     found = solve(truth, turned=True)
     np.testing.assert_allclose(found.tool_position, truth.offset, atol=1e-9)
-    assert [direction.part for direction in found.untold] == ["tool offset"] * 3
-    for direction in found.untold:
+    assert [direction.part for direction in found.unobservable] == ["tool offset"] * 3
+    for direction in found.unobservable:
         spun = truth.rotation @ direction.axis
         assert direction.seen == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)
         assert direction.seen < WEAK_SENSITIVITY

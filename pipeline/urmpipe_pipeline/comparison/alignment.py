@@ -184,7 +184,9 @@ def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
     )
     moved = _alignment("base+tool", found.base_rotation, found.base_position)
     x, y, z = found.tool_position.tolist()
-    alignment = replace(moved, tool=(x, y, z), tool_rotation=_rows(found.tool_rotation), untold=found.untold)
+    alignment = replace(
+        moved, tool=(x, y, z), tool_rotation=_rows(found.tool_rotation), unobservable=found.unobservable
+    )
     tool = np.broadcast_to(found.tool_rotation.reshape(1, 9), (len(quat), 9))
     with_tool = replace(
         posed,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
-from urmpipe_models.hand_eye import Untold
+from urmpipe_models.hand_eye import UnobservableDirection
 from urmpipe_models.math3d import angle_between, to_quaternions
 from urmpipe_pipeline.joint_log import SourceFile, seconds
 
@@ -118,7 +118,7 @@ class Alignment:
         translation: In [m].
         tool: In the frame of the log's tool, in [m].
         tool_rotation: In the frame of the log's tool, rotation matrix [-], row by row, 3 by 3.
-        untold: What the compared poses do not determine of base and tool, or hardly.
+        unobservable: What the compared poses do not determine of base and tool, or hardly.
     """
 
     mode: AlignMode = "none"
@@ -126,7 +126,7 @@ class Alignment:
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tool: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tool_rotation: tuple[tuple[float, ...], ...] = IDENTITY
-    untold: tuple[Untold, ...] = ()
+    unobservable: tuple[UnobservableDirection, ...] = ()
 
     @property
     def angle(self) -> float:

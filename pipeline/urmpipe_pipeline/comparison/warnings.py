@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from urmpipe_models.errors import Hint
-from urmpipe_models.hand_eye import MIN_SENSITIVITY, Part, Untold
+from urmpipe_models.hand_eye import MIN_SENSITIVITY, Part, UnobservableDirection
 from urmpipe_models.measure_units import USUAL_UNITS
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
@@ -73,8 +73,10 @@ def _beyond(one: Deviation, reference: Trajectory) -> int:
 
 def open_frames(one: Deviation) -> Iterator[LogWarning]:
     """Yield what the compared poses of a log do not tell of the base and the tool that were fitted."""
-    untold = one.alignment.untold
-    nothing, little = ([it for it in untold if (it.seen < MIN_SENSITIVITY) is told] for told in (True, False))
+    unobservable = one.alignment.unobservable
+    nothing, little = (
+        [it for it in unobservable if (it.seen < MIN_SENSITIVITY) is told] for told in (True, False)
+    )
     said = []
     if nothing:
         said.append(f"do not determine {_parts(nothing)}, so the smallest values are used")
@@ -85,18 +87,18 @@ def open_frames(one: Deviation) -> Iterator[LogWarning]:
         yield LogWarning("frames-open", told, about=one.name, parameter="align")
 
 
-def _parts(untold: Sequence[Untold]) -> str:
+def _parts(unobservable: Sequence[UnobservableDirection]) -> str:
     """Return what is not told: the whole of a part, or its directions."""
-    parts = dict.fromkeys(one.part for one in untold)
-    return " and ".join(_part(part, [one for one in untold if one.part == part]) for part in parts)
+    parts = dict.fromkeys(one.part for one in unobservable)
+    return " and ".join(_part(part, [one for one in unobservable if one.part == part]) for part in parts)
 
 
-def _part(part: Part, untold: Sequence[Untold]) -> str:
+def _part(part: Part, unobservable: Sequence[UnobservableDirection]) -> str:
     what, turn = part.split()
     said = f"the {turn} of the {what}"
-    if len(untold) == DIMENSIONS:
+    if len(unobservable) == DIMENSIONS:
         return said
-    axes = " and ".join(_axis(one.axis) for one in untold)
+    axes = " and ".join(_axis(one.axis) for one in unobservable)
     return f"{said} {'along' if turn == 'offset' else 'about'} {axes}"
 
 

@@ -34,7 +34,7 @@ TIME, ROW = "t", "row"
 SLICE = 32_768
 """Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
 
-LAYOUT_VERSION = 7
+LAYOUT_VERSION = 8
 """The version that a recording says; raised when what is stored changes otherwise than by a default."""
 
 PROPERTY = "urmpipe"

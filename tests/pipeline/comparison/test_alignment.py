@@ -304,7 +304,7 @@ def test_base_and_tool_are_found_at_once(turned: bool) -> None:
     np.testing.assert_allclose(found.alignment.tool, PROBE.translation, atol=1e-9)
     wanted = PROBE.rotation if turned else np.eye(3)
     np.testing.assert_allclose(found.alignment.tool_rotation, wanted, atol=1e-9)
-    assert found.alignment.untold == ()
+    assert found.alignment.unobservable == ()
     assert found.statistics["norm"].max < 1e-9
     assert (found.angle is not None) == turned
     if turned:
@@ -385,7 +385,7 @@ def test_what_poses_do_not_tell_of_base_and_tool_is_said(turns: FloatArray, said
     assert result.runs[0].statistics["norm"].max < ROUNDING
     told = [(one.kind, str(one)) for one in result.warnings]
     assert told == [("frames-open", f"log: align: the compared poses {said}")]
-    assert (result.runs[0].alignment.untold[0].seen < 1e-4) == ("do not" in said)
+    assert (result.runs[0].alignment.unobservable[0].seen < 1e-4) == ("do not" in said)
 
 
 def test_samples_without_an_orientation_carry_no_tool_between_base_and_probe() -> None:

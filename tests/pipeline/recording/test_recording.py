@@ -191,7 +191,7 @@ def test_what_poses_do_not_tell_of_base_and_tool_comes_back_as_it_was(tmp_path: 
     position = np.random.default_rng(0).normal(size=(40, 3))
     reference, log = made_runs.path_run(position), made_runs.path_run(position, still, name="log")
     comparison = compare_runs(reference, [log], CompareOptions(align="base+tool"))
-    assert [one.part for one in comparison.runs[0].alignment.untold] == ["tool offset"] * 3
+    assert [one.part for one in comparison.runs[0].alignment.unobservable] == ["tool offset"] * 3
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
