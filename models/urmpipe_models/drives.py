@@ -205,7 +205,7 @@ def ramp(time: Element, begin: Element, initial: Element, target: Element, speed
     distance, direction = np.abs(target - initial), np.sign(target - initial)
     end = begin + distance / speed
     travelled = np.maximum(time - begin, 0.0) * speed
-    moving = _since(time, begin) - _since(time, end)
+    moving = _onset(time, begin) - _onset(time, end)
     position = np.where(_is_reached(time, end), target, initial + direction * travelled)
     return JointMotion(position, direction * speed * moving, 0.0 * time)
 
@@ -237,7 +237,7 @@ def trapezoid(
     peak = acceleration * rise
     travelled = 0.5 * acceleration * up * up + peak * level + (peak - 0.5 * acceleration * down) * down
     # 1 during acceleration, 0 at constant velocity, -1 during deceleration, 0 before and after
-    phase = _since(since, 0.0) - _since(since, rise) - _since(since, rise + cruise) + _since(since, total)
+    phase = _onset(since, 0.0) - _onset(since, rise) - _onset(since, rise + cruise) + _onset(since, total)
     return JointMotion(
         np.where(_is_reached(since, total), target, initial + direction * travelled),
         direction * acceleration * (up - down),
@@ -287,7 +287,7 @@ def _is_reached(time: Element, corner: Element) -> Element:
     return time >= corner - CORNER_SLACK
 
 
-def _since(time: Element, corner: Element) -> Element:
+def _onset(time: Element, corner: Element) -> Element:
     """Return 1 from a corner on, 0 before it."""
     return np.where(_is_reached(time, corner), 1.0, 0.0)
 

@@ -88,7 +88,7 @@ _QUOTES = "'\u2018\u2019\u201a\u201b"  # single quotes of PowerShell
 _SPECIAL = frozenset(_QUOTES + ' \t"\u201c\u201d\u201e&()[]{},;=@#$`^!+%~|<>')  # special in PowerShell or cmd
 
 
-def format_parameter(parameter: str, voice: Voice) -> str:
+def _format_parameter(parameter: str, voice: Voice) -> str:
     """Return the name of a parameter: an option, a keyword, or a key of a file."""
     if voice == "python":
         return parameter
@@ -102,7 +102,7 @@ def to_option(parameter: str) -> str:
     return f"--{parameter.replace('_', '-')}"
 
 
-def format_assignment(parameter: str, value: Any, voice: Voice) -> str:
+def _format_assignment(parameter: str, value: Any, voice: Voice) -> str:
     """Return a parameter with its value: `--unit q1=deg`, `unit={"q1": "deg"}`, `units.q1 = "deg"`."""
     placeholder = _PLACEHOLDERS.get(parameter, Placeholder(parameter.upper()))
     if isinstance(value, Mapping):
@@ -283,13 +283,13 @@ class Hint:
             return ""
         if self.robot:
             separator = " " if voice == "command line" else ", "
-            robot = format_assignment("robot", self.robot, voice)
+            robot = _format_assignment("robot", self.robot, voice)
             return f"{robot}{separator}{replace(self, robot='').format(voice)}"
         if not self.call:
-            return format_assignment(self.parameter, self.value, voice)
+            return _format_assignment(self.parameter, self.value, voice)
         if voice == "python":
-            return f"{self.call}({format_assignment(self.parameter, self.value, voice)})"
-        return f"urmpipe {self.call} {format_assignment(self.parameter, self.value, 'command line')}"
+            return f"{self.call}({_format_assignment(self.parameter, self.value, voice)})"
+        return f"urmpipe {self.call} {_format_assignment(self.parameter, self.value, 'command line')}"
 
 
 class Message:
@@ -324,7 +324,7 @@ class Message:
         values = ", ".join(f"{label}{value}" for label, value in fields if value)
         text = (": " if self.found else ", ").join(filter(None, (self.message, values)))
         if self.parameter:
-            text = f"{format_parameter(self.parameter, voice)}: {text}"
+            text = f"{_format_parameter(self.parameter, voice)}: {text}"
         return escape_line("; ".join([text, *format_hints(self.hints, voice)]))
 
     def format(self, voice: Voice) -> str:

@@ -458,7 +458,7 @@ def conjugate(quat_xyzw: FloatArray) -> FloatArray:
     return np.asarray(quat_xyzw * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
-def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
+def rotation_angle(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the angle of the rotation from one orientation to another, 0 to pi: 2 atan2(|v|, |w|).
 
     Args:

@@ -60,7 +60,7 @@ MAX_CONTINUOUS_STEP = np.pi / 4.0  # [rad]: up to it, the other Euler angles are
 OTHER_SIGNS = np.array([1.0, -1.0, 1.0])  # factors of the angles in the other Euler angles of a rotation
 
 
-class State(NamedTuple):
+class WrapState(NamedTuple):
     """Memory of the repolarizer of one joint.
 
     Attributes:
@@ -180,9 +180,9 @@ def add_turns(q: Element, turns: Element, period: Element) -> Element:
     return np.where(turns == 0.0, q, q + period * turns)
 
 
-def step(
-    state: State, q: Element, dt: Element, *, period: Element = FULL_TURN, max_speed: Element = np.inf
-) -> tuple[State, Element, Flags]:
+def repolarize_sample(
+    state: WrapState, q: Element, dt: Element, *, period: Element = FULL_TURN, max_speed: Element = np.inf
+) -> tuple[WrapState, Element, Flags]:
     """Repolarize one sample of one joint (or of many: the arguments are elements).
 
     Args:
@@ -209,7 +209,7 @@ def step(
     )
     turns = state.turns + flags.change
     residual = np.where(flags.in_between, 0.0, move + period * flags.change)
-    following = State(
+    following = WrapState(
         last=np.where(has_value, q, state.last),
         residual=np.where(known, residual, state.residual),
         lasted=np.where(known, elapsed, state.lasted),
@@ -227,7 +227,7 @@ def repolarize(
     period: FloatArray | float = FULL_TURN,
     max_speed: FloatArray | float = np.inf,
 ) -> Repolarized:
-    """Repolarize a whole log: the results of `step` for each sample, bit for bit.
+    """Repolarize a whole log: the results of `repolarize_sample` for each sample, bit for bit.
 
     Args:
         q: Joint values in the unit of the period, shape (n, joints); NaN where a sample is missing.
@@ -352,7 +352,7 @@ def _after_in_between(rows: IntArray, columns: IntArray, paired: NDArray[np.bool
 
 
 def _elapsed(present: IntArray, dt: FloatArray) -> FloatArray:
-    """Return the time from each value to the next, added from left to right as in `step`."""
+    """Return the time from each value to the next, added from left to right as in `repolarize_sample`."""
     elapsed = dt[present]
     distance = np.diff(present, prepend=present[:1])
     for length in np.unique(distance[distance > 1]):

@@ -19,7 +19,6 @@ from urmpipe_models.math3d import (
     FORMS,
     RotationForm,
     Transform,
-    angle_between,
     column_count,
     conjugate,
     euler_zxz,
@@ -31,6 +30,7 @@ from urmpipe_models.math3d import (
     matrix_to_rpy,
     quaternion_product,
     rotation_about,
+    rotation_angle,
     rotation_x,
     rotation_y,
     rotation_z,
@@ -351,7 +351,7 @@ def test_every_form_gives_the_rotation_that_scipy_wrote(form: RotationForm) -> N
     columns = recorded(rotation, form)
     assert columns.shape == (500, column_count(form))
     found = to_quaternions(columns, form)
-    np.testing.assert_allclose(angle_between(found, rotation.as_quat()), 0.0, atol=SMALL)
+    np.testing.assert_allclose(rotation_angle(found, rotation.as_quat()), 0.0, atol=SMALL)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=SMALL)
 
 
@@ -388,8 +388,8 @@ def test_quaternions_of_rotation_vectors() -> None:
 def test_the_angle_between_an_orientation_and_its_negative_is_none() -> None:
     first = Rotation.random(10, rng=np.random.default_rng(5))
     turned = first * Rotation.from_rotvec([0.0, 0.0, 0.25])
-    np.testing.assert_allclose(angle_between(first.as_quat(), -turned.as_quat()), 0.25, atol=SMALL)
-    np.testing.assert_allclose(angle_between(first.as_quat(), -first.as_quat()), 0.0, atol=SMALL)
+    np.testing.assert_allclose(rotation_angle(first.as_quat(), -turned.as_quat()), 0.25, atol=SMALL)
+    np.testing.assert_allclose(rotation_angle(first.as_quat(), -first.as_quat()), 0.0, atol=SMALL)
 
 
 def test_matrices_are_those_of_scipy() -> None:
@@ -412,7 +412,7 @@ def test_angles_are_exact_from_nothing_to_half_a_turn() -> None:
     near = np.concatenate(([0.0], np.logspace(-15, -1, 57)))
     for angle in (*near, *(np.pi - near)):
         turned = first * Rotation.from_rotvec([0.0, angle, 0.0])
-        found = float(angle_between(first.as_quat(), turned.as_quat())[0])
+        found = float(rotation_angle(first.as_quat(), turned.as_quat())[0])
         assert found == pytest.approx(angle, rel=0.0, abs=2e-15)  # some rounding errors of numbers up to pi
 
 
@@ -428,14 +428,14 @@ def test_orientations_between_two_are_those_of_scipy(
 ) -> None:
     one, other = (quat / np.linalg.norm(quat, axis=1, keepdims=True) for quat in (first, second))
     # Half a turn apart both ways round are as short, and either may be taken.
-    assume(bool((angle_between(one, other) < np.pi - 1e-6).all()))
+    assume(bool((rotation_angle(one, other) < np.pi - 1e-6).all()))
     found = slerp(one, other, np.full(3, share))
     for k in range(3):
         ends = Rotation.from_quat(np.vstack((one[k], other[k])))
         expected = Slerp([0.0, 1.0], ends)([share]).as_quat()
-        assert angle_between(found[[k]], expected)[0] < SMALL
-        passed = angle_between(one[[k]], found[[k]])[0]
-        assert passed == pytest.approx(share * angle_between(one[[k]], other[[k]])[0], rel=0, abs=SMALL)
+        assert rotation_angle(found[[k]], expected)[0] < SMALL
+        passed = rotation_angle(one[[k]], found[[k]])[0]
+        assert passed == pytest.approx(share * rotation_angle(one[[k]], other[[k]])[0], rel=0, abs=SMALL)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=SMALL)
 
 

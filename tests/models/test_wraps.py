@@ -22,12 +22,12 @@ from urmpipe_models.wraps import (
     MIN_DISTANCE,
     MIN_DISTANCE_RATIO,
     STEPS_AROUND,
-    State,
+    WrapState,
     find_interpolated_samples,
     max_step,
     reinterpolate,
     repolarize,
-    step,
+    repolarize_sample,
     unwrap_euler,
     unwrap_orientations,
     unwrap_quaternions,
@@ -44,20 +44,20 @@ def wrap(x: FloatArray, period: float = FULL_TURN) -> FloatArray:
 
 
 class Stepped(NamedTuple):
-    """Results of `step`; `unexplained` without the steps to samples that are in-between samples later."""
+    """Results of `repolarize_sample`; `unexplained` without steps to what are in-between samples later."""
 
     out: FloatArray
     changes: FloatArray
     unexplained: NDArray[np.bool_]
     in_between: list[int]
-    state: State
+    state: WrapState
 
 
 def run_steps(q: Iterable[float], dt: Iterable[float], **options: float) -> Stepped:
-    """Run `step` over a log of one joint."""
-    state, rows, unexplained, in_between, last = State(), [], [], [], -1
+    """Run `repolarize_sample` over a log of one joint."""
+    state, rows, unexplained, in_between, last = WrapState(), [], [], [], -1
     for i, (value, elapsed) in enumerate(zip(q, dt, strict=True)):
-        state, result, flags = step(state, value, elapsed, **options)
+        state, result, flags = repolarize_sample(state, value, elapsed, **options)
         rows.append((result, flags.change))
         unexplained.append(bool(flags.unexplained))
         if flags.in_between:
@@ -105,7 +105,7 @@ def test_the_batch_is_the_steps_bit_for_bit(
 
 
 def assert_batch_is_the_steps(q: FloatArray, dt: FloatArray, periods: FloatArray, max_speed: float) -> None:
-    """Compare `repolarize` with `step`, joint by joint; its lists are sorted by row and joint."""
+    """Compare `repolarize` with `repolarize_sample` by joint; its lists are sorted by row and joint."""
     batch = repolarize(q, dt, period=periods, max_speed=max_speed)
     assert batch.change.dtype == np.int64
     for rows in (np.column_stack((batch.rows, batch.joints)), batch.unexplained, batch.in_between):
@@ -195,8 +195,8 @@ def test_a_step_of_just_a_quarter_of_the_period_needs_no_explanation() -> None:
     q, above = np.array([[0.0], [1.0], [0.0]]), np.nextafter(1.0, 2.0)
     assert repolarize(q, np.full(3, TSP), period=4.0).unexplained.tolist() == []
     assert repolarize(q * above, np.full(3, TSP), period=4.0).unexplained.tolist() == [[1, 0], [2, 0]]
-    assert not step(State(0.0, seen=1.0), 1.0, TSP, period=4.0)[2].unexplained
-    assert step(State(0.0, seen=1.0), above, TSP, period=4.0)[2].unexplained
+    assert not repolarize_sample(WrapState(0.0, seen=1.0), 1.0, TSP, period=4.0)[2].unexplained
+    assert repolarize_sample(WrapState(0.0, seen=1.0), above, TSP, period=4.0)[2].unexplained
 
 
 def test_values_that_are_no_joint_values_are_missing_and_warn_of_nothing() -> None:
@@ -205,7 +205,7 @@ def test_values_that_are_no_joint_values_are_missing_and_warn_of_nothing() -> No
         result = repolarize(q, np.full(4, TSP))
     assert result.rows.tolist() == [3, 3, 3]
     assert len(result.unexplained) == 0
-    assert step(State(), 1e300, TSP)[0].seen == 0.0  # at the bound already
+    assert repolarize_sample(WrapState(), 1e300, TSP)[0].seen == 0.0  # at the bound already
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, 1e301, np.nextafter(1e300, 0.0), -np.nextafter(1e300, 0.0)])
@@ -269,7 +269,7 @@ def test_chatter_on_the_limit_leaves_no_net_turn() -> None:
 
 def test_the_step_remembers_the_last_step_in_the_turns_of_now() -> None:
     state = run_steps([3.0, math.nan, -3.0, math.nan], [TSP] * 4).state
-    assert state == State(-3.0, -6.0 + FULL_TURN, 2 * TSP, 1.0, TSP, 1.0)
+    assert state == WrapState(-3.0, -6.0 + FULL_TURN, 2 * TSP, 1.0, TSP, 1.0)
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (1, 3), (5, 0)])
@@ -279,21 +279,21 @@ def test_empty_logs_pass_through(shape: tuple[int, int]) -> None:
 
 def test_the_step_traces_with_casadi() -> None:
     casadi.GlobalOptions.setNumpyMode(-1)
-    state = State(*casadi.SX.sym("state", 6).elements())
+    state = WrapState(*casadi.SX.sym("state", 6).elements())
     inputs = casadi.SX.sym("input", 4)
     q, dt, period, speed = inputs.elements()
-    following, out, flags = step(state, q, dt, period=period, max_speed=speed)
+    following, out, flags = repolarize_sample(state, q, dt, period=period, max_speed=speed)
     traced = casadi.Function("step", [casadi.vertcat(*state), inputs],
                              [casadi.vertcat(*following), casadi.vertcat(out, *flags)])  # fmt: skip
     rng = np.random.default_rng(7)
-    memory = State()
+    memory = WrapState()
     on_the_jump = [3.1, 0.2, -3.1, math.nan, 0.1, 3.1]
     for value in [*wrap(np.cumsum(rng.uniform(-1.5, 1.5, 300))), math.nan, 1.0, 5.0, 2.0, *on_the_jump]:
-        expected_state, expected, expected_flags = step(memory, value, TSP, max_speed=1e4)
+        expected_state, expected, expected_flags = repolarize_sample(memory, value, TSP, max_speed=1e4)
         got_state, got = traced([float(x) for x in memory], [value, TSP, FULL_TURN, 1e4])
         np.testing.assert_array_equal(np.ravel(got_state), np.array(expected_state, dtype=float))
         np.testing.assert_array_equal(np.ravel(got), np.array([expected, *expected_flags], dtype=float))
-        memory = State(*(float(x) for x in expected_state))
+        memory = WrapState(*(float(x) for x in expected_state))
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the real logs of ../shared are not there")

@@ -85,7 +85,6 @@ from urmpipe_models.kinematics.singularity import characteristic_length, singula
 from urmpipe_models.lagrange.formulas import c_code, equations_text, open_form
 from urmpipe_models.math3d import (
     Transform,
-    angle_between,
     conjugate,
     euler_zxz,
     euler_zyx,
@@ -96,6 +95,7 @@ from urmpipe_models.math3d import (
     matrix_to_rpy,
     quaternion_product,
     rotation_about,
+    rotation_angle,
     rotation_x,
     rotation_y,
     rotation_z,
@@ -164,7 +164,7 @@ orientations = {
     "back": to_quaternions(to_matrices(_quats).reshape(-1, 9), "matrix"),
     "wxyz": to_quaternions(_quats, "quat_wxyz"),
     "conjugate": conjugate(_quats),
-    "between": angle_between(_quats, _quats[::-1]),
+    "between": rotation_angle(_quats, _quats[::-1]),
     "slerp": slerp(_quats, _quats[::-1], np.linspace(0, 1, 20)),
     "product": quaternion_product(_quats, _quats[::-1]),
     "vectors": to_rotation_vectors(_quats),

@@ -13,7 +13,7 @@ from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.delta import delta, exceeds_tolerance
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError
-from urmpipe_models.wraps import State, step
+from urmpipe_models.wraps import WrapState, repolarize_sample
 
 LOG_SOURCE_OPTIONS: Mapping[str, str] = {
     "table": "the rows of a log: its times from its start, and the columns of its values",
@@ -123,7 +123,7 @@ REPOLARIZER_OPTIONS: Mapping[str, str] = {"joints": "the number of joints, such 
 def repolarizer(joints: int) -> BlockModel:
     """Return the block that adds whole periods to angles, so that they are continuous.
 
-    It steps with `urmpipe_models.wraps.step` from communication point to communication point, with 1 for
+    It steps with `urmpipe_models.wraps.repolarize_sample` between communication points, with 1 for
     their distance and max_step for the largest speed.
 
     Args:
@@ -190,11 +190,11 @@ def repolarizer(joints: int) -> BlockModel:
     )
 
 
-def _iter_steps(v: Values) -> Iterator[tuple[State, Element]]:
+def _iter_steps(v: Values) -> Iterator[tuple[WrapState, Element]]:
     """Yield the next state and the repolarized angle of each joint."""
     states = zip(v.last, v.residual, v.lasted, v.turns_before, v.elapsed, v.seen, strict=True)
     for fields, raw in zip(states, v.raw, strict=True):
-        state, q, _ = step(State(*fields), raw, 1.0, period=v.period, max_speed=v.max_step)
+        state, q, _ = repolarize_sample(WrapState(*fields), raw, 1.0, period=v.period, max_speed=v.max_step)
         yield state, q
 
 
@@ -205,7 +205,7 @@ def _repolarizer_outputs(v: Values) -> Mapping[str, Sequence[Element]]:
 
 def _repolarizer_update(v: Values) -> Mapping[str, Sequence[Element]]:
     states = [state for state, _ in _iter_steps(v)]
-    fields = dict(zip(State._fields, zip(*states, strict=True), strict=True))
+    fields = dict(zip(WrapState._fields, zip(*states, strict=True), strict=True))
     fields["turns_before"] = fields.pop("turns")
     return fields
 

@@ -156,7 +156,7 @@ def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
         shift = -float(k3 @ (wrist - origin))
         start, radius = wrist - origin + shift * k3, 0.0
         directions3 = np.stack((k3, np.zeros(3)), axis=1)
-    directions1 = np.stack(perpendicular(k1) if r1 else (-k1, np.zeros(3)), axis=1)
+    directions1 = np.stack(perpendicular_pair(k1) if r1 else (-k1, np.zeros(3)), axis=1)
     base = _foot(origin, o1, k1) if r1 else origin
     first = Track(k1, r1, directions1, _coefficients(directions1, base - origin, r1, k2, r2, across))
     third = Track(k3, r3, directions3, _coefficients(directions3, start, r3, k2, r2, across))
@@ -174,7 +174,7 @@ def _across(axis: FloatArray, first: FloatArray, third: FloatArray) -> tuple[Flo
         length = float(np.linalg.norm(normal))
         if length > 1e-6:
             return normal / length, np.cross(axis, normal / length)
-    return perpendicular(axis)
+    return perpendicular_pair(axis)
 
 
 def _coefficients(
@@ -192,7 +192,7 @@ def _coefficients(
     return np.stack((axis @ directions, squares))
 
 
-def perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+def perpendicular_pair(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return two unit vectors [-], shape (3,) each, of the right-handed frame whose third one is `axis`."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(helper, axis)

@@ -219,7 +219,7 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, p4: Vector, wish: FloatArr
     a, b = (2.0 * (o[0] * v[0] + o[1] * v[1]) for v in (u, w))
     mean = o[0] ** 2 + o[1] ** 2 + u[0] ** 2 + u[1] ** 2
     swing, middle = np.hypot(a, b), np.arctan2(b, a)
-    upper, fore = link_lengths(arm)
+    upper, fore = _link_lengths(arm)
     least, most = ((square - mean) / swing for square in ((upper - fore) ** 2, (upper + fore) ** 2))
     away = wrap_angle(wish - middle)
     cosine = np.cos(away)
@@ -253,7 +253,7 @@ def two_links(
         side: 1 or -1 [-]: the sign of the first elbow's bend, shape (..., n) or one that broadcasts to it.
         near: q2 where it is free, in [rad], shape (..., n) or one that broadcasts to it.
     """
-    upper, fore = link_lengths(arm)
+    upper, fore = _link_lengths(arm)
     r = np.hypot(*place)
     short, long = abs(upper - fore), upper + fore
     stretched, withdrawn = long - r <= EDGE * arm.size, r - short <= EDGE * arm.size
@@ -285,7 +285,7 @@ def two_links(
     )
 
 
-def link_lengths(arm: ParallelGeometry) -> tuple[float, float]:
+def _link_lengths(arm: ParallelGeometry) -> tuple[float, float]:
     """Return the lengths of the links from axis 2 to axis 3 and on to axis 4, in [m]."""
     return (
         float(np.hypot(arm.p3[0], arm.p3[1])),

@@ -38,7 +38,7 @@ from urmpipe_models.ik.trigonometric import (
     Roots,
     angle_about,
     circle_roots,
-    is_straight,
+    is_linear,
     parabola_roots,
     quadric_roots,
     wrap_angle,
@@ -175,7 +175,7 @@ class PositionArm:
         """Numbers of roots of joint 1 and joint 3."""
         first, third = self._combinations
         return [
-            1 if not track.revolute and is_straight(share @ track.coefficients) else 2
+            1 if not track.revolute and is_linear(share @ track.coefficients) else 2
             for track, share in ((self.equations.first, first), (self.equations.third, third))
         ]
 

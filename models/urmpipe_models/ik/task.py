@@ -182,7 +182,7 @@ def prepare_chain(chain: Chain) -> PreparedChain:
     for joint in chain.joints:
         between = between @ joint.origin
         if joint.kind != "fixed":
-            upright = _upright(joint.axis)
+            upright = _frame_with_z(joint.axis)
             steps.append(_step(between @ upright))
             joints.append(joint)
             between = upright.inverse()
@@ -190,7 +190,7 @@ def prepare_chain(chain: Chain) -> PreparedChain:
     return PreparedChain(chain, tuple(joints), tuple(steps))
 
 
-def _upright(axis: Vector) -> Transform:
+def _frame_with_z(axis: Vector) -> Transform:
     """Return a frame whose z is a unit vector; of a coordinate axis its entries are 0 and +-1."""
     along = max(range(3), key=lambda i: abs(axis[i]))
     other = [0.0, 0.0, 0.0]

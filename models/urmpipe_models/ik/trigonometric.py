@@ -99,7 +99,7 @@ def parabola_roots(alpha: FloatArray, beta: FloatArray) -> Roots:
         alpha: In any unit, shape (2,), not 0.
         beta: In the unit of alpha . u, shape (...).
     """
-    if is_straight(alpha):
+    if is_linear(alpha):
         s = (beta / alpha[0])[None]
         return Roots(np.stack((s, s * s)), np.zeros(beta.shape, dtype=bool))
     square = alpha[0] ** 2 + 4.0 * alpha[1] * beta
@@ -109,7 +109,7 @@ def parabola_roots(alpha: FloatArray, beta: FloatArray) -> Roots:
     return Roots(np.stack((s, s * s)), np.asarray(square <= MEETING * scale) & np.isfinite(root))
 
 
-def is_straight(alpha: FloatArray) -> bool:
+def is_linear(alpha: FloatArray) -> bool:
     """Return whether the equation of a parabola, alpha of shape (2,) in any unit, is linear in s."""
     return bool(abs(alpha[1]) <= 1e-9 * abs(alpha[0]))
 

@@ -1,7 +1,7 @@
 """Open form of the equations of motion: reduced formulas of each term, their cost, as text and as C99.
 
 1. `open_form`: derives the terms (`derivation`), simplifies them and counts their operations.
-2. `factor_common_terms`: variables factored out, common subexpressions computed once, as C computes them.
+2. `_factor_common_terms`: variables factored out, common subexpressions computed once, as C computes them.
 3. `equations_text`: the formulas as text.
 4. `c_code`: the formulas as one file of C99.
 5. Names of the variables in text and in C: c12 and s12 are cosine and sine of the sum of coordinates 1 and 2.
@@ -161,7 +161,7 @@ def open_form(chain: Chain, terms: Sequence[TermName] = TERMS) -> OpenForm:
         term: [_to_terms(simplify_polynomial(equation[term], variables)) for equation in expanded]
         for term in terms
     }
-    programs = {term: factor_common_terms(formulas[term], c_symbols(variables)) for term in terms}
+    programs = {term: _factor_common_terms(formulas[term], _c_symbols(variables)) for term in terms}
     reduced = {term: programs[term].operations() for term in terms}
     costs = tuple(
         Cost(name, term, _count_polynomial_operations(_to_terms(expanded[i][term])), reduced[term][i])
@@ -176,7 +176,7 @@ def _to_terms(polynomial: Polynomial) -> Terms:
     return {key: float(f"{float(value):.{COEFFICIENT_DIGITS}g}") for key, value in polynomial.terms()}
 
 
-def factor_common_terms(formulas: Sequence[Terms], symbols: Sequence[Expression]) -> FactoredExpressions:
+def _factor_common_terms(formulas: Sequence[Terms], symbols: Sequence[Expression]) -> FactoredExpressions:
     """Return formulas with variables factored out and common subexpressions computed once.
 
     Args:
@@ -441,7 +441,7 @@ def _c_printer() -> Any:
     return Printer()
 
 
-def c_symbols(variables: Variables) -> list[Any]:
+def _c_symbols(variables: Variables) -> list[Any]:
     """Return the symbol of each variable in C: c12, s12, q[0], qd[0], qdd[0], force[0], ..."""
     from sympy import Symbol
 

@@ -333,10 +333,10 @@ class _Search:
         nearest = order[0] if order else _wrap_angles(mechanism, self._nearest[:, np.newaxis])[:, 0]
         return AssemblyResult(
             np.array(order).T.reshape(len(self.start), -1),
-            tuple(build_assembly(mechanism, x) for x in order),
-            None if order else build_assembly(mechanism, nearest),
+            tuple(_build_assembly(mechanism, x) for x in order),
+            None if order else _build_assembly(mechanism, nearest),
             nearest,
-            () if order else find_gaps(mechanism, nearest),
+            () if order else _find_gaps(mechanism, nearest),
             tried,
             reason,
             elsewhere,
@@ -370,7 +370,7 @@ def _wrap_angles(mechanism: Mechanism, x: FloatArray) -> FloatArray:
     return wrapped
 
 
-def build_assembly(mechanism: Mechanism, x: FloatArray) -> Assembly:
+def _build_assembly(mechanism: Mechanism, x: FloatArray) -> Assembly:
     """Return a configuration, its variables in [m], [rad] and as controls are given, shape (variables,)."""
     controls = mechanism.control_values(x)
     values: dict[str, tuple[float, ...]] = {
@@ -400,7 +400,7 @@ def body_poses(mechanism: Mechanism, x: FloatArray) -> FloatArray:
     return poses
 
 
-def find_gaps(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
+def _find_gaps(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
     """Return what does not close at variables x, shape (variables,), in [m] and [rad], the largest first."""
     residual = evaluate_closure(mechanism, x[:, np.newaxis]).residual[:, 0]
     network, graph = mechanism.network, mechanism.graph

@@ -1,7 +1,7 @@
 """Driven motion of a network, from drives by name: which variables follow, where it begins, its rows.
 
 1. `find_driven_variables`: controls and joint variables by name.
-2. `split_variables`: which variables follow. Controls without a drive keep their value; if joints are
+2. `_split_variables`: which variables follow. Controls without a drive keep their value; if joints are
    driven in their place, controls follow.
 3. `move_to`: from an assembly along a straight line of the drives to where the motion begins.
 4. `drive_rows`: the motion along rows of the drives, on a line (`continuation`) or not (`row_motion`).
@@ -142,7 +142,7 @@ def _drive_error(message: str) -> NetworkError:
     return NetworkError(Finding(message, parameter="drives"))
 
 
-def split_variables(mechanism: Mechanism, x: FloatArray, driven: DrivenVariables) -> IndexArray:
+def _split_variables(mechanism: Mechanism, x: FloatArray, driven: DrivenVariables) -> IndexArray:
     """Return the numbers of the variables that follow, shape (free,) [-].
 
     Args:
@@ -285,7 +285,7 @@ def drive_rows(
     # a driven angle begins at the turn that is nearest to the assembly
     turns = np.isin(places, mechanism.angles)
     x[places[turns]] += 2.0 * np.pi * np.round((values[0] - x[places])[turns] / (2.0 * np.pi))
-    free = split_variables(mechanism, x, driven)
+    free = _split_variables(mechanism, x, driven)
     spins = len(find_spinning_bodies(mechanism, x))
     setup = _Setup(mechanism, driven, free, limits)
     line = _find_line(values / mechanism.column_scales[places])

@@ -282,7 +282,7 @@ def segment_phases(
         leave: s' at its end in [m/s]; one that the acceleration allows from `entry`.
         a: Maximum acceleration in [m/s2]: of s'', or on an arc in total.
     """
-    rise = _line_rise if math.isinf(segment.radius) else _arc_rise
+    rise = _line_peak if math.isinf(segment.radius) else _arc_peak
     peak, up, down = rise(segment, entry, leave, a)
     level = segment.length - up.s - down.s
     if up.duration > 0.0:
@@ -293,7 +293,7 @@ def segment_phases(
         yield down._replace(s=begin + segment.length - down.s)
 
 
-def _line_rise(segment: SpeedSegment, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
+def _line_peak(segment: SpeedSegment, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
     """Return the maximum speed on a line, and the phases before and after it; `s` is their length."""
     peak = min(segment.max_speed, math.sqrt(0.5 * (entry * entry + leave * leave) + a * segment.length))
     peak = max(peak, entry, leave)
@@ -301,7 +301,7 @@ def _line_rise(segment: SpeedSegment, entry: float, leave: float, a: float) -> t
     return peak, up, Phase((peak - leave) / a, 0.5 * (peak + leave) * (peak - leave) / a, peak, -a)
 
 
-def _arc_rise(segment: SpeedSegment, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
+def _arc_peak(segment: SpeedSegment, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
     """Return the same on an arc with a limited total acceleration."""
     radius, largest = segment.radius, a * segment.radius
     first, last, cap = (math.asin(min(v * v / largest, 1.0)) for v in (entry, leave, segment.max_speed))

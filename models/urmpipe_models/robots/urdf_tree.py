@@ -1,6 +1,6 @@
 """Links and joints of a URDF file, with the line of each error.
 
-1. `read_xml`: the file as a tree of elements with line numbers. A document that could expand is rejected.
+1. `_read_xml`: the file as a tree of elements with line numbers. A document that could expand is rejected.
 2. `read_tree`: links, joints and colours. Errors are collected in `UrdfTree.faults`.
 3. `_read_joint`: origin, axis, limits, mimic of a joint.
 4. `_check_links`, `_check_mimics`: one parent per link, no loops, mimics of existing joints.
@@ -72,7 +72,7 @@ class Node:
             waiting.extend(reversed(node.children))
 
 
-def read_xml(path: Path) -> Node:
+def _read_xml(path: Path) -> Node:
     """Return the root element of an XML file.
 
     Entities can be declared only in a document type, so a document with one is rejected at its first
@@ -171,7 +171,7 @@ def read_tree(path: Path) -> UrdfTree:
     Raises:
         RobotError: If the file is no URDF.
     """
-    root = read_xml(path)
+    root = _read_xml(path)
     if path.suffix == ".xacro" or any(node.tag.startswith("xacro:") for node in root.walk()):
         target = path.with_suffix("").stem + (".urdf" if path.suffix == ".xacro" else ".expanded.urdf")
         raise RobotError(Finding(f"is a xacro file; expand it first: xacro {path} -o {target}", str(path)))

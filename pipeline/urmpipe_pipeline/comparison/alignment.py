@@ -13,11 +13,11 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.hand_eye import solve_hand_eye
 from urmpipe_models.math3d import (
     Transform,
-    angle_between,
     conjugate,
     fit_rotation,
     matrix_to_rpy,
     quaternion_product,
+    rotation_angle,
     to_matrices,
     to_quaternions,
 )
@@ -160,7 +160,7 @@ def _moved(matched: Matched, alignment: Alignment) -> Matched:
 def _with_tool(matched: Matched, run: Run) -> Matched:
     """Move the log by the d of the least |p_reference - p - R d|^2, the mean of R^T (p_reference - p)."""
     posed, quat = _oriented(matched, "tool", run)
-    turned = float(angle_between(quat, np.broadcast_to(quat[0], quat.shape)).max())
+    turned = float(rotation_angle(quat, np.broadcast_to(quat[0], quat.shape)).max())
     if turned < TURNED:
         found = f"tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
         said = "which an offset of the base explains as well, allowed: a log that turns it; start, none"

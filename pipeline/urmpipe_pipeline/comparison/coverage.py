@@ -28,7 +28,7 @@ import numpy as np
 
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
-from urmpipe_models.math3d import angle_between, slerp
+from urmpipe_models.math3d import rotation_angle, slerp
 from urmpipe_pipeline.comparison.deviation import Share, ShareKind, Stretch, Verdict
 from urmpipe_pipeline.comparison.matching import Matched, joint_order
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, allowed_for
@@ -176,7 +176,7 @@ def _departs(first: _Values, second: _Values, limits: _Limits) -> BoolArray:
     if limits.norm < math.inf:
         within.append(np.linalg.norm(difference, axis=1) <= limits.norm)
     if limits.angle < math.inf and first.quat is not None and second.quat is not None:
-        within.append(angle_between(first.quat, second.quat) <= limits.angle)
+        within.append(rotation_angle(first.quat, second.quat) <= limits.angle)
     if limits.joint < math.inf and first.q is not None and second.q is not None:
         within.append((np.abs(first.q - second.q) <= limits.joint).all(axis=1))
     return np.asarray(~np.all(within, axis=0))

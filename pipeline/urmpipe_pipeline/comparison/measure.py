@@ -9,7 +9,7 @@ import numpy as np
 from urmpipe_models.delta import delta
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
-from urmpipe_models.math3d import angle_between
+from urmpipe_models.math3d import rotation_angle
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.comparison.coverage import measure_shares
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Deviation
@@ -101,7 +101,7 @@ def _angle(matched: Matched) -> FloatArray | None:
     """Return the angle between the orientations in [rad], shape (m,); None if a side has none anywhere."""
     if matched.reference_quat is None or matched.actual_quat is None:
         return None
-    angle = angle_between(matched.reference_quat, matched.actual_quat)
+    angle = rotation_angle(matched.reference_quat, matched.actual_quat)
     return angle if np.isfinite(angle).any() else None
 
 

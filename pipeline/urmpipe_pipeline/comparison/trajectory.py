@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.hand_eye import UnobservableDirection
-from urmpipe_models.math3d import angle_between, to_quaternions
+from urmpipe_models.math3d import rotation_angle, to_quaternions
 from urmpipe_pipeline.joint_log import SourceFile, seconds
 
 SyncMode = Literal["start", "stamps", "given", "auto"]
@@ -155,7 +155,7 @@ class Alignment:
 
 def _angle(rotation: tuple[tuple[float, ...], ...]) -> float:
     quat = to_quaternions(np.reshape(rotation, (1, 9)), "matrix")
-    return float(angle_between(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
+    return float(rotation_angle(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
 
 
 def extent(values: FloatArray) -> float:

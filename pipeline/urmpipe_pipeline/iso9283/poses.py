@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import angle_between
+from urmpipe_models.math3d import rotation_angle
 from urmpipe_pipeline.iso9283.command_path import Stop
 from urmpipe_pipeline.iso9283.in_order import in_order
 from urmpipe_pipeline.iso9283.motion import Motion, Rest
@@ -45,7 +45,7 @@ class Poses:
         near = float(np.linalg.norm(self.position[first] - self.position[second])) <= SAME[0]
         if self.quat_xyzw is None or not near:
             return near
-        turned = angle_between(self.quat_xyzw[[first]], self.quat_xyzw[[second]])
+        turned = rotation_angle(self.quat_xyzw[[first]], self.quat_xyzw[[second]])
         return float(turned[0]) <= SAME[1]
 
     @property

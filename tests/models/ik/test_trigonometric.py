@@ -15,7 +15,7 @@ from urmpipe_models.ik.trigonometric import (
     BOUNDARY,
     MEETING,
     circle_roots,
-    is_straight,
+    is_linear,
     linear_roots,
     parabola_roots,
     quadric_roots,
@@ -200,9 +200,9 @@ def test_a_parabola_that_is_missed_by_rounding_is_touched(unit: float) -> None:
 
 
 def test_a_parabola_along_its_axis_is_met_once() -> None:
-    assert is_straight(np.array([-1.0, 1e-9]))
-    assert not is_straight(np.array([-1.0, 1.01e-9]))
-    assert not is_straight(np.array([0.0, 1e-30]))
+    assert is_linear(np.array([-1.0, 1e-9]))
+    assert not is_linear(np.array([-1.0, 1.01e-9]))
+    assert not is_linear(np.array([0.0, 1e-30]))
     roots = parabola_roots(np.array([2.0, 0.0]), np.array([3.0, -1.0]))
     np.testing.assert_array_equal(roots.u, [[[1.5, -0.5]], [[2.25, 0.25]]])
     assert roots.coincide.tolist() == [False, False]

@@ -15,7 +15,7 @@ from asserting import refusal
 from random_paths import by_first_points, corner_rows
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError, PathError
-from urmpipe_models.math3d import angle_between, from_offset, to_matrices, to_quaternions
+from urmpipe_models.math3d import from_offset, rotation_angle, to_matrices, to_quaternions
 from urmpipe_models.planning.from_rows import rows_to_path, validate_rows
 from urmpipe_models.planning.path import PLANES, LineArcPath, PathRows, cube_rows
 
@@ -231,10 +231,10 @@ def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[floa
     along_it = np.insert(path.orientation.quaternions(path.at), np.arange(1, len(rows)), quats, axis=0)
     turned_by = np.einsum("ij,ij->i", along_it[1:], along_it[:-1])
     assert turned_by.min() >= math.sqrt(0.5) - ROUNDING  # one sign: half of at most half a turn a step
-    halves = np.stack((angle_between(ends[:-1], quats), angle_between(quats, ends[1:])))
+    halves = np.stack((rotation_angle(ends[:-1], quats), rotation_angle(quats, ends[1:])))
     np.testing.assert_allclose(halves[0], halves[1], atol=1e-7)  # acos-like near 0
     speed = np.linalg.norm(path.orientation.rate, axis=1) * np.diff(path.at)
-    np.testing.assert_allclose(speed, angle_between(ends[:-1], ends[1:]), atol=1e-7)
+    np.testing.assert_allclose(speed, rotation_angle(ends[:-1], ends[1:]), atol=1e-7)
 
 
 def faults(points: Sequence[Sequence[float]], radius: Sequence[float], corner: bool = False) -> list[str]:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import urmpipe
 from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import angle_between, to_quaternions
+from urmpipe_models.math3d import rotation_angle, to_quaternions
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.provenance import provenance
@@ -207,6 +207,6 @@ def test_whatever_is_judged_the_shares_are_of_it(tolerance: str) -> None:
     lengths = np.linalg.norm(np.diff(whole.q if "joint" in tolerance else tcp.position, axis=0), axis=1)
     if "angle" in tolerance:
         quat = to_quaternions(tcp.euler_zyx, "zyx")
-        lengths = angle_between(quat[1:], quat[:-1])
+        lengths = rotation_angle(quat[1:], quat[:-1])
     share = lengths[:119].sum() / lengths.sum()
     assert longer.shares["judged"].value == pytest.approx(share, abs=0.02)  # a step of the tolerance

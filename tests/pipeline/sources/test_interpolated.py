@@ -14,7 +14,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import (
     RotationForm,
-    angle_between,
+    rotation_angle,
     to_quaternions,
     to_rotation_vectors,
 )
@@ -83,7 +83,7 @@ def test_rows_between_the_ends_of_a_jump_are_not_used(form: RotationForm, ratio:
     content, q = text(form, ratio)
     log = read(content, robot, rotation=form)
     assert log.tcp_rotation is not None
-    apart = angle_between(to_quaternions(log.tcp_rotation, form), true(robot, q)[1])
+    apart = rotation_angle(to_quaternions(log.tcp_rotation, form), true(robot, q)[1])
     missing = np.isnan(apart)
     (said,) = [warning for warning in log.warnings if warning.kind == "interpolated-orientation"]
     assert said.row == int(np.argmax(missing)) + 1
@@ -112,7 +112,7 @@ def test_many_rows_between_contradict_the_kinematics(form: RotationForm, read: R
     log = read(content, robot, rotation=form)
     assert log.tcp_rotation is not None
     assert "interpolated-orientation" in kinds(log)
-    apart = angle_between(to_quaternions(log.tcp_rotation, form), true(robot, q)[1])
+    apart = rotation_angle(to_quaternions(log.tcp_rotation, form), true(robot, q)[1])
     assert np.nanmax(apart) <= 0.35  # a row of 20 is 18 deg off, 0.31 rad; the chord adds less than 0.04
     assert np.isnan(apart).mean() < 0.02
 
@@ -146,7 +146,7 @@ def test_each_row_between_is_found_in_any_unit(
     spelled[:, 0] = np.mod(angles[:, 0] + np.pi, 2 * np.pi) - np.pi
     grid, values = resampled(t, spelled * factor, ratio)
     _, smooth = resampled(t, angles, ratio)
-    off = angle_between(to_quaternions(values / factor, "rpy"), to_quaternions(smooth, "rpy"))
+    off = rotation_angle(to_quaternions(values / factor, "rpy"), to_quaternions(smooth, "rpy"))
     np.testing.assert_array_equal(interpolated_rows(values), off > 0.1)
     assert not interpolated_rows(spelled * factor).any()
     assert len(grid) == len(values)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import angle_between
+from urmpipe_models.math3d import rotation_angle
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources.columns.columns import Column
@@ -70,7 +70,7 @@ def test_forms_that_the_names_tell(case: str, read: Read) -> None:
     log = read(text([*JOINTS_RAD, *XYZ, *names], Q, POSITION * 1e3, values))
     assert log.rotation_form == ("quat_xyzw" if "letters" in case else case)
     assert log.tcp_quat_xyzw is not None
-    np.testing.assert_allclose(angle_between(log.tcp_quat_xyzw, ROTATION.as_quat()), 0.0, atol=PRINTED)
+    np.testing.assert_allclose(rotation_angle(log.tcp_quat_xyzw, ROTATION.as_quat()), 0.0, atol=PRINTED)
     assert log.tcp_position is not None
     np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)
     assert log.joints == tuple(JOINTS)
@@ -136,7 +136,7 @@ def test_the_user_tells_the_form(read: Read) -> None:
     log = read(table, rotation="rpy")
     assert log.rotation_form == "rpy"
     assert log.tcp_quat_xyzw is not None
-    np.testing.assert_allclose(angle_between(log.tcp_quat_xyzw, ROTATION.as_quat()), 0.0, atol=PRINTED)
+    np.testing.assert_allclose(rotation_angle(log.tcp_quat_xyzw, ROTATION.as_quat()), 0.0, atol=PRINTED)
     assert not log.warnings
 
 

@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray
-from urmpipe_models.math3d import angle_between, conjugate, quaternion_product
+from urmpipe_models.math3d import conjugate, quaternion_product, rotation_angle
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -127,10 +127,10 @@ def turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> f
     Computed and recorded orientations are unit quaternions x, y, z, w [-], shape (n, 4).
     """
     if not tool:
-        return float(np.sqrt(np.mean(angle_between(computed, recorded) ** 2)))
+        return float(np.sqrt(np.mean(rotation_angle(computed, recorded) ** 2)))
     relative = quaternion_product(conjugate(computed), recorded)
     mean = np.broadcast_to(mean_turn(computed, recorded), relative.shape)
-    return float(np.sqrt(np.mean(angle_between(mean, relative) ** 2)))
+    return float(np.sqrt(np.mean(rotation_angle(mean, relative) ** 2)))
 
 
 def mean_turn(computed: FloatArray, recorded: FloatArray) -> FloatArray:

@@ -19,7 +19,13 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import RotationForm, angle_between, conjugate, quaternion_product, to_quaternions
+from urmpipe_models.math3d import (
+    RotationForm,
+    conjugate,
+    quaternion_product,
+    rotation_angle,
+    to_quaternions,
+)
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.units.evidence import mean_turn, spread
@@ -152,7 +158,7 @@ def _turned(arm: tuple[Chain, FloatArray], rows: IntArray) -> FloatArray:
     before, here, behind = (
         to_quaternions(poses_over_log(robot, q[at])[1].reshape(-1, 9), "matrix") for at in around
     )
-    return np.fmax(angle_between(before, here), angle_between(here, behind))
+    return np.fmax(rotation_angle(before, here), rotation_angle(here, behind))
 
 
 def _misses(
@@ -169,7 +175,7 @@ def _misses(
 
     def apart(pair: tuple[FloatArray, FloatArray], turn: FloatArray) -> FloatArray:
         relative = quaternion_product(conjugate(pair[0]), pair[1])
-        return angle_between(np.broadcast_to(turn, relative.shape), relative)
+        return rotation_angle(np.broadcast_to(turn, relative.shape), relative)
 
     own = both(usual)
     first = apart(own, mean_turn(*own))
