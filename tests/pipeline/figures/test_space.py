@@ -109,4 +109,8 @@ def test_solids_and_sheets_are_faces_and_the_hidden_are_left_out() -> None:
 def test_a_scene_of_nothing_is_drawn() -> None:
     for position in (np.empty((0, 3)), np.full((5, 3), np.nan), np.ones((1, 3))):
         path = Path("tcp", position, None, RED, values=np.ones(len(position)))
-        drawn(paths=(path, Path("reference", position, None, RED, asked=True))).draw_without_rendering()
+        figure = drawn(paths=(path, Path("reference", position, None, RED, asked=True)))
+        figure.draw_without_rendering()
+        axes = scene(figure)
+        limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+        assert np.isfinite(limits).all() and (limits[:, 0] < limits[:, 1]).all()
