@@ -282,19 +282,24 @@ def fmu(foreign: Foreign) -> Path:
 
 
 def system(
-    blocks: Mapping[str, Foreign],
+    blocks: Mapping[str, Foreign | Path],
     connections: Mapping[str, str] | None = None,
     start: Mapping[str, Mapping[str, Any]] | None = None,
     inputs: Sequence[LogInput] = (),
     **options: Any,
 ) -> System:
-    """Return a system of foreign FMUs; connections are destination: source."""
+    """Return a system of FMUs; connections are destination: source."""
     made = {"step": 0.1, "duration": 1.0, **options}
     return System(
         name="test",
         path=Path("test.toml"),
         blocks=tuple(
-            Block(name=name, fmu=fmu(one), start=(start or {}).get(name, {})) for name, one in blocks.items()
+            Block(
+                name=name,
+                fmu=model if isinstance(model, Path) else fmu(model),
+                start=(start or {}).get(name, {}),
+            )
+            for name, model in blocks.items()
         ),
         connections=tuple(
             Connection(Port(*to.split(".", 1)), Port(*source.split(".", 1)))
