@@ -1,4 +1,4 @@
-"""URDF files of others, their inertias by Pinocchio, and files in other encodings. urdf.cases has the rest."""
+"""URDF files of others, inertias by Pinocchio, and encodings. urdf.cases has the rest."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from asserting import refusal
 from urmpipe_models.errors import RobotError
 from urmpipe_models.robots.urdf import read_urdf
 
-TURNED = """<robot name="arm"><link name="r"/><link name="a"><inertial><origin rpy="0.4 -0.7 1.9"/><mass value="1"/>
+TURNED = """<robot name="arm"><link name="r"/><link name="a">
+<inertial><origin rpy="0.4 -0.7 1.9"/><mass value="1"/>
 <inertia ixx="0.2" ixy="0" ixz="0" iyy="0.3" iyz="0" izz="0.4"/></inertial></link>
 <joint name="j" type="continuous"><parent link="r"/><child link="a"/></joint></robot>"""
 
