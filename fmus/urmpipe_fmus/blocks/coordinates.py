@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
-from urmpipe_fmus.block import Output, Recipe, State, Values
+from urmpipe_fmus.block import Input, Output, Recipe, State, Values
 from urmpipe_models.arm.chain import Chain, JointKind
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError, format_value
@@ -63,6 +63,9 @@ def check_choices(block: str, option: str, value: Any, allowed: tuple[str, ...])
     if errors:
         raise UnitError(*(finding for error in errors for finding in error.findings))
     return tuple(name for name in allowed if name in value)
+
+
+Moving = TypeVar("Moving", Input, State)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,28 +135,30 @@ def format_joints(robot: Chain, indices: Iterable[int]) -> str:
     return f"of the joints {', '.join(robot.coordinates[k] for k in indices)}"
 
 
-def motion_states(robot: Chain) -> Iterator[State]:
-    """Yield the coordinates and their velocities as states; they start at rest at the start pose."""
+def coordinate_variables(
+    robot: Chain, variable: type[Moving], derivatives: int, **fields: Any
+) -> Iterator[Moving]:
+    """Yield the coordinates and their derivatives as variables; they start at rest at the start pose.
+
+    Args:
+        robot: The robot.
+        variable: The class of the variables.
+        derivatives: 0 for the coordinates, 1 for their velocities too, 2 for their accelerations too.
+        fields: Further fields of each variable.
+    """
     for kind in coordinate_kinds(robot):
         indices = kind.indices(robot)
-        joints = format_joints(robot, indices)
-        yield State(
-            name=kind.name,
-            description=f"{kind.word}s {joints}",
-            unit=kind.unit,
-            display_unit=kind.display_unit,
-            start=tuple(float(robot.start[k]) for k in indices),
-            size=len(indices),
-            output=True,
-        )
-        yield State(
-            name=f"{kind.name}d",
-            description=f"Velocities {joints}",
-            unit=f"{kind.unit}/s",
-            display_unit=f"{kind.display_unit}/s",
-            size=len(indices),
-            output=True,
-        )
+        for order, (dots, per) in enumerate((("", ""), ("d", "/s"), ("dd", "/s2"))[: derivatives + 1]):
+            word = (f"{kind.word}s", "Velocities", "Accelerations")[order]
+            yield variable(
+                name=kind.name + dots,
+                description=f"{word} {format_joints(robot, indices)}",
+                unit=kind.unit + per,
+                display_unit=kind.display_unit + per,
+                size=len(indices),
+                start=tuple(float(robot.start[k]) for k in indices) if order == 0 else 0.0,
+                **fields,
+            )
 
 
 def acceleration_outputs(robot: Chain) -> Iterator[Output]:

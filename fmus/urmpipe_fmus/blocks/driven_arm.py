@@ -28,8 +28,8 @@ from urmpipe_fmus.blocks.coordinates import (
     acceleration_outputs,
     check_robot,
     coordinate_kinds,
+    coordinate_variables,
     format_joints,
-    motion_states,
     read_coordinates,
     robot_recipe,
     scatter,
@@ -396,7 +396,7 @@ class _DrivenArm:
         for group in self.groups:
             yield from group.computed()
         yield Output(name="energy_stored", description="Energy of arm, drives, shafts and springs", unit="J")
-        yield from motion_states(self.robot)
+        yield from coordinate_variables(self.robot, State, 1, output=True)
         for group in self.groups:
             yield from (*group.states(), *group.memories())
         yield State(name="energy_in", description="Work of voltages and tool force", unit="J", output=True)

@@ -17,8 +17,7 @@ from urmpipe_fmus.blocks.coordinates import (
     check_choices,
     check_flag,
     check_robot,
-    coordinate_kinds,
-    format_joints,
+    coordinate_variables,
     read_coordinates,
     robot_recipe,
 )
@@ -208,7 +207,7 @@ def kinematic_chain(
         description=f"Points of {robot.name or 'an arm'} from its joints",
         variables=(
             *geometry.parameters,
-            *_joint_inputs(robot, rates),
+            *coordinate_variables(robot, Input, 2 if rates else 0),
             *(_output(name, f"Place of point {name}: x, y, z", "m", 3) for name in selected),
             *(variable for name in sensor_names for variable in _sensor_outputs(name, rates)),
         ),
@@ -237,29 +236,6 @@ RATE_EQUATIONS = (
 def from_robot_toml(robot: str, **options: Any) -> BlockModel:
     """Return `kinematic_chain` of the robot in a text of `robot_toml`, equal to the bit."""
     return kinematic_chain(chain_from_dict(tomllib.loads(robot)), **options)
-
-
-def _joint_inputs(robot: Chain, rates: bool) -> Iterator[Input]:
-    """Yield the coordinates, and with rates their velocities and accelerations."""
-    for kind in coordinate_kinds(robot):
-        indices = kind.indices(robot)
-        joints = format_joints(robot, indices)
-        yield Input(
-            name=kind.name,
-            description=f"{kind.word}s {joints}",
-            unit=kind.unit,
-            display_unit=kind.display_unit,
-            start=tuple(float(robot.start[k]) for k in indices),
-            size=len(indices),
-        )
-        for dots, per, word in (("d", "/s", "Velocities"), ("dd", "/s2", "Accelerations")) if rates else ():
-            yield Input(
-                name=f"{kind.name}{dots}",
-                description=f"{word} {joints}",
-                unit=f"{kind.unit}{per}",
-                display_unit=f"{kind.display_unit}{per}",
-                size=len(indices),
-            )
 
 
 def _sensor_outputs(name: str, rates: bool) -> Iterator[Variable]:
