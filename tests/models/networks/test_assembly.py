@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
+from closed_forms import arm_with_wrist
 from known_mechanisms import (
     MECHANISMS,
     ORIGIN,
@@ -33,7 +34,6 @@ from known_mechanisms import (
     tied,
 )
 from random_networks import matrix, transform, unit, vec
-from spherical_arms import random_arm
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.ik.solutions import forward_targets
@@ -245,7 +245,7 @@ def test_a_plane_platform_has_as_many_modes_as_its_coupler_curve_meets_a_circle(
 def test_an_arm_with_a_spherical_wrist_has_the_eight_modes_of_its_closed_form(seed: int) -> None:
     """Its tool is fixed to the ground: joint values are those of `solve`, counted from where it is drawn."""
     rng = np.random.default_rng(seed)
-    chain = random_arm(rng, "like a PUMA")
+    chain = arm_with_wrist(rng, "like a PUMA")
     while True:
         q = rng.uniform(-2.5, 2.5, (1, 6))
         closed = solve(chain, forward_targets(chain, q), every=True)
