@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ ROBOTS = {name: load_robot(name) for name in robot_names()} | {
 def joint_inputs(robot: Chain, *motion: FloatArray) -> dict[str, FloatArray]:
     """Return the inputs of revolute and prismatic joints: of q, and of velocities and accelerations."""
     prismatic = np.array([joint.kind == "prismatic" for joint in robot.moving])
-    inputs = {}
+    inputs: dict[str, FloatArray] = {}
     for suffix, values in zip(("", "d", "dd"), motion, strict=False):
         inputs |= {f"phi{suffix}": values[:, ~prismatic], f"s{suffix}": values[:, prismatic]}
     return {name: column for name, column in inputs.items() if column.size}
@@ -85,7 +86,8 @@ def test_lengths_and_tilts_are_tuned_while_it_runs() -> None:
 
 def test_the_frames_of_any_arm_are_tuned() -> None:
     robot, rng = sliding_arm(), np.random.default_rng(0)
-    start, frames = {}, {}
+    start: dict[str, Any] = {}
+    frames: dict[str, Any] = {}
     for name in ("origin2", "origin5", "tip", "base", "tool"):
         (x, y, z, rx, ry, rz) = frame = rng.uniform(-1.0, 1.0, 6)
         start |= {name: frame[:3], f"{name}_rpy": frame[3:]}
