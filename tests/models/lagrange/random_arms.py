@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import re
+import shlex
 import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -34,12 +35,9 @@ def random_arm(rng: np.random.Generator, coordinates: int) -> Chain:
             follower: JointKind = "revolute" if rng.random() < 0.7 else "prismatic"
             joints.append(Joint(f"m{k + 1}", follower, *_frame(rng), mimic=mimic))
     inertials += [body(one.name, rng) for one in joints]
-    frames = [_frame(rng)[0] for _ in range(3)]
+    base, tip, tool = (_frame(rng)[0] for _ in range(3))
     gravity = tuple(rng.normal(0.0, 9.0, 3).tolist())
-    return Chain(
-        "any", tuple(joints), base=frames[0], tip=frames[1], tool=frames[2],
-        inertials=tuple(inertials), gravity=gravity,
-    )  # fmt: skip
+    return Chain("any", tuple(joints), tip, base, tool, inertials=tuple(inertials), gravity=gravity)
 
 
 def random_motion(rng: np.random.Generator, chain: Chain) -> Motion:
@@ -62,10 +60,7 @@ def compiled(code: str, folder: Path) -> ctypes.CDLL:
     source = folder / "equations.c"
     source.write_text(code, encoding="utf-8")
     library = source.with_suffix(".so")
-    flags = [
-        "-std=c99", "-O1", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror", "-pedantic", "-shared",
-        "-fPIC",
-    ]  # fmt: skip
+    flags = shlex.split("-std=c99 -O1 -Wall -Wextra -Wno-unused-parameter -Werror -pedantic -shared -fPIC")
     command = ["cc", *flags, str(source), "-o", str(library), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -76,17 +71,13 @@ def c_terms(
     library: ctypes.CDLL, chain: Chain, motion: Motion, wrench: Sequence[float]
 ) -> dict[str, FloatArray]:
     """Return each term of each coordinate, and the sum as `torque`, as compiled C computes them."""
-    given = dict(zip(("q", "qd", "qdd"), motion, strict=True)) | {"force": np.asarray(wrench)}
-    arguments: dict[str, tuple[str, ...]] = {str(term): ARGUMENTS[term] for term in ARGUMENTS}
-    arguments["torque"] = tuple(given)
-    pointer = ctypes.POINTER(ctypes.c_double)
-    found = {}
-    for term, names in arguments.items():
-        tau = np.full(len(chain.coordinates), np.nan)
-        arrays = [*(np.ascontiguousarray(given[name]) for name in names), tau]
-        getattr(library, f"{c_name(chain.name)}_{term}")(*(one.ctypes.data_as(pointer) for one in arrays))
-        found[term] = tau
-    return found
+    inputs = dict(zip(("q", "qd", "qdd"), motion, strict=True)) | {"force": np.asarray(wrench)}
+    pointer, terms = ctypes.POINTER(ctypes.c_double), dict[str, FloatArray]()
+    for term, names in [*ARGUMENTS.items(), ("torque", tuple(inputs))]:
+        terms[term] = np.full(len(chain.coordinates), np.nan)
+        arrays = [*(np.ascontiguousarray(inputs[name]) for name in names), terms[term]]
+        getattr(library, f"{c_name(chain.name)}_{term}")(*(array.ctypes.data_as(pointer) for array in arrays))
+    return terms
 
 
 def text_terms(text: str) -> Callable[[Motion, Sequence[float]], dict[str, FloatArray]]:
@@ -94,20 +85,18 @@ def text_terms(text: str) -> Callable[[Motion, Sequence[float]], dict[str, Float
     coordinates = re.findall(r"^tau_(\w+) = ", text, re.MULTILINE)
     angles = re.findall(r"^# (c\w+) = (cos\(.*\)), (s\w+) = (sin\(.*\))$", text, re.MULTILINE)
     lines = re.findall(r"^  (\w+) = (.*)$", text, re.MULTILINE)
-    in_python = [(term, re.sub(r"''", "_dd", one)) for term, one in lines]
-    code = [(term, re.sub(r"'", "_d", one).replace("^", "**")) for term, one in in_python]
+    code = [(term, line.replace("''", "_dd").replace("'", "_d").replace("^", "**")) for term, line in lines]
 
     def terms(motion: Motion, wrench: Sequence[float]) -> dict[str, FloatArray]:
-        """Return the terms."""
         names: dict[str, Any] = {"cos": math.cos, "sin": math.sin}
         for mark, values in zip(("", "_d", "_dd"), motion, strict=True):
             names |= dict(zip((f"{name}{mark}" for name in coordinates), values.tolist(), strict=True))
         names |= dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), wrench, strict=True))
         for cosine, c, sine, s in angles:
             names |= {cosine: eval(c, names), sine: eval(s, names)}
-        found: dict[str, list[float]] = {}
+        results: dict[str, list[float]] = {}
         for term, formula in code:
-            found.setdefault(term, []).append(eval(formula, names))
-        return {term: np.array(values) for term, values in found.items()}
+            results.setdefault(term, []).append(eval(formula, names))
+        return {term: np.array(values) for term, values in results.items()}
 
     return terms
