@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.strategies import DrawFn
+from hypothesis.strategies import DrawFn, SearchStrategy
 
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import PathRows
@@ -44,8 +48,12 @@ def corner_rows(draw: DrawFn, variants: bool = False) -> PathRows:
 
 
 def by_first_points(rows: PathRows) -> PathRows:
-    """Return the same path by the first points of its arcs, as the paper tells it."""
-    path = rows_to_path(rows)
-    position = rows.position.copy()
+    """Return the same path by the first points of its arcs, as in the paper."""
+    path, position = rows_to_path(rows), rows.position.copy()
     position[path.row[path.arcs]] = path.start[path.arcs]
     return PathRows(position, rows.radius, variant=rows.variant)
+
+
+def slow_law(*drawn: SearchStrategy[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator of slow tests, each of 40 drawn cases."""
+    return lambda test: pytest.mark.slow(settings(max_examples=40)(given(*drawn)(test)))
