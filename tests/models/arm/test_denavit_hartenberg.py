@@ -1,9 +1,8 @@
-"""Chains from geometric models, against the products of their matrices."""
+"""Chains from geometric models, against the products of their matrices. geometric.cases has the rest."""
 
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import Any
 
 import casadi
@@ -14,51 +13,39 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from scipy.spatial.transform import Rotation
 
-from asserting import refusal
 from direct_geometric_model import geometric_model
 from urmpipe_models.arm.denavit_hartenberg import (
     DHRow,
     GeometricModelRow,
-    articulated_6r,
     dh_chain,
     geometric_chain,
     modified_dh_chain,
-    urm_chain,
 )
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
-from urmpipe_models.math3d import Transform, from_offset, translation
+from urmpipe_models.math3d import Transform, from_offset
 
 ROUNDING = 2e-14  # up to seven products of 4x4 matrices with entries of up to 14 m
 
 
+def row_values(row: DHRow, q: float) -> tuple[float, ...]:
+    """Return cosines and sines of theta and alpha, and d, of a row at its coordinate."""
+    theta, d = (row.theta + q, row.d) if row.kind == "revolute" else (row.theta, row.d + q)
+    return math.cos(theta), math.sin(theta), math.cos(row.alpha), math.sin(row.alpha), d
+
+
 def standard(row: DHRow, q: float) -> FloatArray:
     """A_i as the textbooks print it."""
-    theta, d = (row.theta + q, row.d) if row.kind == "revolute" else (row.theta, row.d + q)
-    ct, st_, ca, sa = math.cos(theta), math.sin(theta), math.cos(row.alpha), math.sin(row.alpha)
-    return np.array(
-        [
-            [ct, -st_ * ca, st_ * sa, row.a * ct],
-            [st_, ct * ca, -ct * sa, row.a * st_],
-            [0.0, sa, ca, d],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+    ct, st_, ca, sa, d = row_values(row, q)
+    rows = [ct, -st_ * ca, st_ * sa, row.a * ct], [st_, ct * ca, -ct * sa, row.a * st_], [0.0, sa, ca, d]
+    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
 def modified(row: DHRow, q: float) -> FloatArray:
     """Craig's matrix, his equation 3.6."""
-    theta, d = (row.theta + q, row.d) if row.kind == "revolute" else (row.theta, row.d + q)
-    ct, st_, ca, sa = math.cos(theta), math.sin(theta), math.cos(row.alpha), math.sin(row.alpha)
-    return np.array(
-        [
-            [ct, -st_, 0.0, row.a],
-            [st_ * ca, ct * ca, -sa, -sa * d],
-            [st_ * sa, ct * sa, ca, ca * d],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+    ct, st_, ca, sa, d = row_values(row, q)
+    rows = [ct, -st_, 0.0, row.a], [st_ * ca, ct * ca, -sa, -sa * d], [st_ * sa, ct * sa, ca, ca * d]
+    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
 def homogeneous(frame: Transform) -> FloatArray:
@@ -95,44 +82,6 @@ def test_the_points_of_a_standard_arm_are_its_frames_origins(
     for row, point in zip(rows, forward(dh_chain("arm", rows), [0.3] * len(rows)), strict=True):
         expected = expected @ standard(row, 0.3)
         np.testing.assert_allclose(point.translation, expected[:3, 3], rtol=0.0, atol=ROUNDING)
-
-
-@pytest.mark.parametrize("build", [dh_chain, modified_dh_chain])
-def test_limits_and_speeds_of_rows_go_into_the_chain(build: Any) -> None:
-    rows = [DHRow(name="turn", lower=-1.0, upper=2.0, velocity=3.0, acceleration=4.0, effort=5.0)]
-    turn, slide = build("arm", [*rows, DHRow(kind="prismatic", upper=0.5)]).joints
-    limits = (turn.lower, turn.upper, turn.velocity, turn.acceleration, turn.effort)
-    assert (turn.name, limits) == ("turn", (-1.0, 2.0, 3.0, 4.0, 5.0))
-    assert (slide.name, slide.kind, slide.lower, slide.upper) == ("q2", "prismatic", -math.inf, 0.5)
-    plain = build("arm", rows)
-    assert (plain.base, plain.tool) == (Transform(), Transform())
-
-
-BUILDERS: dict[str, tuple[Any, int]] = {  # and the coordinates of the arm
-    "dh": (partial(dh_chain, rows=[DHRow(), DHRow()]), 2),
-    "modified_dh": (partial(modified_dh_chain, rows=[DHRow(), DHRow()]), 2),
-    "geometric": (
-        partial(geometric_chain, rows=[GeometricModelRow("T", "x"), GeometricModelRow("R", "y")]),
-        2,
-    ),
-    "urm": (partial(urm_chain, lengths=(0.3, 0.2, 0.1), tilts=(0.5, -0.7)), 2),
-    "articulated_6r": (partial(articulated_6r, 0.3, 0.1, 0.45, 0.4, 0.15), 6),
-}
-
-
-@pytest.mark.parametrize("kind", BUILDERS)
-def test_name_start_and_words_go_into_the_chain(kind: str) -> None:
-    build, count = BUILDERS[kind]
-    chain = build(name="arm", start=range(count), description="short", source="a test")
-    assert (chain.name, chain.start) == ("arm", tuple(map(float, range(count))))
-    assert (chain.description, chain.source) == ("short", "a test")
-    bare = build(name="arm")
-    assert (bare.start, bare.description, bare.source) == ((0.0,) * count, "", "")
-
-
-@pytest.mark.parametrize("build", [dh_chain, modified_dh_chain, geometric_chain])
-def test_an_arm_needs_a_joint(build: Any) -> None:
-    assert refusal(RobotError, build, "none", []) == "robot none: has no moving joint; at least one is needed"
 
 
 @pytest.mark.parametrize(("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)])
@@ -202,26 +151,14 @@ def test_it_is_matrix_products_and_the_chain(rows: list[GeometricModelRow], data
     np.testing.assert_allclose(seen[0], steps[-1], rtol=0.0, atol=ROUNDING)
 
 
-def test_rows_name_joints_and_give_their_kinds() -> None:
-    rows = (GeometricModelRow("T", "x", name="slide"), GeometricModelRow("R", "y"))
-    assert [(joint.name, joint.kind, joint.axis) for joint in geometric_chain("arm", rows).joints] == [
-        ("slide", "prismatic", (1.0, 0.0, 0.0)),
-        ("q2", "revolute", (0.0, 1.0, 0.0)),
-    ]
-
-
 def test_an_arm_that_slides_by_hand() -> None:
     s1, turn, s3, s4, swing = 0.1, math.pi / 2, 0.2, -0.3, math.pi / 2
     model = geometric_model(TRTTR1, [s1, turn, s3, s4, swing], TIP)
     # up by 0.4 + 0.1; then y becomes -x and x becomes y; then the gripper's y points up and its z along x
     expected = [
-        (0.0, 0.0, 0.5),
-        (0.0, 0.1, 0.2),
-        (-0.5, 0.05, 0.0),
-        (0.0, -0.2, -0.2),
-        (-0.25, 0.0, 0.0),
+        (0.0, 0.0, 0.5), (0.0, 0.1, 0.2), (-0.5, 0.05, 0.0), (0.0, -0.2, -0.2), (-0.25, 0.0, 0.0),
         (0.03, 0.0, 0.12),
-    ]
+    ]  # fmt: skip
     np.testing.assert_allclose(model.steps, expected, rtol=0.0, atol=1e-16)
     np.testing.assert_allclose(model.positions[-1], (-0.72, -0.05, 0.62), rtol=0.0, atol=2e-16)
     axes = model.equations[3:]
@@ -244,36 +181,3 @@ def test_a_column_of_joint_values_and_symbols_take_the_same_lines() -> None:
         got = [np.broadcast_to(column, 20)[k] for column in columns]
         np.testing.assert_allclose(got, single, rtol=0.0, atol=1e-14)
         np.testing.assert_allclose(np.ravel(np.array(function(q[k]))), single, rtol=0.0, atol=1e-14)
-
-
-LENGTHS = (0.3, 0.1, 0.45, 0.4, 0.15)
-
-
-def test_six_joints_turn_about_z_x_x_z_x_z_the_last_three_in_the_wrist_centre() -> None:
-    chain = articulated_6r(*LENGTHS)
-    assert chain.name == "articulated6r"
-    assert {joint.kind for joint in chain.joints} == {"revolute"}
-    assert ["xyz"[joint.axis.index(1.0)] for joint in chain.joints] == ["z", "x", "x", "z", "x", "z"]
-    heights = [joint.origin.translation for joint in chain.joints]
-    assert heights == [(0.0, 0.0, z) for z in (*LENGTHS[:4], 0.0, 0.0)]
-    assert chain.tip.translation == (0.0, 0.0, LENGTHS[4])
-
-
-def test_urm_modules_are_joints_about_z_and_a_tilted_effector() -> None:
-    chain = urm_chain("two", (0.3, 0.2, 0.1), (0.5, math.pi / 2), directions=(1, -1), start=(0.1, 0.2))
-    assert chain.coordinates == ("phi1", "phi2")
-    assert [joint.axis for joint in chain.moving] == [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
-    assert chain.joints[0].origin == Transform()
-    assert chain.joints[1].origin.translation == (0.0, 0.0, 0.3)
-    assert (chain.joints[2].name, chain.joints[2].kind) == ("effector", "fixed")
-    assert chain.joints[2].origin.rotation == ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
-    assert chain.tip == translation(0.0, 0.0, 0.1)
-    limits = [(joint.upper, joint.velocity, joint.acceleration) for joint in chain.joints]
-    assert limits == [(math.inf,) * 3] * 3
-
-
-def test_urm_counts_and_directions_must_fit() -> None:
-    said = "robot odd: 2 lengths and 2 tilts; n modules need n + 1 lengths and n tilts"
-    assert refusal(RobotError, urm_chain, "odd", (0.3, 0.2), (0.5, 0.5)) == said
-    said = "robot odd: directions [2]; allowed: 1 values, each 1 or -1"
-    assert refusal(RobotError, urm_chain, "odd", (0.3, 0.2), (0.5,), directions=(2,)) == said

@@ -16,7 +16,7 @@ from hypothesis.strategies import SearchStrategy
 from urmpipe_models.arm.chain import Box, Capsule, Chain, Cylinder, Joint, JointKind, Mesh, Sphere, Visual
 from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.arm.solids import build_placeholder_solids
-from urmpipe_models.elementwise import FloatArray, Vector
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log, positions_over_log
 from urmpipe_models.math3d import Transform, from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
@@ -52,9 +52,6 @@ def scaled(chain: Chain, factor: float) -> Chain:
 
     joints = tuple(replace(one, origin=larger(one.origin)) for one in chain.joints)
     return replace(chain, joints=joints, tip=larger(chain.tip), tool=larger(chain.tool))
-
-
-# --- links -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -118,9 +115,8 @@ def test_no_link_goes_astray(alpha: float, d: float, a: float) -> None:
 @pytest.mark.parametrize("name", ["urm6", "ur5e", "panda"])
 def test_solids_are_as_large_as_their_arm(name: str, factor: float) -> None:
     small = load_robot(name).placed(tool=translation(0.0, 0.02, 0.1))
-    for one, large in zip(
-        build_placeholder_solids(small), build_placeholder_solids(scaled(small, factor)), strict=True
-    ):
+    pair = build_placeholder_solids(small), build_placeholder_solids(scaled(small, factor))
+    for one, large in zip(*pair, strict=True):
         np.testing.assert_allclose(ends_of(large), factor * ends_of(one), rtol=1e-6, atol=1e-9 * factor)
         assert type(large.shape) is type(one.shape)
         if isinstance(one.shape, (Capsule, Cylinder)) and isinstance(large.shape, (Capsule, Cylinder)):
@@ -137,12 +133,9 @@ def test_links_are_longer_than_they_are_thick_however_many(joints: int) -> None:
 
 
 def test_an_arm_without_any_length_is_a_joint_on_a_plate() -> None:
-    shapes = [one.shape for one in build_placeholder_solids(Chain("arm", (Joint("j"),)))]
-    assert all(isinstance(shape, Cylinder) and 0.01 < shape.radius < 0.1 for shape in shapes)
-    assert [one.joint for one in build_placeholder_solids(Chain("arm", (Joint("j"),)))] == [None, "j", "j"]
-
-
-# --- joints ----------------------------------------------------------------------------------------
+    solids = build_placeholder_solids(Chain("arm", (Joint("j"),)))
+    assert all(isinstance(one.shape, Cylinder) and 0.01 < one.shape.radius < 0.1 for one in solids)
+    assert [one.joint for one in solids] == [None, "j", "j"]
 
 
 def coloured(chain: Chain) -> dict[str, Visual]:
@@ -170,9 +163,8 @@ def test_joints_at_one_place_do_not_hide_each_other() -> None:
     middle = {name: ends_of(one).mean(axis=0).tolist() for name, one in solids.items()}
     assert middle["q4"][2] > ends_of(solids["q3"])[1][2]
     assert middle["q2"] == middle["q3"] == [0.0, 0.0, 0.0]
-    twice = Chain(
-        "twice", (Joint("a"), Joint("b"), Joint("c", axis=(0.0, 1.0, 0.0))), tip=translation(1, 0, 0)
-    )
+    joints = Joint("a"), Joint("b"), Joint("c", axis=(0.0, 1.0, 0.0))
+    twice = Chain("twice", joints, tip=translation(1, 0, 0))
     assert list(coloured(twice)) == ["a", "c"]
 
 
@@ -202,18 +194,10 @@ def test_a_sliding_joint_is_a_box_on_a_rail_as_long_as_its_limits(
 
 
 def test_a_gantry_of_rails_alone_is_as_thick_as_they_are_long() -> None:
-    axes: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)]
-    joints = tuple(
-        Joint(f"q{k}", SLIDING, axis=(float(x), float(y), float(z)), lower=0.0, upper=0.8)
-        for k, (x, y, z) in enumerate(axes)
-    )
-    rails = [
-        one.shape for one in build_placeholder_solids(Chain("gantry", joints)) if isinstance(one.shape, Box)
-    ]
-    assert all(0.01 < min(rail.size) < 0.1 for rail in rails)
-
-
-# --- the tool --------------------------------------------------------------------------------------
+    axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)
+    joints = tuple(Joint(f"q{k}", SLIDING, axis=axis, lower=0.0, upper=0.8) for k, axis in enumerate(axes))
+    shapes = [one.shape for one in build_placeholder_solids(Chain("gantry", joints))]
+    assert all(0.01 < min(shape.size) < 0.1 for shape in shapes if isinstance(shape, Box))
 
 
 @pytest.mark.parametrize("name", robot_names())
