@@ -1,0 +1,89 @@
+"""Wraps of joints as `repolarize`, `repolarize_sample` and `find_interpolated_samples` judge them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.wraps import (
+    FULL_TURN,
+    MAX_VALUE,
+    WrapState,
+    find_interpolated_samples,
+    repolarize,
+    repolarize_sample,
+)
+
+TSP = 0.005  # s
+
+
+def wrap(x: FloatArray, period: float = FULL_TURN) -> FloatArray:
+    """Limit to +-period/2, as an environment with limited joints does."""
+    return x - period * np.floor((x + period / 2.0) / period)
+
+
+class Judged(NamedTuple):
+    """The turns added to each sample of a joint, and rows of in-between samples and unexplained steps."""
+
+    turns: list[int]
+    in_between: list[int]
+    unexplained: list[int]
+
+
+def judge(
+    q: FloatArray,
+    dt: FloatArray | float = TSP,
+    period: FloatArray | float = FULL_TURN,
+    max_speed: float = math.inf,
+) -> list[Judged]:
+    """Return the results of each joint, which the batch and the steps must give bit for bit.
+
+    The lists of the batch are sorted by row and joint.
+    """
+    periods, times = np.broadcast_to(period, q.shape[1]), np.broadcast_to(dt, len(q))
+    batch = repolarize(q, times, period=periods, max_speed=max_speed)
+    assert batch.change.dtype == np.int64
+    for rows in (np.column_stack((batch.rows, batch.joints)), batch.unexplained, batch.in_between):
+        assert rows.tolist() == sorted(rows.tolist())
+    joints = []
+    for j, column in enumerate(q.T):
+        state, out, changes, unexplained, in_between, last = WrapState(), [], [], set[int](), [], -1
+        for i, (value, elapsed) in enumerate(zip(column, times, strict=True)):
+            state, result, flags = repolarize_sample(
+                state, value, elapsed, period=float(periods[j]), max_speed=max_speed
+            )
+            out.append(float(result))
+            changes.append(int(flags.change))
+            if flags.unexplained:
+                unexplained.add(i)
+            if flags.in_between:
+                in_between.append(last)
+                unexplained.discard(last)
+            last = i if abs(value) < MAX_VALUE else last
+        turns = np.cumsum(changes)
+        assert np.array(out).tobytes() == np.ascontiguousarray(batch.q[:, j]).tobytes()
+        np.testing.assert_array_equal(out, column + periods[j] * turns)
+        assert np.array(out)[turns == 0].tobytes() == column[turns == 0].tobytes()  # signs of zeros, too
+        of_joint = batch.joints == j
+        assert np.flatnonzero(changes).tolist() == batch.rows[of_joint].tolist()
+        assert [change for change in changes if change] == batch.change[of_joint].tolist()
+        assert sorted(unexplained) == batch.unexplained[batch.unexplained[:, 1] == j, 0].tolist()
+        assert in_between == batch.in_between[batch.in_between[:, 1] == j, 0].tolist()
+        joints.append(Judged(turns.tolist(), in_between, sorted(unexplained)))
+    return joints
+
+
+def find_in_between(q: FloatArray, max_speed: float = math.inf) -> Judged:
+    """Return the results of a joint by the batch, with in-between samples that only the whole log shows."""
+    t = TSP * np.arange(len(q), dtype=np.float64)
+    result = repolarize(q[:, np.newaxis], np.full(len(q), TSP), max_speed=max_speed)
+    here = np.flatnonzero(~np.isnan(q))
+    wraps = np.searchsorted(here, result.rows)
+    found = here[find_interpolated_samples(q[here], result.q[here, 0], t[here], wraps, FULL_TURN)]
+    changes = np.zeros(len(q), dtype=np.int64)
+    changes[result.rows] = result.change
+    samples = sorted({*result.in_between[:, 0].tolist(), *found.tolist()})
+    return Judged(np.cumsum(changes).tolist(), samples, result.unexplained[:, 0].tolist())
