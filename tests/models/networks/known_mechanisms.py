@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from random_networks import Vec, axis_frame, transform, unit, vec
+from random_networks import KINDS, Vec, axis_frame, transform, unit, vec
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, JointKind
@@ -32,24 +32,22 @@ def rod(name: str, bodies: tuple[str, str], p: Vec, q: Vec, more: str = "0") -> 
     return ConstraintElement(name, "gg", bodies, Expression(f"{length!r} + {more}"), (p, q))
 
 
+def network(name: str, bodies: Iterable[str], joints: list[Joint], drive: str | None) -> Network:
+    """Return a network without elements; a function of the control s drives its first joint if asked."""
+    first = joints[0] if drive is None else driven(joints[0], drive)
+    controls = () if drive is None else (Control("s"),)
+    return Network(name, tuple(map(Body, bodies)), (first, *joints[1:]), controls=controls)
+
+
 def ring(kinds: str, axes: FloatArray, points: FloatArray, drives: str | None = None) -> Network:
     """Return a loop of joints r, p, c, h, g along axes [-] through points in [m]; drives turn the first."""
-    named: dict[str, JointKind] = {
-        "r": "revolute",
-        "p": "prismatic",
-        "c": "cylindrical",
-        "h": "helical",
-        "g": "global",
-    }
+    named: dict[str, JointKind] = {kind[0]: kind for kind in KINDS}
     names = ["ground", *(f"b{k}" for k in range(1, len(kinds)))]
     joints = [
         tied(f"j{k}", named[kind], (names[k], names[(k + 1) % len(kinds)]), vec(axes[k]), vec(points[k]), 0.1)
         for k, kind in enumerate(kinds)
     ]
-    if drives is not None:
-        joints[0] = driven(joints[0], drives)
-    controls = (Control("s"),) if drives is not None else ()
-    return Network(kinds, tuple(map(Body, names[1:])), tuple(joints), controls=controls)
+    return network(kinds, names[1:], joints, drives)
 
 
 def circles(p: FloatArray, r: float, q: FloatArray, s: float, sign: float = 1.0) -> FloatArray:
@@ -76,12 +74,7 @@ def screw_displacement(t: float, a: float, alpha: float) -> FloatArray:
     """Return Rz(t) Tx(a) Rx(alpha)."""
     c, s, ca, sa = np.cos(t), np.sin(t), np.cos(alpha), np.sin(alpha)
     return np.array(
-        [
-            [c, -s * ca, s * sa, a * c],
-            [s, c * ca, -c * sa, a * s],
-            [0.0, sa, ca, 0.0],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
+        [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0.0, sa, ca, 0.0], [0.0, 0.0, 0.0, 1.0]]
     )
 
 
@@ -102,10 +95,9 @@ def bennett(drive: str | None = None, alpha: float = 0.6, beta: float = 1.1, t: 
 def sarrus(drive: str | None = None) -> Network:
     """Return Sarrus' linkage: two legs of three parallel hinges in planes across each other."""
     axes = np.array([Y, Y, Y, X, X, X])
-    points = np.array(
-        [(0.5, 0, 0), (0.75, 0, 0.3), (0.4, 0, 0.6), (0, 0.35, 0.6), (0, 0.8, 0.35), (0, 0.45, 0)],
-        dtype=float,
-    )
+    along_x = [(0.5, 0, 0), (0.75, 0, 0.3), (0.4, 0, 0.6)]
+    along_y = [(0, 0.35, 0.6), (0, 0.8, 0.35), (0, 0.45, 0)]
+    points = np.array(along_x + along_y, dtype=float)
     return ring("rrrrrr", axes, points, drive)
 
 
@@ -138,7 +130,6 @@ def nine_revolutes(drive: str | None = None) -> Network:
 
 def coupled_loops(drive: str | None = None) -> Network:
     """Return two planar four-bars: the rocker of the first is the crank of the second."""
-    names = ("crank", "coupler", "rocker", "rod", "output")
     joints = [
         tied("A", "revolute", ("ground", "crank"), Z, (0.0, 0.0, 0.0)),
         tied("B", "revolute", ("crank", "coupler"), Z, (0.2, 0.35, 0.0)),
@@ -148,10 +139,7 @@ def coupled_loops(drive: str | None = None) -> Network:
         tied("F", "revolute", ("rod", "output"), Z, (2.1, 0.8, 0.0)),
         tied("G", "revolute", ("output", "ground"), Z, (2.0, 0.0, 0.0)),
     ]
-    if drive is not None:
-        joints[0] = driven(joints[0], drive)
-    controls = (Control("s"),) if drive is not None else ()
-    return Network("coupled", tuple(map(Body, names)), tuple(joints), controls=controls)
+    return network("coupled", ("crank", "coupler", "rocker", "rod", "output"), joints, drive)
 
 
 def rod_platform(drive: str | None = None, rods: int = 6) -> Network:

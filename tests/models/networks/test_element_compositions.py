@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -30,10 +29,19 @@ from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.joint_motion import measure_element
 from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import analyse_mobility
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, ElementKind, Expression, Joint
+from urmpipe_models.networks.parts import (
+    Body,
+    ConstraintElement,
+    Control,
+    ElementKind,
+    Expression,
+    Joint,
+    JointKind,
+)
 
 CLOSES = 1e-12  # residuals in [m] and [rad]: products of some ten matrices with entries up to 10
 SAME = 1e-6  # projections onto twist spaces: differences of 1e-12 times the networks' conditions, below 1e5
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 NETWORKS = 5  # of each kind and each number of other elements, 0 to 4: 100
 
 
@@ -45,89 +53,34 @@ class Composition(NamedTuple):
     idle: tuple[str, ...] = ()
 
 
-def in_ground(
-    element: ConstraintElement, poses: Poses
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the points in [m] and normals [-] of an element in the ground: p, n, q and the other n."""
-    first, second = (poses[name] for name in element.bodies)
+def compose(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
+    """Return what moves as an element does where its bodies have these poses."""
+    a, b = element.bodies
+    first, second = poses[a], poses[b]
     p = first[:3, :3] @ np.array(element.points[0]) + first[:3, 3]
     q = second[:3, :3] @ np.array(element.points[1]) + second[:3, 3]
-    return p, first[:3, :3] @ np.array(element.normals[0]), q, second[:3, :3] @ np.array(element.normals[1])
+    n, other = first[:3, :3] @ np.array(element.normals[0]), second[:3, :3] @ np.array(element.normals[1])
 
+    def joint(kind: JointKind, first: str, second: str, at: FloatArray, n: FloatArray | None = None) -> Joint:
+        """Return a joint at a point in [m], along an axis [-] unless it is global."""
+        frame = random_pose(rng) if n is None else axis_frame(n, at, rng)
+        frame[:3, 3] = at
+        return joint_between(f"{first} {second}", kind, (first, second), poses, rng, frame)
 
-def as_rod(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
-    """A rod with a global joint at each end, which spins."""
-    p, _, q, _ = in_ground(element, poses)
-    a, b = element.bodies
-    return Composition(
-        ("rod",),
-        (
-            joint_between("G1", "global", (a, "rod"), poses, rng, point_frame(p, rng)),
-            joint_between("G2", "global", ("rod", b), poses, rng, point_frame(q, rng)),
-        ),
-        ("rod",),
-    )
-
-
-def as_plane(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
-    """Two slides in the plane across each other, and a global joint at the point."""
-    _, n, q, _ = in_ground(element, poses)
-    a, b = element.bodies
-    u = unit(np.cross(n, rng.normal(size=3)))
-    return Composition(
-        ("slide", "cross"),
-        (
-            joint_between("P1", "prismatic", (a, "slide"), poses, rng, axis_frame(u, q, rng)),
-            joint_between(
-                "P2", "prismatic", ("cross", "slide"), poses, rng, axis_frame(np.cross(n, u), q, rng)
-            ),
-            joint_between("G", "global", ("cross", b), poses, rng, point_frame(q, rng)),
-        ),
-    )
-
-
-def as_lines(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
-    """A cylindrical joint on each line, a revolute along their common perpendicular between both."""
-    p, n, q, other = in_ground(element, poses)
-    a, b = element.bodies
+    if element.kind == "gg":  # a rod with a global joint at each end, which spins
+        ends = (joint("global", a, "rod", p), joint("global", "rod", b, q))
+        return Composition(("rod",), ends, idle=("rod",))
+    if element.kind == "gc":  # a rod across the axis of a cylindrical joint, a global joint at its end
+        return Composition(("rod",), (joint("cylindrical", a, "rod", p, n), joint("global", b, "rod", q)))
+    if element.kind == "eg":  # two slides in the plane across each other, and a global joint at the point
+        u = unit(np.cross(n, rng.normal(size=3)))
+        slides = joint("prismatic", a, "slide", q, u), joint("prismatic", "cross", "slide", q, np.cross(n, u))
+        return Composition(("slide", "cross"), (*slides, joint("global", "cross", b, q)))
+    # a cylindrical joint on each line, a revolute along their common perpendicular between both
     u = unit(np.cross(n, other))
-    along = np.linalg.solve(np.column_stack((n, -other, u)), q - p)
-    foot = p + along[0] * n
-    return Composition(
-        ("sleeve", "cross"),
-        (
-            joint_between("C1", "cylindrical", (a, "sleeve"), poses, rng, axis_frame(n, foot, rng)),
-            joint_between("R", "revolute", ("sleeve", "cross"), poses, rng, axis_frame(u, foot, rng)),
-            joint_between("C2", "cylindrical", ("cross", b), poses, rng, axis_frame(other, q, rng)),
-        ),
-    )
-
-
-def as_cylinder(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
-    """A rod across the axis of a cylindrical joint, a global joint at its end."""
-    p, n, q, _ = in_ground(element, poses)
-    a, b = element.bodies
-    return Composition(
-        ("rod",),
-        (
-            joint_between("C", "cylindrical", (a, "rod"), poses, rng, axis_frame(n, p, rng)),
-            joint_between("G", "global", (b, "rod"), poses, rng, point_frame(q, rng)),
-        ),
-    )
-
-
-def point_frame(point: FloatArray, rng: np.random.Generator) -> FloatArray:
-    frame = random_pose(rng)
-    frame[:3, 3] = point
-    return frame
-
-
-COMPOSED: dict[ElementKind, Callable[[ConstraintElement, Poses, np.random.Generator], Composition]] = {
-    "gg": as_rod,
-    "eg": as_plane,
-    "crc": as_lines,
-    "gc": as_cylinder,
-}
+    foot = p + np.linalg.solve(np.column_stack((n, -other, u)), q - p)[0] * n
+    sleeves = joint("cylindrical", a, "sleeve", p, n), joint("cylindrical", "cross", b, q, other)
+    return Composition(("sleeve", "cross"), (*sleeves, joint("revolute", "sleeve", "cross", foot, u)))
 
 
 def both(kind: ElementKind, others: int, seed: int) -> tuple[Network, Network, Composition]:
@@ -142,7 +95,7 @@ def both(kind: ElementKind, others: int, seed: int) -> tuple[Network, Network, C
         element_between(f"e{k}", ELEMENTS[int(rng.integers(4))], ("ground", "platform"), poses, rng)
         for k in range(others)
     ]
-    built = COMPOSED[kind](element, poses, rng)
+    built = compose(element, poses, rng)
     start = start_of(poses["platform"])
     first = Network("element", (Body("platform", start),), (), (*more, element))
     second = Network("joints", (Body("platform"), *map(Body, built.bodies)), built.joints, tuple(more))
@@ -188,17 +141,10 @@ def test_an_element_holds_wherever_its_joints_move(kind: ElementKind) -> None:
             assert distance == pytest.approx(float(element.length.value({})), abs=1e-12)
 
 
-def meeting_lines(d: float) -> Network:
-    """Return a body with a line along x that is d from the ground's line along z."""
-    element = ConstraintElement(
-        "E", "crc", ("ground", "b"), Expression(repr(d)), normals=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-    )  # fmt: skip
-    return Network("lines", (Body("b", (0.3, d, 0.2, 0.0, 0.3, 0.0)),), (), (element,))
-
-
 def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
     """d = 0: the joints' composition has no perpendicular of its own there, the lines' normal serves."""
-    network = meeting_lines(0.0)
+    lines = ConstraintElement("E", "crc", ("ground", "b"), Expression("0.0"), normals=(Z, X))
+    network = Network("lines", (Body("b", (0.3, 0.0, 0.2, 0.0, 0.3, 0.0)),), (), (lines,))
     mechanism = build_mechanism(network)
     x = mechanism.start
     assert np.abs(evaluate_closure(mechanism, x[:, np.newaxis]).residual).max() == 0.0
@@ -207,7 +153,7 @@ def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
     rng = np.random.default_rng(0)
     pose = matrix(mechanism.poses(x.tolist())["b"])
     poses = {"ground": np.eye(4), "b": pose, "sleeve": random_pose(rng), "cross": random_pose(rng)}
-    built = as_lines(network.elements[0], poses, rng)
+    built = compose(network.elements[0], poses, rng)
     composed = build_mechanism(Network("joints", (Body("b"), Body("sleeve"), Body("cross")), built.joints))
     assert_same_space(twist_space(mechanism, x, "b"), twist_space(composed, composed.start, "b"), SAME)
 
@@ -215,10 +161,10 @@ def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
 def test_the_driven_length_of_an_element_is_followed() -> None:
     """A rod's platform on a slide: its end follows sqrt(l^2 - h^2), by its derivative, too."""
     rng = np.random.default_rng(2)
+    at = axis_frame(np.array(X), np.zeros(3), rng)
     slide = joint_between(
-        "P", "prismatic", ("ground", "b"), {"ground": np.eye(4), "b": np.eye(4)}, rng,
-        axis_frame(np.array([1.0, 0.0, 0.0]), np.zeros(3), rng), (0.0,),
-    )  # fmt: skip
+        "P", "prismatic", ("ground", "b"), dict.fromkeys(("ground", "b"), np.eye(4)), rng, at, (0.0,)
+    )
     rod = ConstraintElement(
         "R", "gg", ("b", "ground"), Expression("2 * s"), ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0))
     )
