@@ -197,7 +197,7 @@ def test_euler_angles_of_a_column_are_those_of_each_rotation(name: str) -> None:
     build, angles_of = CONVENTIONS[name].build, CONVENTIONS[name].angles
     middles = [0.0, 0.3, math.pi / 2, math.pi, -math.pi / 2]
     singles = [build(0.5, middle, 0.2).rotation for middle in middles]
-    columns = angles_of(np.moveaxis(np.array(singles, dtype=float), 0, -1))  # type: ignore[arg-type]
+    columns = angles_of(np.moveaxis(np.array(singles, dtype=float), 0, -1))
     np.testing.assert_array_equal(np.transpose(columns), [angles_of(single) for single in singles])
 
 
