@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -19,32 +19,29 @@ from urmpipe_fmus.instance import Equations, Instance
 from urmpipe_fmus.run import run
 from urmpipe_models.errors import UnitError
 
+Kind = TypeVar("Kind", bound=Variable)
+
+
+def scalar(kind: type[Kind], name: str, **fields: Any) -> Kind:
+    return kind(name=name, description="", **fields)
+
+
+def block(*variables: Variable, name: str = "u", **functions: Any) -> BlockModel:
+    return BlockModel(name=name, description="", variables=variables, **functions)
+
 
 def unit_of(outputs: Any) -> BlockModel:
-    return BlockModel(
-        name="u",
-        description="",
-        variables=(
-            Input(name="x", description=""),
-            Output(name="y", description=""),
-            Output(name="p", description="", size=2),
-        ),
-        outputs=outputs,
-    )
+    return block(scalar(Input, "x"), scalar(Output, "y"), scalar(Output, "p", size=2), outputs=outputs)
 
 
 def test_elements_go_in_by_kind_and_come_out_in_order() -> None:
-    model = BlockModel(
-        name="u",
-        description="",
-        variables=(
-            Output(name="y", description=""),
-            Memory(name="m", description="", size=2),
-            State(name="s", description=""),
-            Input(name="i", description=""),
-            Parameter(name="p", description=""),
-            Output(name="w", description="", size=2),
-        ),
+    model = block(
+        scalar(Output, "y"),
+        scalar(Memory, "m", size=2),
+        scalar(State, "s"),
+        scalar(Input, "i"),
+        scalar(Parameter, "p"),
+        scalar(Output, "w", size=2),
         outputs=lambda v: {"w": (v.s, v.m[1]), "y": v.p + 10.0 * v.i},
         derivatives=lambda v: {"s": v.time},
         update=lambda v: {"m": [v.m[1], v.m[0]]},
@@ -78,22 +75,19 @@ def test_a_division_by_zero_is_infinite_as_in_c_and_warns_nobody(recwarn: pytest
 
 def mixed() -> BlockModel:
     """A unit of every kind: y is fresh, m is the input of the point before, x the input's integral."""
-    return BlockModel(
-        name="mixed",
-        description="",
-        variables=(
-            Parameter(name="k", description="", start=2.0, minimum=0.0, maximum=10.0),
-            Parameter(name="fixed", description="", tunable=False),
-            Input(name="u", description="", minimum=-100.0, maximum=100.0),
-            Input(name="n", description="", type="Integer"),
-            State(name="x", description="", output=True),
-            Memory(name="m", description="", output=True),
-            Output(name="y", description=""),
-        ),
+    return block(
+        scalar(Parameter, "k", start=2.0, minimum=0.0, maximum=10.0),
+        scalar(Parameter, "fixed", tunable=False),
+        scalar(Input, "u", minimum=-100.0, maximum=100.0),
+        scalar(Input, "n", type="Integer"),
+        scalar(State, "x", output=True),
+        scalar(Memory, "m", output=True),
+        scalar(Output, "y"),
         outputs=lambda v: {"y": v.k * v.u + v.x + 100.0 * v.m},
         derivatives=lambda v: {"x": v.u / (v.fixed - 1.0)},
         update=lambda v: {"m": v.u},
         internal_step=0.25,
+        name="mixed",
     )
 
 
@@ -165,12 +159,8 @@ def test_an_error_of_the_functions_undoes_the_step_too() -> None:
     def rates(v: Any) -> dict[str, Any]:
         return {"x": {0.0: 1.0}[float(v.x)]}  # fails once x has moved
 
-    model = BlockModel(
-        name="u",
-        description="",
-        variables=(State(name="x", description=""), Memory(name="m", description="")),
-        derivatives=rates,
-        update=lambda v: {"m": v.m + 1.0},
+    model = block(
+        scalar(State, "x"), scalar(Memory, "m"), derivatives=rates, update=lambda v: {"m": v.m + 1.0}
     )
     instance = Instance(model)
     with pytest.raises(UnitError, match="unit u: derivatives: KeyError"):
@@ -179,12 +169,7 @@ def test_an_error_of_the_functions_undoes_the_step_too() -> None:
 
 
 def test_an_output_that_is_not_finite_is_an_error_until_its_inputs_are_mended() -> None:
-    model = BlockModel(
-        name="u",
-        description="",
-        variables=(Input(name="u", description=""), Output(name="y", description="")),
-        outputs=lambda v: {"y": 1.0 / v.u},
-    )
+    model = block(scalar(Input, "u"), scalar(Output, "y"), outputs=lambda v: {"y": 1.0 / v.u})
     instance = Instance(model, 2.5)
     for _ in range(2):
         with pytest.raises(UnitError, match=r"^unit u: output y is not finite at 2.5 s$"):
@@ -196,12 +181,11 @@ def test_an_output_that_is_not_finite_is_an_error_until_its_inputs_are_mended() 
 
 def error_at(step: float) -> float:
     """The error at t = 2 of x' = -2 t x^2, x(0) = 1, of which x = 1 / (1 + t^2)."""
-    model = BlockModel(
-        name="ode",
-        description="",
-        variables=(State(name="x", description="", start=1.0),),
+    model = block(
+        scalar(State, "x", start=1.0),
         derivatives=lambda v: {"x": -2.0 * v.time * v.x * v.x},
         internal_step=step,
+        name="ode",
     )
     instance = Instance(model)
     for k in range(4):
@@ -212,27 +196,19 @@ def error_at(step: float) -> float:
 def test_the_error_falls_with_the_fourth_power_of_the_internal_step() -> None:
     errors = [error_at(step) for step in (0.05, 0.025, 0.0125)]
     ratios = np.array(errors[:-1]) / errors[1:]
-    assert (np.abs(np.log2(ratios) - 4.0) < 0.1).all(), (
-        ratios
-    )  # the fifth power's share is below a tenth here
+    assert (np.abs(np.log2(ratios) - 4.0) < 0.1).all(), ratios  # the fifth power's share is below a tenth
 
 
 def test_a_step_is_divided_into_equal_internal_steps() -> None:
     times: list[float] = []
-    model = BlockModel(
-        name="u",
-        description="",
-        variables=(State(name="x", description=""),),
-        derivatives=lambda v: times.append(float(v.time)) or {"x": 0.0},  # type: ignore[func-returns-value]
-        internal_step=0.1,
-    )
-    for time, step, count in (
-        (0.0, 0.3, 3),
-        (0.3, 0.6 - 0.3, 3),
-        (0.0, 0.05, 1),
-        (0.0, 0.1001, 2),
-        (1.0, 0.35, 4),
-    ):
+
+    def rates(v: Any) -> dict[str, Any]:
+        times.append(float(v.time))
+        return {"x": 0.0}
+
+    model = block(scalar(State, "x"), derivatives=rates, internal_step=0.1)
+    steps = ((0.0, 0.3, 3), (0.3, 0.6 - 0.3, 3), (0.0, 0.05, 1), (0.0, 0.1001, 2), (1.0, 0.35, 4))
+    for time, step, count in steps:
         times.clear()
         Instance(model, time).do_step(time, step)
         h = step / count
@@ -313,18 +289,15 @@ def test_a_column_is_refused_for_any_row_and_kept_as_it_was() -> None:
 
 
 def gain(**more: Any) -> BlockModel:
-    return BlockModel(
-        name="gain",
-        description="",
-        variables=(
-            Parameter(name="k", description="", start=2.0, minimum=0.0),
-            Input(name="u", description="", size=2, start=(1.0, 3.0)),
-            Output(name="y", description="", size=2),
-            Output(name="t", description=""),
-            Output(name="one", description=""),
-        ),
+    return block(
+        scalar(Parameter, "k", start=2.0, minimum=0.0),
+        scalar(Input, "u", size=2, start=(1.0, 3.0)),
+        scalar(Output, "y", size=2),
+        scalar(Output, "t"),
+        scalar(Output, "one"),
         outputs=lambda v: {"y": tuple(v.k * u for u in v.u), "t": v.time, "one": 1.0},
         **more,
+        name="gain",
     )
 
 
@@ -342,16 +315,13 @@ def test_outputs_are_columns_and_inputs_that_are_not_given_stay_at_their_start()
 
 
 def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
-    model = BlockModel(
-        name="sum",
-        description="",
-        variables=(
-            Input(name="u", description=""),
-            Memory(name="m", description="", output=True),
-            Output(name="y", description=""),
-        ),
+    model = block(
+        scalar(Input, "u"),
+        scalar(Memory, "m", output=True),
+        scalar(Output, "y"),
         outputs=lambda v: {"y": v.m + v.u},
         update=lambda v: {"m": v.m + v.u},
+        name="sum",
     )
     u = np.array([1.0, 2.0, 4.0, 8.0])
     found = run(model, np.array([0.0, 0.1, 0.5, 0.6]), {"u": u}, {"m": 10.0})
