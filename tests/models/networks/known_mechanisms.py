@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,8 +23,13 @@ def tied(name: str, kind: JointKind, bodies: tuple[str, str], n: Vec, p: Vec, pi
 
 def driven(joint: Joint, *values: str | None) -> Joint:
     """Return a joint whose variables functions of controls drive."""
-    found = tuple(None if one is None else Expression(one) for one in values)
-    return Joint(joint.name, joint.kind, joint.bodies, joint.frames, values=found, pitch=joint.pitch)
+    return replace(joint, values=tuple(None if one is None else Expression(one) for one in values))
+
+
+def with_drives(free: Network, **drives: str) -> Network:
+    """Return a network with joints that functions of the control s drive, by their names."""
+    joints = (driven(one, drives[one.name]) if one.name in drives else one for one in free.joints)
+    return replace(free, joints=tuple(joints), controls=(Control("s"),))
 
 
 def rod(name: str, bodies: tuple[str, str], p: Vec, q: Vec, more: str = "0") -> ConstraintElement:
@@ -119,13 +125,7 @@ def rccc(drive: str | None = None) -> Network:
 def nine_revolutes(drive: str | None = None) -> Network:
     """Return nine hinges in a ring: three are driven by one control if asked, as in the paper."""
     free = random_ring("rrrrrrrrr", 9)
-    if drive is None:
-        return free
-    joints = [
-        driven(one, (drive, f"0.5 * ({drive})", f"sin({drive})")[k // 3]) if k % 3 == 0 else one
-        for k, one in enumerate(free.joints)
-    ]
-    return Network("nine", free.bodies, tuple(joints), controls=(Control("s"),))
+    return with_drives(free, j0=drive, j3=f"0.5 * ({drive})", j6=f"sin({drive})") if drive else free
 
 
 def coupled_loops(drive: str | None = None) -> Network:
@@ -140,6 +140,13 @@ def coupled_loops(drive: str | None = None) -> Network:
         tied("G", "revolute", ("output", "ground"), Z, (2.0, 0.0, 0.0)),
     ]
     return network("coupled", ("crank", "coupler", "rocker", "rod", "output"), joints, drive)
+
+
+def slider_crank(crank: float, drive: str | None = None, a: float = 0.3, b: float = 0.8) -> Network:
+    """Return a slide j0 along x, driven if asked, a rod b and a crank a [m], which is at an angle [rad]."""
+    pin = a * np.array([np.cos(crank), np.sin(crank), 0.0])
+    slide = pin[0] + np.sqrt(b**2 - pin[1] ** 2)
+    return ring("prrr", np.array([X, Z, Z, Z]), np.array([ORIGIN, (slide, 0.0, 0.0), pin, ORIGIN]), drive)
 
 
 def rod_platform(drive: str | None = None, rods: int = 6) -> Network:
