@@ -25,17 +25,23 @@ class Loaded:
 
     Args:
         path: The FMU.
-        start: Where it starts in [s].
+        start: Where it starts in [s]; None if it is not begun yet.
         folder: Where it is unpacked; by default in a folder of FMPy's choice.
         before: Called with this before the initialization, to set start values.
+        guid: By default that of its description.
+
+    Attributes:
+        blocks: Addresses of its memory that is allocated and not freed.
+        most_blocks: The number of blocks from which on there is no memory left.
     """
 
     def __init__(
         self,
         path: Path,
-        start: float = 0.0,
+        start: float | None = 0.0,
         folder: Path | None = None,
         before: Callable[[Loaded], None] = lambda _: None,
+        guid: str | None = None,
     ) -> None:
         self.described = read_model_description(str(path))
         self.references = {one.name: one.valueReference for one in self.described.modelVariables}
@@ -43,16 +49,19 @@ class Loaded:
         self.log: list[tuple[int, str, str]] = []
         self.callbacks = fmi2CallbackFunctions()
         self.callbacks.logger = fmi2CallbackLoggerTYPE(self._take)
-        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        self.blocks: set[int] = set()
+        self.most_blocks = 1_000_000
+        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(self._allocate)
+        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(self._free)
         self._before = before
         self.fmu: Any = FMU2Slave(
-            guid=self.described.guid,
+            guid=self.described.guid if guid is None else guid,
             unzipDirectory=extract(str(path), unzipdir=None if folder is None else str(folder)),
             modelIdentifier=self.described.coSimulation.modelIdentifier,
             instanceName="one",
         )
-        self.begin(start)
+        if start is not None:
+            self.begin(start)
 
     def begin(self, start: float) -> None:
         """Make an instance, and initialize it."""
@@ -70,6 +79,17 @@ class Loaded:
         """Take a message of the FMU."""
         self.log.append((status, (category or b"").decode(), text.decode()))
 
+    def _allocate(self, count: int, size: int) -> int | None:
+        if len(self.blocks) >= self.most_blocks:
+            return None
+        block = int(calloc(count, size))
+        self.blocks.add(block)
+        return block
+
+    def _free(self, block: int) -> None:
+        self.blocks.remove(block)
+        free(block)
+
     def get(self, names: Sequence[str]) -> list[Any]:
         """Return the values of scalars, one call each."""
         return [getattr(self.fmu, f"get{self.types[one]}")([self.references[one]])[0] for one in names]
@@ -82,10 +102,10 @@ class Loaded:
         """Take a step from a time, both in [s]."""
         self.fmu.doStep(time, step)
 
-    def status_of(self, function: str, *arguments: Any) -> int:
+    def status_of(self, function: str, *arguments: Any, **options: Any) -> int:
         """Return the status that a call returns."""
         try:
-            getattr(self.fmu, function)(*arguments)
+            getattr(self.fmu, function)(*arguments, **options)
         except FMICallException as error:
             return int(error.status)
         return 0

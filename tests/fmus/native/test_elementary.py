@@ -77,10 +77,8 @@ def function(library: ctypes.CDLL, name: str, arguments: int) -> Callable[..., f
 
 def numpys(name: str) -> Callable[..., FloatArray]:
     """NumPy's function of the same values as C's."""
-    special = {"atan2": "arctan2", "pow": "power"}
-    if name in special:
-        return getattr(np, special[name])  # type: ignore[no-any-return]
-    return getattr(np, f"arc{name[1:]}" if name[0] == "a" else name)  # type: ignore[no-any-return]
+    same = {"atan2": "arctan2", "pow": "power"}.get(name, f"arc{name[1:]}" if name[0] == "a" else name)
+    return getattr(np, same)  # type: ignore[no-any-return]
 
 
 def assert_near(name: str, found: FloatArray, exact: FloatArray) -> None:
@@ -109,13 +107,9 @@ def test_functions_of_two_values(library: ctypes.CDLL, name: str) -> None:
     edges = [*EDGES, -3.0, -0.5, -math.inf, 5e-324, -1.7e308, 1e18, 1.0 + 2.0**-52]
     bases = rng.uniform(0.6, 1.5, 2000)  # the powers of which go to the ends of the range
     x = np.concatenate([SIZES, POSITIVE, 1.0 + SIZES[:500] / 1e9, bases, ANY, np.repeat(edges, len(edges))])
-    y = np.concatenate(
-        [
-            *(rng.permutation(SIZES), rng.uniform(-1, 1, 2000), SIZES[500:1000]),
-            *(rng.uniform(-700.0, 700.0, 2000) / np.log(bases), rng.permutation(ANY)),
-            np.tile(edges, len(edges)),
-        ]
-    )
+    powers = rng.uniform(-700.0, 700.0, 2000) / np.log(bases)
+    others = (rng.permutation(SIZES), rng.uniform(-1, 1, 2000), SIZES[500:1000], powers, rng.permutation(ANY))
+    y = np.concatenate([*others, np.tile(edges, len(edges))])
     found = np.array([ours(*pair) for pair in zip(x, y, strict=True)])
     assert_near(name, found, numpys(name)(x.astype(EXACT), y.astype(EXACT)))
 

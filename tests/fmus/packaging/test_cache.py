@@ -1,11 +1,10 @@
-"""FMUs that were built before: found again, told apart, mended."""
+"""FMUs that were built before: found again, distinguished, repaired."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +13,12 @@ import pytest
 
 from asserting import refusal
 from loaded_fmu import Loaded
-from urmpipe_fmus.block import BlockModel, Recipe, Table
+from urmpipe_fmus.block import Recipe, Table
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import cache_folder, cache_key, cached_fmu
 from urmpipe_models.errors import FmuError
-
-Make = Callable[..., BlockModel]
+from written_units import unit_of
 
 
 @pytest.fixture(autouse=True)
@@ -29,59 +27,49 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def marked(path: Path) -> int:
-    """When the file was written: the same if it was not built again."""
-    return path.stat().st_mtime_ns
-
-
-def test_a_unit_is_built_once(make: Make, folder: Path) -> None:
-    path = cached_fmu(make("arm"), "python")
-    built = marked(path)
-    assert path.parent.parent == folder / "fmus"
-    assert path.name == "arm.fmu"
-    assert cached_fmu(make("arm"), "python") == path
-    assert marked(path) == built
+def test_a_unit_is_built_once(folder: Path) -> None:
+    path = cached_fmu(unit_of("arm"), "python")
+    built = path.stat().st_mtime_ns
+    assert (path.parent.parent, path.name) == (folder / "fmus", "arm.fmu")
+    assert cached_fmu(unit_of("arm"), "python") == path
+    assert path.stat().st_mtime_ns == built
 
 
 @pytest.mark.slow
-def test_other_tables_arguments_sources_variables_and_backends_are_other_fmus(make: Make) -> None:
-    model = make("playback")
+def test_other_tables_arguments_sources_variables_and_backends_are_other_fmus() -> None:
+    model = unit_of("playback")
     assert model.table is not None
     other_table = replace(model, table=Table(model.table.t_ns, model.table.values + 1e-15))
     shifted = replace(model, table=Table(model.table.t_ns + np.int64(1), model.table.values))
     other_source = replace(model, recipe=replace(model.recipe, source=model.recipe.source + "\n# changed\n"))
-    units = [model, other_table, shifted, other_source, make("playback", gain=2.0)]
+    units = [model, other_table, shifted, other_source, unit_of("playback", gain=2.0)]
     keys = [cache_key(one, "python", "linux64") for one in units] + [cache_key(model, "native", "linux64")]
     assert len(set(keys)) == len(keys)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", [b"", b"PK", None])
-def test_a_damaged_entry_is_built_again(make: Make, damage: bytes | None) -> None:
-    path = cached_fmu(make("arm"), "python")
-    whole = path.read_bytes()
-    path.write_bytes(whole[:-100] if damage is None else damage)
-    assert cached_fmu(make("arm"), "python") == path
+@pytest.mark.parametrize(
+    ("suffix", "damage"),
+    [(".fmu", b""), (".fmu", b"PK"), (".fmu", None), (".sha256", None), (".sha256", b"\xff")],
+)
+def test_an_entry_is_built_again_that_is_damaged_or_has_no_hash(suffix: str, damage: bytes | None) -> None:
+    path = cached_fmu(unit_of("arm"), "python")
+    whole, built, damaged = path.read_bytes(), path.stat().st_mtime_ns, path.with_suffix(suffix)
+    damaged.unlink() if damage is None else damaged.write_bytes(damage)
+    assert cached_fmu(unit_of("arm"), "python") == path
     assert path.read_bytes() == whole
-
-
-def test_an_entry_without_its_hash_is_built_again(make: Make) -> None:
-    path = cached_fmu(make("arm"), "python")
-    path.with_suffix(".sha256").unlink()
-    before = marked(path)
-    assert cached_fmu(make("arm"), "python") == path
-    assert marked(path) > before
+    assert path.stat().st_mtime_ns > built
     assert sorted(one.name for one in path.parent.iterdir()) == ["arm.fmu", "arm.sha256"]
 
 
 @pytest.mark.slow
-def test_a_unit_without_a_recipe_or_with_one_of_somebody_elses_module_is_never_taken_for_another(
-    make: Make, folder: Path
+def test_a_unit_without_a_recipe_or_with_that_of_a_foreign_module_is_built_each_time(
+    folder: Path,
 ) -> None:
-    nobodys = replace(make("spring"), recipe=Recipe())
-    elses = replace(nobodys, recipe=Recipe("somebody.elses", "spring"))
-    other = replace(elses, derivatives=lambda v: {"x": v.v, "v": -v.x})
-    paths = [cached_fmu(model, "native") for model in (elses, other, nobodys)]
+    unknown = replace(unit_of("spring"), recipe=Recipe())
+    foreign = replace(unknown, recipe=Recipe("somebody.elses", "spring"))
+    other = replace(foreign, derivatives=lambda v: {"x": v.v, "v": -v.x})
+    paths = [cached_fmu(model, "native") for model in (foreign, other, unknown)]
     assert paths[0] == paths[2] != paths[1]  # their places are named by what was built
     assert len(list((folder / "fmus").iterdir())) == 2
 
@@ -130,13 +118,13 @@ def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
         "import sys; print(cached_fmu(make_block('inertia')))\n"
         "print(*sorted({'casadi', 'fmpy', 'pythonfmu', 'jinja2', 'lxml', 'scipy'} & set(sys.modules)))\n"
     )
-    said = subprocess.run(
+    printed = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.splitlines()
-    assert said == [str(built), ""]
+    assert printed == [str(built), ""]
 
 
-def test_the_folder_is_the_users_and_can_be_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_folder_is_the_users_or_that_of_the_variable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert cache_folder() == tmp_path / "cache"
     monkeypatch.delenv("URMPIPE_CACHE")
     monkeypatch.setenv("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME", str(tmp_path / "x"))
@@ -146,25 +134,25 @@ def test_the_folder_is_the_users_and_can_be_told(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs POSIX's users")
-def test_a_user_without_a_home_is_told_to_name_a_folder(
-    make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_a_user_without_a_home_is_asked_for_a_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     import pwd
 
     for name in ("URMPIPE_CACHE", "XDG_CACHE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)  # raises KeyError, as for a user of no entry
-    assert refusal(FmuError, cached_fmu, make("arm"), "python") == (
+    assert refusal(FmuError, cached_fmu, unit_of("arm"), "python") == (
         "cache of FMUs: found no home folder, allowed: a folder that the variable URMPIPE_CACHE names"
     )
 
 
 def test_a_cache_that_cannot_be_written_is_an_error_that_names_the_variable(
-    make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "file"))
-    assert refusal(FmuError, cached_fmu, make("arm"), "python") == (
+    assert refusal(FmuError, cached_fmu, unit_of("arm"), "python") == (
         f"{tmp_path / 'file' / 'fmus'}: cannot be written: Not a directory; the variable URMPIPE_CACHE names"
         " another place"
     )
