@@ -80,16 +80,17 @@ def test_sanitizers_find_nothing(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="needs LD_PRELOAD")
 def test_the_tests_of_the_runtime_pass_with_sanitizers() -> None:
     """Strings, types and refusals that the host does not call: through FMPy, with the sanitizer in Python."""
-    library = subprocess.run(
-        ["cc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
-    ).stdout.strip()
-    if not Path(library).is_file():
+    libraries = [  # that of C++ for the exceptions in the binaries of pythonfmu
+        subprocess.run(["cc", f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout
+        for name in ("libasan.so", "libstdc++.so.6")
+    ]
+    if not all(Path(one.strip()).is_file() for one in libraries):
         pytest.skip("needs gcc's libasan.so, to be loaded before Python")
     tests = [str(HERE / name) for name in ("test_states.py", "calls.cases")]
     environment = {
         **os.environ,
         "CC": " ".join(["env", "-u", "LD_PRELOAD", *SANITIZED]),  # the compiler itself runs without
-        "LD_PRELOAD": library,
+        "LD_PRELOAD": " ".join(map(str.strip, libraries)),
         "ASAN_OPTIONS": "detect_leaks=0",  # Python's own; those of the runtime the host would show
     }
     done = subprocess.run(

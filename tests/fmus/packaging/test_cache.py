@@ -124,7 +124,7 @@ def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
     assert printed == [str(built), ""]
 
 
-def test_the_folder_is_the_users_or_that_of_the_variable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_folder_is_the_users_or_of_the_variable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert cache_folder() == tmp_path / "cache"
     monkeypatch.delenv("URMPIPE_CACHE")
     monkeypatch.setenv("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME", str(tmp_path / "x"))
@@ -134,9 +134,7 @@ def test_the_folder_is_the_users_or_that_of_the_variable(monkeypatch: pytest.Mon
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs POSIX's users")
-def test_a_user_without_a_home_is_asked_for_a_folder(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_user_without_a_home_is_asked_for_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     import pwd
 
     for name in ("URMPIPE_CACHE", "XDG_CACHE_HOME", "HOME"):
