@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
@@ -16,20 +17,10 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_fmus.cosim import (
-    Block,
-    Connection,
-    CosimulationRecord,
-    LogColumn,
-    LogInput,
-    Plan,
-    Port,
-    System,
-    prepare,
-    simulate,
-)
+from urmpipe_fmus import cosim
 
-HERE = Path(__file__).parent
+GUID = "{f0e1d2c3}"
+CALLS = ("load", "start", "setup", "enter", "exit", "get", "set", "free", "terminate")
 
 
 @dataclass(frozen=True)
@@ -46,6 +37,24 @@ class Scalar:
     initial: str = ""
     on: tuple[str, ...] | None = ()
 
+    def xml(self) -> str:
+        """Return its line of the model description."""
+        is_set = self.causality in ("parameter", "input")
+        start = (self.start or {"Boolean": "false"}.get(self.type, "0")) if is_set else self.start
+        variability = "continuous" if self.type == "Real" else "discrete"
+        variable = {"name": self.name, "valueReference": self.place, "causality": self.causality}
+        variable["variability"] = "tunable" if self.causality == "parameter" else variability
+        value = _attributes(unit=self.unit, start=start)
+        return (
+            f"<ScalarVariable{_attributes(**variable, initial=self.initial)}>"
+            f"<{self.type}{value}{self.extra}/></ScalarVariable>"
+        )
+
+
+def _attributes(**values: object) -> str:
+    """Return those attributes of an XML element that are stated."""
+    return "".join(f' {name}="{value}"' for name, value in values.items() if value not in ("", None))
+
 
 @cache
 def compiled(model: str) -> bytes:
@@ -57,11 +66,11 @@ def compiled(model: str) -> bytes:
         pytest.skip("needs a C compiler: cc")
     with TemporaryDirectory() as folder:
         Path(folder, "model.h").write_text(model)
+        source, library = Path(__file__).with_suffix(".c"), Path(folder, "library")
         includes = (f"-I{folder}", f"-I{Path(fmpy.__file__).parent / 'c-code'}")
         # not optimized: it takes longer to compile than to run
         flags = ("-shared", "-fPIC", "-O0", "-w", *includes)
-        library = Path(folder, "library")
-        subprocess.run([compiler, *flags, HERE / "foreign_fmus.c", "-o", library, "-lm"], check=True)
+        subprocess.run([compiler, *flags, source, "-o", library, "-lm"], check=True)
         return library.read_bytes()
 
 
@@ -91,104 +100,73 @@ class Foreign:
     once: bool = False
     variable_step: bool = True
     units: str = ""
-    guid: str = field(default="{f0e1d2c3}")
 
     def write(self, folder: Path) -> Path:
         """Compile and pack it; return the FMU."""
         import fmpy
 
-        made = folder / f"{self.name}.fmu"
+        macros = {"GUID": f'"{GUID}"', "FRESH": int(self.fresh), "VARIABLE_STEP": int(self.variable_step)}
+        for call in CALLS:
+            macros[f"ON_{call.upper()}" if call in ("get", "set") else call.upper()] = getattr(self, call)
         library = compiled(
-            f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n'
-            f"#define VARIABLE_STEP {int(self.variable_step)}\n"
-            + "".join(f"#define {macro} {code}\n" for macro, code in self._calls().items())
+            "".join(f"#define {macro} {code}\n" for macro, code in macros.items())
             + f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
             "static fmi2Status step(Model *m, double t, double h) {\n"
             f"    Values *v = &m->v; (void)v; {self.step}\n    return fmi2OK;\n}}\n"
         )
-        with zipfile.ZipFile(made, "w") as archive:
+        path = folder / f"{self.name}.fmu"
+        with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("modelDescription.xml", self.description())
             archive.writestr(f"binaries/{fmpy.platform}/{self.name}{fmpy.sharedLibraryExtension}", library)
-        return made
-
-    def _calls(self) -> dict[str, str]:
-        """Return the C of each call by its macro."""
-        return {
-            "LOAD": self.load,
-            "START": self.start,
-            "SETUP": self.setup,
-            "ENTER": self.enter,
-            "EXIT": self.exit,
-            "ON_GET": self.get,
-            "ON_SET": self.set,
-            "FREE": self.free,
-            "TERMINATE": self.terminate,
-        }
+        return path
 
     def description(self) -> str:
-        places = {one.name: i for i, one in enumerate(self.scalars, 1)}
-        outputs = "".join(
-            f'<Unknown index="{places[one.name]}"'
-            + ("" if one.on is None else f' dependencies="{" ".join(str(places[n]) for n in one.on)}"')
-            + "/>"
-            for one in self.scalars
-            if one.causality == "output"
-        )
-        variables = "".join(_variable(one) for one in self.scalars)
+        """Return the model description."""
+        places = {scalar.name: str(i) for i, scalar in enumerate(self.scalars, 1)}
+        outputs = ""
+        for scalar in (scalar for scalar in self.scalars if scalar.causality == "output"):
+            dependencies = ""
+            if scalar.on is not None:
+                dependencies = f' dependencies="{" ".join(places[name] for name in scalar.on)}"'
+            outputs += f'<Unknown index="{places[scalar.name]}"{dependencies}/>'
+        abilities = {
+            "canHandleVariableCommunicationStepSize": self.variable_step,
+            "canGetAndSetFMUstate": self.can_save,
+            "canBeInstantiatedOnlyOncePerProcess": self.once,
+        }
+        stated = _attributes(**{name: str(value).lower() for name, value in abilities.items()})
         return (
             '<?xml version="1.0" encoding="UTF-8"?>'
-            f'<fmiModelDescription fmiVersion="2.0" modelName="{self.name}" guid="{self.guid}">'
-            f'<CoSimulation modelIdentifier="{self.name}"'
-            f' canHandleVariableCommunicationStepSize="{str(self.variable_step).lower()}"'
-            f' canGetAndSetFMUstate="{str(self.can_save).lower()}"'
-            f' canBeInstantiatedOnlyOncePerProcess="{str(self.once).lower()}"/>'
+            f'<fmiModelDescription fmiVersion="2.0" modelName="{self.name}" guid="{GUID}">'
+            f'<CoSimulation modelIdentifier="{self.name}"{stated}/>'
             + (f"<UnitDefinitions>{self.units}</UnitDefinitions>" if self.units else "")
-            + f"<ModelVariables>{variables}</ModelVariables>"
+            + f"<ModelVariables>{''.join(scalar.xml() for scalar in self.scalars)}</ModelVariables>"
             + f"<ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"
         )
 
 
-def _variable(one: Scalar) -> str:
-    changes = "continuous" if one.type == "Real" else "discrete"
-    changes = "tunable" if one.causality == "parameter" else changes
-    initial = f' initial="{one.initial}"' if one.initial else ""
-    needs_start = one.causality in ("parameter", "input")
-    start = one.start or (("false" if one.type == "Boolean" else "0") if needs_start else None)
-    told = f' start="{start}"' if start is not None else ""
-    unit = f' unit="{one.unit}"' if one.unit else ""
-    return (
-        f'<ScalarVariable name="{one.name}" valueReference="{one.place}" causality="{one.causality}"'
-        f' variability="{changes}"{initial}><{one.type}{unit}{told}{one.extra}/></ScalarVariable>'
-    )
-
-
-def gain(name: str = "gain", *, fresh: bool = True, formula: str = "k * u + c", **options: object) -> Foreign:
-    """y = k u + c, at once; or only after a step."""
-    unit = str(options.pop("unit", ""))
-    on = options.pop("on", ("u",))
+def gain(
+    name: str = "gain",
+    *,
+    formula: str = "k * u + c",
+    unit: str = "",
+    on: tuple[str, ...] | None = ("u",),
+    **options: Any,
+) -> Foreign:
+    """y = k u + c, at once; or only after a step if it is not fresh."""
+    k, c = Scalar("k", 0, "parameter", start="1"), Scalar("c", 1, "parameter", start="0")
     return Foreign(
         name=name,
-        scalars=(
-            Scalar("k", 0, "parameter", start="1"),
-            Scalar("c", 1, "parameter", start="0"),
-            Scalar("u", 2, "input", unit=unit),
-            Scalar("y", 3, unit=unit, on=on),  # type: ignore[arg-type]
-        ),
+        scalars=(k, c, Scalar("u", 2, "input", unit=unit), Scalar("y", 3, unit=unit, on=on)),
         compute=f"double k = v->r[0], c = v->r[1], u = v->r[2]; (void)k; v->r[3] = {formula};",
         start="m->v.r[0] = 1;",
-        fresh=fresh,
-        **options,  # type: ignore[arg-type]
+        **options,
     )
 
 
-HANGS = "for (;;) pause();"
-"""C that does not return."""
-
-OVERFLOWS = "overflow(0);"
-"""C that overflows the stack."""
-
-TAKES_MEMORY = "take(20000000000u);"
-"""C that takes 20 GB in one piece; where it gets none, it writes to NULL."""
+HANGS = "for (;;) pause();"  # does not return
+OVERFLOWS = "overflow(0);"  # the stack
+TAKES_MEMORY = "take(20000000000u);"  # 20 GB in one piece; where it gets none, it writes to NULL
 
 STAIR = Foreign(
     name="stair",
@@ -203,17 +181,9 @@ STAIR = Foreign(
 
 
 def trouble_in(call: str, code: str) -> Foreign:
-    """Return an FMU of which a call runs some C.
-
-    Args:
-        call: load, start (fmi2Instantiate), setup, enter, exit, get, set, step, terminate or free.
-        code: The C.
-    """
-    return Foreign(
-        name=f"in_{call}",
-        scalars=(Scalar("u", 0, "input"), Scalar("y", 1)),
-        **{call: code.replace("\n", " ")},  # type: ignore[arg-type]
-    )
+    """Return an FMU that runs some C in `step` or in one of `CALLS`; `start` is fmi2Instantiate."""
+    trouble: dict[str, Any] = {call: code.replace("\n", " ")}
+    return Foreign(f"in_{call}", (Scalar("u", 0, "input"), Scalar("y", 1)), **trouble)
 
 
 INTEGRATOR = Foreign(
@@ -266,58 +236,47 @@ TROUBLE = Foreign(
 """Breaks from a time on, in the way of its parameter `kind`."""
 
 
-@cache
-def _folder() -> Path:
-    import atexit
-
-    folder = Path(mkdtemp(prefix="foreign-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
+FOLDER = Path(mkdtemp(prefix="foreign-"))
+atexit.register(shutil.rmtree, FOLDER, ignore_errors=True)
 
 
 @cache
 def fmu(foreign: Foreign) -> Path:
     """Return a foreign FMU, compiled once a test run."""
-    return foreign.write(Path(mkdtemp(dir=_folder())))
+    return foreign.write(Path(mkdtemp(dir=FOLDER)))
+
+
+def port(text: str) -> cosim.Port:
+    """Return the port `block.variable`."""
+    return cosim.Port(*text.split(".", 1))
 
 
 def system(
     blocks: Mapping[str, Foreign | Path],
     connections: Mapping[str, str] | None = None,
     start: Mapping[str, Mapping[str, Any]] | None = None,
-    inputs: Sequence[LogInput] = (),
+    inputs: Sequence[cosim.LogInput] = (),
     **options: Any,
-) -> System:
+) -> cosim.System:
     """Return a system of FMUs; connections are destination: source."""
-    made = {"step": 0.1, "duration": 1.0, **options}
-    return System(
+    paths = {name: model if isinstance(model, Path) else fmu(model) for name, model in blocks.items()}
+    starts, wires = start or {}, connections or {}
+    return cosim.System(
         name="test",
         path=Path("test.toml"),
-        blocks=tuple(
-            Block(
-                name=name,
-                fmu=model if isinstance(model, Path) else fmu(model),
-                start=(start or {}).get(name, {}),
-            )
-            for name, model in blocks.items()
-        ),
-        connections=tuple(
-            Connection(Port(*to.split(".", 1)), Port(*source.split(".", 1)))
-            for to, source in (connections or {}).items()
-        ),
+        blocks=tuple(cosim.Block(name=name, fmu=paths[name], start=starts.get(name, {})) for name in blocks),
+        connections=tuple(cosim.Connection(port(to), port(source)) for to, source in wires.items()),
         inputs=tuple(inputs),
-        **made,
+        **{"step": 0.1, "duration": 1.0, **options},
     )
 
 
-ZEROS = LogColumn(np.array([0, 10**9]), np.zeros(2))
-"""A column of 1 s."""
+ZEROS = cosim.LogColumn(np.array([0, 10**9]), np.zeros(2))  # a column of 1 s
 
 
-def follow(port: str, column: str = "u", log: str = "run.csv", *, interpolate: bool = False) -> LogInput:
+def follow(to: str, column: str = "u", log: str = "run.csv", *, interpolate: bool = False) -> cosim.LogInput:
     """Return an input that follows a column of a log."""
-    destination = Port(*port.split(".", 1))
-    return LogInput(destination=destination, log=log, column=column, interpolate=interpolate)
+    return cosim.LogInput(destination=port(to), log=log, column=column, interpolate=interpolate)
 
 
 def copy_changed(path: Path, copy: Path, name: str, change: Callable[[bytes], bytes]) -> Path:
@@ -329,16 +288,16 @@ def copy_changed(path: Path, copy: Path, name: str, change: Callable[[bytes], by
     return copy
 
 
-def fmu_of(block: Block) -> Path:
+def fmu_of(block: cosim.Block) -> Path:
     """Return the FMU of a block that names one."""
     return there(block.fmu)
 
 
-def planned(*arguments: Any, column: Callable[[LogInput], LogColumn] | None = None, **options: Any) -> Plan:
-    """Return the plan of a system of foreign FMUs: the arguments are those of `system`."""
-    return prepare(system(*arguments, **options), fmu_of, column=column)
+def planned(*arguments: Any, column: Any = None, **options: Any) -> cosim.Plan:
+    """Return the plan of a system of foreign FMUs: the arguments are those of `system` and `prepare`."""
+    return cosim.prepare(system(*arguments, **options), fmu_of, column=column)
 
 
-def ran(*arguments: Any, **options: Any) -> CosimulationRecord:
+def ran(*arguments: Any, **options: Any) -> cosim.CosimulationRecord:
     """Return what a system of foreign FMUs recorded: the arguments are those of `planned`."""
-    return simulate(planned(*arguments, **options))
+    return cosim.simulate(planned(*arguments, **options))

@@ -21,7 +21,6 @@ def fmu_of() -> Fmu:
     """Return a function that gives a shipped unit's FMU by name and backend, built once a session."""
 
     def build(name: str, backend: Backend = "native") -> Path:
-        """Return the FMU out of the session's cache."""
         if backend == "native":
             need_builds_for(this_platform())
         return cached_fmu(shipped_unit(name), backend)
@@ -36,9 +35,8 @@ def cross_built(session_folder: Path) -> Callable[[str], Path]:
     need_builds_for(*platforms)
 
     def build(name: str) -> Path:
-        """Return the FMU out of the session's folder; it is renamed into its place when it is whole."""
         path = session_folder / "cross_built" / f"{name}.fmu"
-        if not path.exists():
+        if not path.exists():  # it is renamed into its place when it is whole
             path.parent.mkdir(exist_ok=True)
             build_fmu(shipped_unit(name), path, platforms=platforms)
         return path

@@ -2,89 +2,46 @@
 
 from __future__ import annotations
 
-from systems import System, Trace, empty_trace
+from collections.abc import Callable
+from typing import Any
+
+from systems import Scalar, System, Trace, empty_trace
 
 
-class LibcosimMaster:
-    """A system in libcosim.
-
-    Attributes:
-        system: The system.
-    """
-
-    def __init__(self, system: System, step: float) -> None:
-        from libcosimpy.CosimExecution import CosimExecution
-        from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
-        from libcosimpy.CosimManipulator import CosimManipulator
-        from libcosimpy.CosimObserver import CosimObserver
-        from libcosimpy.CosimSlave import CosimLocalSlave
-
-        log_output_level(CosimLogLevel.ERROR)
-        self.system = system
-        self._execution = execution = CosimExecution.from_step_size(round(step * 1e9))
-        self._slaves = {name: CosimLocalSlave(str(one.fmu), name) for name, one in system.blocks.items()}
-        self._index = {name: execution.add_local_slave(slave) for name, slave in self._slaves.items()}
-        assert min(self._index.values()) >= 0, f"libcosim cannot add one of {self._index}"
-        self._observer, self._manipulator = (
-            CosimObserver.create_last_value(),
-            CosimManipulator.create_override(),
-        )
-        assert execution.add_observer(self._observer)
-        assert execution.add_manipulator(self._manipulator)
-        self._start()
-        self._connect()
-
-    def _start(self) -> None:
-        setters = {
-            "Real": self._execution.real_initial_value,
-            "Integer": self._execution.integer_initial_value,
-            "Boolean": self._execution.boolean_initial_value,
-        }
-        for one, value in self.system.starts():
-            assert setters[one.variable.type](self._index[one.block], one.reference, value)
-
-    def _connect(self) -> None:
-        connects = {
-            "Real": self._execution.connect_real_variables,
-            "Integer": self._execution.connect_integer_variables,
-            "Boolean": self._execution.connect_boolean_variables,
-        }
-        for source, target in self.system.connected():
-            ends = (self._index[source.block], source.reference, self._index[target.block], target.reference)
-            assert connects[source.variable.type](*ends) == 0
-
-    def set(self, k: int) -> None:
-        """Set the inputs of step k."""
-        setters = {
-            "Real": self._manipulator.slave_real_values,
-            "Integer": self._manipulator.slave_integer_values,
-            "Boolean": self._manipulator.slave_boolean_values,
-        }
-        for one, value in self.system.inputs(k):
-            assert setters[one.variable.type](self._index[one.block], [one.reference], [value])
-
-    def step(self) -> None:
-        """Take a step."""
-        assert self._execution.step(), f"libcosim: {self._execution.status()}"
-
-    def read(self, trace: Trace, sample: int) -> None:
-        """Read all outputs into a sample of a trace."""
-        getters = {
-            "Real": self._observer.last_real_values,
-            "Integer": self._observer.last_integer_values,
-            "Boolean": self._observer.last_boolean_values,
-        }
-        for one in self.system.outputs():
-            value = getters[one.variable.type](self._index[one.block], [one.reference])[0]
-            trace[one.block][one.name][sample] = value
+def typed(owner: object, method: str, scalar: Scalar) -> Callable[..., Any]:
+    """Return the method for the type of a scalar: `real_initial_value` of `{}_initial_value`."""
+    found: Callable[..., Any] = getattr(owner, method.format(scalar.variable.type.lower()))
+    return found
 
 
 def run_libcosim(system: System, step: float, steps: int) -> Trace:
     """Run a system with libcosim. Sample 0 stays NaN: its observers see nothing before the first step."""
-    master = LibcosimMaster(system, step)
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_step_size(round(step * 1e9))
+    slaves = {name: CosimLocalSlave(str(block.fmu), name) for name, block in system.blocks.items()}
+    index = {name: execution.add_local_slave(slave) for name, slave in slaves.items()}
+    assert min(index.values()) >= 0, f"libcosim cannot add one of {index}"
+    observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
+    assert execution.add_observer(observer)
+    assert execution.add_manipulator(manipulator)
+    for scalar, value in system.starts():
+        assert typed(execution, "{}_initial_value", scalar)(index[scalar.block], scalar.reference, value)
+    for source, target in system.connected():
+        ends = (index[source.block], source.reference, index[target.block], target.reference)
+        assert typed(execution, "connect_{}_variables", source)(*ends) == 0
     trace = empty_trace(system, steps)
     for k in range(steps):
-        master.set(k)
-        master.step()
-        master.read(trace, k + 1)
+        for scalar, value in system.inputs(k):
+            set_values = typed(manipulator, "slave_{}_values", scalar)
+            assert set_values(index[scalar.block], [scalar.reference], [value])
+        assert execution.step(), f"libcosim: {execution.status()}"
+        for scalar in system.outputs():
+            values = typed(observer, "last_{}_values", scalar)(index[scalar.block], [scalar.reference])
+            trace[scalar.block][scalar.name][k + 1] = values[0]
     return trace

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from importlib import import_module
+from subprocess import PIPE, STDOUT, CompletedProcess, run
 
 import pytest
 
 from urmpipe_fmus.native import native_unavailable_reason
 
-NEEDS = {
-    "ecospy": "needs ecospy and Debian's libtbb12 and unzip",
-    "fmu_manipulation_toolbox": "needs fmu-manipulation-toolbox",
-    "libcosimpy": "needs libcosimpy",
-}
+NEEDS = {"ecospy": "ecospy and Debian's libtbb12 and unzip"}
 
 
 def need(module: str) -> None:
@@ -22,7 +18,7 @@ def need(module: str) -> None:
     try:
         import_module(module)
     except (ImportError, OSError) as error:
-        pytest.skip(f"{NEEDS.get(module, f'needs {module}')}: {error}")
+        pytest.skip(f"needs {NEEDS.get(module, module)}: {error}")
 
 
 def need_builds_for(*platforms: str) -> None:
@@ -31,20 +27,13 @@ def need_builds_for(*platforms: str) -> None:
         pytest.skip(f"needs what builds for {' and '.join(platforms)}: {missing}")
 
 
-def fmutool(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run fmutool of the FMU manipulation toolbox; what it says comes in one stream."""
+def fmutool(*arguments: str) -> CompletedProcess[str]:
+    """Run fmutool of the FMU manipulation toolbox."""
     need("fmu_manipulation_toolbox")
-    code = "from fmu_manipulation_toolbox.cli.fmutool import fmutool; fmutool()"
-    return said_by(sys.executable, "-c", code, *arguments)
+    return python("-c", "from fmu_manipulation_toolbox.cli.fmutool import fmutool; fmutool()", *arguments)
 
 
-def fmpy(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run FMPy's command; what it says comes in one stream."""
-    return said_by(sys.executable, "-m", "fmpy", *arguments)
-
-
-def said_by(*command: str) -> subprocess.CompletedProcess[str]:
-    """Run a command, whatever it ends with."""
-    return subprocess.run(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", check=False, timeout=600
-    )
+def python(*arguments: str) -> CompletedProcess[str]:
+    """Run Python, whatever it ends with; its output and errors come in one stream."""
+    command = [sys.executable, *arguments]
+    return run(command, stdout=PIPE, stderr=STDOUT, encoding="utf-8", check=False, timeout=600)

@@ -16,17 +16,15 @@ import numpy as np
 from urmpipe_fmus.block import BlockModel, Variable
 from urmpipe_models.elementwise import FloatArray
 
+Number = float | int | bool
+PYTHON = {"Real": float, "Integer": int, "Boolean": bool}  # the type of a variable's values
+Trace = dict[str, dict[str, FloatArray]]
+"""Of every block, its outputs before the first step and after each, by scalar name: shape (steps + 1,)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A scalar variable of a block.
-
-    Attributes:
-        block: Name of the block.
-        name: As FMI has it: `phi[1]`.
-        reference: FMI's value reference.
-        variable: The unit's variable that it belongs to.
-    """
+    """A scalar variable of a block, with FMI's value reference and the variable that it belongs to."""
 
     block: str
     name: str
@@ -38,21 +36,12 @@ class Scalar:
         """The name in the whole system, as Ecos writes it."""
         return f"{self.block}::{self.name}"
 
-    def python(self, value: float) -> float | int | bool:
-        """Return a value as Python's kind for the variable's type."""
-        kind = {"Real": float, "Integer": int, "Boolean": bool}[self.variable.type]
-        return kind(value)  # type: ignore[no-any-return]
-
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """An FMU in a system.
+    """An FMU in a system, and the block model that it was made of: it has the references and types.
 
-    Attributes:
-        fmu: Its file.
-        unit: The unit that it was made of: it knows the variables' references and types.
-        inputs: Columns of what is set before each step, by scalar name, shape (steps,) or longer.
-        start: What is set before the start, by scalar name.
+    `inputs` are columns of what is set before each step, `start` is set before the start; by scalar name.
     """
 
     fmu: Path
@@ -61,54 +50,45 @@ class Block:
     start: Mapping[str, float] = field(default_factory=dict)
 
 
-Trace = dict[str, dict[str, FloatArray]]
-"""Of every block, its outputs before the first step and after each, by scalar name: shape (steps + 1,)."""
-
-
 @dataclass(frozen=True, slots=True)
 class System:
-    """FMUs and their connections.
-
-    Attributes:
-        blocks: By name.
-        connections: Source and target, each a name of a block and one of a scalar.
-    """
+    """FMUs by name, and connections: source and target, each a name of a block and one of a scalar."""
 
     blocks: Mapping[str, Block]
     connections: Sequence[tuple[tuple[str, str], tuple[str, str]]] = ()
 
     def scalar(self, block: str, name: str) -> Scalar:
         """Return a scalar of a block by name."""
-        for reference, (known, variable) in enumerate(self.blocks[block].unit.scalars):
-            if known == name:
-                return Scalar(block, name, reference, variable)
-        raise KeyError(f"{block}: no {name}")
+        names = [known for known, _ in self.blocks[block].unit.scalars]
+        reference = names.index(name)
+        return Scalar(block, name, reference, self.blocks[block].unit.scalars[reference][1])
 
     def connected(self) -> Iterator[tuple[Scalar, Scalar]]:
         """Yield source and target of every connection."""
         for source, target in self.connections:
             yield self.scalar(*source), self.scalar(*target)
 
-    def starts(self) -> Iterator[tuple[Scalar, float | int | bool]]:
+    def starts(self) -> Iterator[tuple[Scalar, Number]]:
         """Yield what is set before the start."""
-        for name, block in self.blocks.items():
-            for one, value in block.start.items():
-                scalar = self.scalar(name, one)
-                yield scalar, scalar.python(value)
+        return self._typed({name: block.start for name, block in self.blocks.items()})
 
-    def inputs(self, step: int) -> Iterator[tuple[Scalar, float | int | bool]]:
+    def inputs(self, step: int) -> Iterator[tuple[Scalar, Number]]:
         """Yield what is set before a step."""
-        for name, block in self.blocks.items():
-            for one, values in block.inputs.items():
-                scalar = self.scalar(name, one)
-                yield scalar, scalar.python(values[step])
+        rows = {name: block.inputs for name, block in self.blocks.items()}
+        return self._typed({name: {u: x[step] for u, x in row.items()} for name, row in rows.items()})
+
+    def _typed(self, values: Mapping[str, Mapping[str, float]]) -> Iterator[tuple[Scalar, Number]]:
+        for block, row in values.items():
+            for name, value in row.items():
+                scalar = self.scalar(block, name)
+                yield scalar, PYTHON[scalar.variable.type](value)
 
     def outputs(self) -> Iterator[Scalar]:
         """Yield all outputs."""
-        for name, block in self.blocks.items():
-            for one, variable in block.unit.scalars:
+        for block, model in self.blocks.items():
+            for reference, (name, variable) in enumerate(model.unit.scalars):
                 if variable.causality == "output":
-                    yield self.scalar(name, one)
+                    yield Scalar(block, name, reference, variable)
 
 
 def alone(fmu: Path, unit: BlockModel, inputs: Mapping[str, FloatArray] | None = None) -> System:

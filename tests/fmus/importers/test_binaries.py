@@ -5,25 +5,19 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from peers import need_builds_for, said_by
-from shipped_units import CROSS_BUILT, shipped
+from peers import need_builds_for, python
+from shipped_units import CROSS_BUILT
+from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.blocks.user import load_block_file
+from urmpipe_fmus.build.description import Backend
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.native import this_platform
-
-
-def binary(fmu: Path, folder: Path, platform: str = "linux64") -> Path:
-    """Return the binary of an FMU, unpacked into a folder."""
-    suffix = {"linux64": "so", "win64": "dll"}[platform]
-    with zipfile.ZipFile(fmu) as file:
-        return Path(file.extract(f"binaries/{platform}/{fmu.stem}.{suffix}", folder))
 
 
 def readelf(option: str, path: Path) -> str:
@@ -35,28 +29,25 @@ def readelf(option: str, path: Path) -> str:
     ).stdout
 
 
-def assert_needs_only_the_c_library(path: Path) -> None:
-    """The dynamic section names libc and libm, and nothing else."""
+def checked_binary(fmu: Path, folder: Path) -> Path:
+    """Return the Linux binary of an FMU, which needs only the C library and shows only functions of FMI."""
+    with zipfile.ZipFile(fmu) as file:
+        path = Path(file.extract(f"binaries/linux64/{fmu.stem}.so", folder))
     needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", readelf("--dynamic", path)))
     assert needed <= {"libc.so.6", "libm.so.6"}
-
-
-def exported(path: Path) -> set[str]:
-    """Return the symbols that a binary defines for others."""
     rows = [line.split() for line in readelf("--dyn-syms", path).splitlines()]
-    return {row[7] for row in rows if len(row) == 8 and row[4] != "LOCAL" and row[6].isdigit()}
+    shown = {row[7] for row in rows if len(row) == 8 and row[4] != "LOCAL" and row[6].isdigit()}
+    assert {symbol for symbol in shown if not symbol.startswith("fmi2")} == set()
+    assert {"fmi2Instantiate", "fmi2DoStep", "fmi2GetReal", "fmi2SerializeFMUstate"} <= shown
+    return path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", block_names())
 def test_a_binary_needs_only_the_c_library_and_shows_only_the_functions_of_fmi(
     name: str, fmu_of: Callable[..., Path], tmp_path: Path
 ) -> None:
-    path = binary(fmu_of(name), tmp_path)
-    assert_needs_only_the_c_library(path)
-    found = exported(path)
-    assert {symbol for symbol in found if not symbol.startswith("fmi2")} == set()
-    assert {"fmi2Instantiate", "fmi2DoStep", "fmi2GetReal", "fmi2SerializeFMUstate"} <= found
+    checked_binary(fmu_of(name), tmp_path)
 
 
 @pytest.mark.slow
@@ -64,11 +55,9 @@ def test_a_binary_needs_only_the_c_library_and_shows_only_the_functions_of_fmi(
 def test_a_cross_built_binary_loads_where_the_c_library_is_of_2012(
     name: str, cross_built: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    path = binary(cross_built(name), tmp_path)
-    assert_needs_only_the_c_library(path)
-    assert {symbol for symbol in exported(path) if not symbol.startswith("fmi2")} == set()
+    path = checked_binary(cross_built(name), tmp_path)
     versions = re.findall(r"GLIBC_([0-9.]+)", readelf("--version-info", path))
-    assert max(tuple(map(int, one.split("."))) for one in versions) <= (2, 17)
+    assert max(tuple(map(int, version.split("."))) for version in versions) <= (2, 17)
 
 
 SIDE_BY_SIDE = """
@@ -101,32 +90,23 @@ print([[round(value, 9) for value in fmu.getReal([1, 2])] for fmu in (one, two)]
 USER_UNIT = """
 from urmpipe_fmus.block import BlockModel, Input, Output, State
 
-
-def outputs(v):
-    return {{"y": {factor} * v.u}}
-
-
-def derivatives(v):
-    return {{"x": {factor} * v.u}}
-
-
 unit = BlockModel(
-    name="{name}",
+    name="same",
     description="A factor, and its integral",
     variables=(
         Input(name="u", description="input"),
         Output(name="y", description="u times a factor"),
         State(name="x", description="integral of y", output=True),
     ),
-    outputs=outputs,
-    derivatives=derivatives,
+    outputs=lambda v: {{"y": {factor} * v.u}},
+    derivatives=lambda v: {{"x": {factor} * v.u}},
 )
 """
 
 
 @pytest.mark.parametrize("backend", ["native", pytest.param("python", marks=pytest.mark.slow)])
 def test_two_fmus_with_equal_inner_names_compute_their_own_in_one_process(
-    backend: str, tmp_path: Path
+    backend: Backend, tmp_path: Path
 ) -> None:
     if backend == "native":
         need_builds_for(this_platform())
@@ -134,8 +114,8 @@ def test_two_fmus_with_equal_inner_names_compute_their_own_in_one_process(
     for folder, factor in (("one", 2.0), ("two", -7.0)):
         (tmp_path / folder).mkdir()
         source = tmp_path / folder / "same.py"
-        source.write_text(USER_UNIT.format(name="same", factor=factor), encoding="utf-8")
-        target = tmp_path / folder / "same.fmu"
-        paths.append(str(build_fmu(load_block_file(source), target, backend=backend).path))  # type: ignore[arg-type]
-    said = said_by(sys.executable, "-c", SIDE_BY_SIDE, *paths)
-    assert said.stdout.strip() == "[[6.0, 6.0], [-35.0, -35.0]]", said.stdout
+        source.write_text(USER_UNIT.format(factor=factor), encoding="utf-8")
+        built = build_fmu(load_block_file(source), source.with_suffix(".fmu"), backend=backend)
+        paths.append(str(built.path))
+    output = python("-c", SIDE_BY_SIDE, *paths).stdout
+    assert output.strip() == "[[6.0, 6.0], [-35.0, -35.0]]", output

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from peers import said_by
+from peers import python
 
 CYCLES = """
 import gc, os, sys
@@ -56,8 +55,8 @@ print(resident() - before)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["repolarizer", "log_source", "dc_drive"])  # memories, a table, states
 def test_thousands_of_instances_leave_resident_memory_flat(name: str, fmu_of: Callable[..., Path]) -> None:
-    said = said_by(sys.executable, "-c", CYCLES, str(fmu_of(name)))
-    assert said.stdout.strip().lstrip("-").isdecimal(), said.stdout
+    output = python("-c", CYCLES, str(fmu_of(name))).stdout
+    assert output.strip().lstrip("-").isdecimal(), output
     # 13 bytes a cycle: any instance or saved state is larger. What the heap had free before can hide a block
     # as small as a name: the native backend's test of its callbacks counts each.
-    assert int(said.stdout) < 64 * 1024, f"{int(said.stdout)} bytes more after 5000 instances"
+    assert int(output) < 64 * 1024, f"{int(output)} bytes more after 5000 instances"

@@ -13,8 +13,6 @@ from shipped_units import STEP, sample_times, shipped_unit
 from urmpipe_fmus.run import run
 
 FOLDERS = ("plain", "with a space", "Größe ü 角度", "100% sure", "a%20b", "a#b?c=d&e", "quote'and+plus")
-
-
 CASES = [(folder, "native") for folder in FOLDERS] + [
     # pythonfmu's binary undoes the %20 of an address and no other sign: elsewhere it ends the process.
     pytest.param(folder, "python", marks=pytest.mark.slow)
@@ -30,12 +28,11 @@ def test_a_log_is_found_in_any_folder(
     place = tmp_path / folder
     place.mkdir()
     fmu = Loaded(fmu_of("log_source", backend), folder=place)
-    shown = [one.name for one in fmu.described.modelVariables if one.causality == "output"]
+    shown = [variable.name for variable in fmu.described.modelVariables if variable.causality == "output"]
     found = []
     for k in range(10):
         found.append(fmu.get(shown))
         fmu.do_step(k * STEP, STEP)
     fmu.free()
-    expected = run(shipped_unit("log_source"), sample_times(10))
-    # The rows of the table are what is read: no arithmetic.
+    expected = run(shipped_unit("log_source"), sample_times(10))  # rows of the table: no arithmetic
     np.testing.assert_array_equal(found, np.column_stack(list(expected.values())))

@@ -25,13 +25,13 @@ from urmpipe_models.robots.catalogue import load_robot
 STEPS = 300
 Port = tuple[str, str]
 MASTERS = {"libcosimpy": run_libcosim, "ecospy": run_ecos}
+# After a step libcosim reads the outputs before it passes them on to connected inputs, Ecos after.
 READS_FRESH = {"libcosimpy": False, "ecospy": True}
-"""After a step libcosim reads the outputs before it passes them on to connected inputs, Ecos after."""
 
 
-def elements(source: Port, target: Port, size: int) -> list[tuple[Port, Port]]:
-    """Return the connections of all elements of two arrays."""
-    return [((source[0], f"{source[1]}[{i}]"), (target[0], f"{target[1]}[{i}]")) for i in range(1, size + 1)]
+def elements(source: Port, target: Port) -> list[tuple[Port, Port]]:
+    """Return the connections of all elements of two arrays of six."""
+    return [((source[0], f"{source[1]}[{i}]"), (target[0], f"{target[1]}[{i}]")) for i in range(1, 7)]
 
 
 def wrapped_joints() -> tuple[Table, FloatArray]:
@@ -55,8 +55,8 @@ def test_log_repolarizer_and_chain_give_the_tool_of_the_log(master: str, fmu_of:
     names = ("repolarizer", "kinematic_chain")
     blocks = {"log": Block(played, source)}
     blocks |= {name: Block(fmu_of(name), shipped_unit(name)) for name in names}
-    connections = elements(("log", "q"), ("repolarizer", "raw"), 6)
-    connections += elements(("repolarizer", "q"), ("kinematic_chain", "phi"), 6)
+    connections = elements(("log", "q"), ("repolarizer", "raw"))
+    connections += elements(("repolarizer", "q"), ("kinematic_chain", "phi"))
     trace = MASTERS[master](System(blocks, connections), STEP, STEPS)
     late = 1 if READS_FRESH[master] else 2  # two connections, each a step; the last is read fresh
     p7 = positions_over_log(load_robot("urm6"), q)
@@ -86,36 +86,30 @@ def test_a_drive_and_its_load_give_what_their_instances_in_python_give(
     system, step = System(blocks, connections), 5e-4
     trace = MASTERS[master](system, step, STEPS)
     expected = run_instances(system, step, STEPS, fresh=READS_FRESH[master])
-    for one in system.outputs():
-        values, wanted = trace[one.block][one.name][1:], expected[one.block][one.name][1:]
+    for scalar in system.outputs():
+        values, wanted = (result[scalar.block][scalar.name][1:] for result in (trace, expected))
         # 300 steps of a stiff shaft: the masters' clocks differ from k h in the last digits.
-        np.testing.assert_allclose(values, wanted, 1e-9, 1e-9 * float(np.abs(wanted).max()), err_msg=one.path)
+        scale = float(np.abs(wanted).max())
+        np.testing.assert_allclose(values, wanted, 1e-9, 1e-9 * scale, err_msg=scalar.path)
     assert np.abs(trace["inertia"]["theta"][-1]) > 1e-3, "the load should have moved"
 
 
 def run_instances(system: System, step: float, steps: int, *, fresh: bool) -> Trace:
-    """Run the units in Python, all outputs passed on together after each step.
-
-    Args:
-        system: What to run.
-        step: In [s].
-        steps: How many.
-        fresh: Read the outputs after they were passed on, as Ecos does, else before, as libcosim does.
-    """
+    """Run the units in Python, all outputs passed on together after each step, and read then if `fresh`."""
     instances = {name: Instance(block.unit) for name, block in system.blocks.items()}
     connected = list(system.connected())
     trace = empty_trace(system, steps)
     for _ in range(len(instances)):
         pass_on(instances, connected)
     for k in range(steps):
-        for one, value in system.inputs(k):
-            instances[one.block].set([one.reference], [value])
+        for scalar, value in system.inputs(k):
+            instances[scalar.block].set([scalar.reference], [value])
         for instance in instances.values():
             instance.do_step(k * step, step)
         if fresh:
             pass_on(instances, connected)
-        for one in system.outputs():
-            trace[one.block][one.name][k + 1] = instances[one.block].get([one.reference])[0]
+        for scalar in system.outputs():
+            trace[scalar.block][scalar.name][k + 1] = instances[scalar.block].get([scalar.reference])[0]
         if not fresh:
             pass_on(instances, connected)
     return trace
