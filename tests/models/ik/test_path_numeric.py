@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ik_arms import planar, times
+from closed_forms import assert_met as assert_poses_met
+from ik_arms import follow, line, planar, times
 from urmpipe_datasets import LOGS
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
@@ -16,7 +17,6 @@ from urmpipe_models.ik import path_numeric as sliding_window
 from urmpipe_models.ik.path import JointPath, solve_path
 from urmpipe_models.ik.path_numeric import (
     DAMPING,
-    LeastMotionPath,
     SlidingWindow,
     find_out_of_reach,
     max_reach,
@@ -31,6 +31,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.wraps import repolarize
 
 NANOMETRE = 1e-9  # what the solver promises: targets are met within it
+ARM = planar(1.0, 1.0, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +46,14 @@ def followed(demo_path: FloatArray) -> JointPath:
 
 
 def assert_met(path: JointPath, targets: Targets) -> None:
-    distance, turn = pose_errors(path.chain, path.q, targets)
     assert path.reached.all(), list(path.reasons[path.reasons != ""])
-    assert np.linalg.norm(distance, axis=1).max() <= NANOMETRE
     # rad: the solver counts rotations as arcs of a quarter of the arm, 0.2 m and more of these arms
-    assert np.linalg.norm(turn, axis=1).max() <= 5.0 * NANOMETRE
+    assert_poses_met(path.chain, targets, path.q, NANOMETRE, 5.0 * NANOMETRE)
+
+
+def in_plane(x: FloatArray, y: FloatArray | float = 0.0) -> Targets:
+    """Return positions in the plane of planar arms, in [m]."""
+    return Targets(np.stack(np.broadcast_arrays(x, y, 0.0), axis=-1))
 
 
 def assert_least_motion(path: JointPath, least_singular: float) -> None:
@@ -68,9 +72,7 @@ def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(
     followed: JointPath, demo_path: FloatArray
 ) -> None:
     assert_met(followed, Targets(demo_path))
-    assert followed.jumps == ()
-    assert followed.too_fast == ()
-    assert followed.singular == ()
+    assert not (followed.jumps or followed.too_fast or followed.singular)
     assert set(followed.branch) == {"1"}
     assert followed.method == "least motion"
     assert not followed.shortfall.any()
@@ -81,14 +83,10 @@ def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(
     # rad: the joints do not follow the rounding of the file there: 0.086 by least motion alone
     np.testing.assert_allclose(followed.q[0], load_robot("urm6").start, rtol=0.0, atol=1e-15)
     assert np.linalg.norm(np.diff(followed.q[:200], axis=0), axis=1).sum() < 0.06
-
-
-def test_the_distance_to_singular_poses_is_told_along_the_path(followed: JointPath) -> None:
     smallest = followed.singularity.smallest
     J = jacobian_over_log(followed.chain, followed.q)[:, :3] / followed.singularity.length
-    np.testing.assert_allclose(
-        smallest, np.linalg.svd(J, compute_uv=False)[:, -1], rtol=0.0, atol=1e-12
-    )  # the same matrix, decomposed twice
+    # the same matrix, decomposed twice
+    np.testing.assert_allclose(smallest, np.linalg.svd(J, compute_uv=False)[:, -1], rtol=0.0, atol=1e-12)
     assert smallest[0] < 1e-12
     assert smallest[1000:].min() > 1e-3
 
@@ -132,12 +130,10 @@ def test_joints_within_pi_are_unwrapped_by_the_repolarizer(
     assert np.abs(followed.q).max() > math.pi
     assert wrapped.q.max() <= math.pi
     assert wrapped.q.min() > -math.pi
-    dt = np.append(0.0, np.diff(followed.t_ns) * 1e-9)
-    again = repolarize(wrapped.q, dt)
+    again = repolarize(wrapped.q, np.append(0.0, np.diff(followed.t_ns) * 1e-9))
     assert len(again.rows) > 0
-    turns = followed.q[0] - again.q[0]
     # rad: whole turns taken off and added again
-    np.testing.assert_allclose(again.q + turns, followed.q, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(again.q + followed.q[0] - again.q[0], followed.q, rtol=0.0, atol=1e-13)
     assert wrapped.jumps == ()
 
 
@@ -145,32 +141,26 @@ def test_a_redundant_arm_follows_poses_within_its_limits() -> None:
     panda = load_robot("panda")
     t = np.linspace(0.0, 6.0, 500)[:, None]
     q = np.array(panda.start) + 0.4 * np.sin(t * np.linspace(0.3, 1.0, 7))
-    targets = forward_targets(panda, q)
-    path = solve_path(panda, targets, times(len(q)), start=q[0])
-    assert_met(path, targets)
+    path = follow(panda, q)
+    assert_met(path, forward_targets(panda, q))
     assert path.jumps == ()
     assert_least_motion(path, 0.01)
     # a redundant arm finds a shorter way than the one that the poses were made from
     assert np.square(np.diff(path.q, axis=0)).sum() < np.square(np.diff(q, axis=0)).sum()
 
 
-def test_a_joint_is_held_on_its_limit_and_let_go_again() -> None:
-    free, limited = planar(1.0, 1.0, 1.0), planar(1.0, 1.0, 1.0, upper=0.5)
-    start = np.array([0.2, -0.6, 0.3])
+def test_a_joint_stays_on_its_limit_and_leaves_it_again() -> None:
+    limited, start = planar(1.0, 1.0, 1.0, upper=0.5), np.array([[0.2, -0.6, 0.3]])
     t = np.linspace(0.0, 2.0 * math.pi, 400)
-    circle = forward_targets(free, start[None]).position + 0.6 * np.column_stack(
-        (np.cos(t) - 1.0, np.sin(t), np.zeros_like(t))
-    )
-    without = solve_path(free, Targets(circle), times(400), start=start)
-    path = solve_path(limited, Targets(circle), times(400), start=start)
+    x, y, _ = forward_targets(ARM, start).position[0]
+    circle = in_plane(x + 0.6 * (np.cos(t) - 1.0), y + 0.6 * np.sin(t))
+    without, path = follow(ARM, start, circle), follow(limited, start, circle)
     assert without.q[:, 0].max() > 0.6
-    assert_met(path, Targets(circle))
+    assert_met(path, circle)
     assert path.q[:, 0].max() == 0.5
     assert path.jumps == ()
     on = path.q[:, 0] == 0.5
-    assert on.sum() > 20
-    assert not on[0]
-    assert not on[-1]
+    assert on.sum() > 20 and not on[0] and not on[-1]
     step = np.diff(path.q, axis=0)
     J = jacobian_over_log(limited, path.q)[1:, :2]
     for k in np.flatnonzero(~on[1:]):
@@ -181,28 +171,20 @@ def test_a_joint_is_held_on_its_limit_and_let_go_again() -> None:
 
 
 def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> None:
-    arm = planar(1.0, 1.0, 1.0)
-    t = np.linspace(0.0, 1.0, 301)
-    reach = 2.5 + 1.2 * np.sin(math.pi * t)
-    line = np.column_stack((reach, np.zeros((301, 2))))
-    path = solve_path(arm, Targets(line), times(301), start=np.array([0.6, -1.0, 0.1]))
+    reach = 2.5 + 1.2 * np.sin(math.pi * np.linspace(0.0, 1.0, 301))
+    path = follow(ARM, np.array([[0.6, -1.0, 0.1]]), in_plane(reach))
     out = reach > 3.0
     assert (path.reached == ~out).all()
-    assert np.isnan(path.q[out]).all()
-    assert all(path.reasons[out])
-    assert not any(path.reasons[~out])
-    assert (path.branch[out] == "").all()
-    distance, _ = pose_errors(arm, path.q[~out], Targets(line[~out]))
-    assert np.abs(distance).max() <= NANOMETRE
+    assert (path.reasons != "").tolist() == (path.branch == "").tolist() == out.tolist()
+    assert_poses_met(ARM, in_plane(reach), path.q, NANOMETRE)
     assert path.jumps == ()
 
 
-def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
-    free, arm = planar(1.0, 1.0), planar(1.0, 1.0, upper=1.0)
-    q = np.array([0.9, -1.0]) + np.linspace(0.0, 0.2, 41)[:, None] * np.array([1.0, 0.0])
-    targets = Targets(forward_targets(free, q).position)
+def test_another_bend_after_a_gap_is_a_jump() -> None:
+    q = line([0.2, 0.0], 41, np.array([0.9, -1.0]))
+    targets = Targets(forward_targets(planar(1.0, 1.0), q).position)
     targets.position[18:22] *= 2.0
-    path = solve_path(arm, targets, times(41), start=q[0])
+    path = follow(planar(1.0, 1.0, upper=1.0), q, targets)
     assert (np.flatnonzero(~path.reached) == np.arange(18, 22)).all()
     (jump,) = path.jumps
     assert (jump.last, jump.sample, jump.from_branch, jump.to_branch) == (17, 22, "1", "2")
@@ -211,170 +193,127 @@ def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
 
 
 def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
-    arm = planar(1.0, 1.0, 1.0)
     reach = 2.9 + 0.102 * np.sin(np.linspace(0.0, math.pi, 101))
-    line = np.column_stack((reach, np.zeros((101, 2))))
-    path = solve_path(
-        arm,
-        Targets(line),
-        times(101),
-        start=np.array([0.3, -0.5, 0.1]),
-        search=SearchOptions(tolerance=0.003),
-    )
+    search = SearchOptions(tolerance=0.003)
+    path = follow(ARM, np.array([[0.3, -0.5, 0.1]]), in_plane(reach), search=search)
     assert path.reached.all()
     # m: along x the arm reaches 3 m; the nearest point is found to 1e-6 rad about it, so much better
     np.testing.assert_allclose(path.shortfall, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
 
 
-def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
-    arm = load_robot("ur5e")
-    stretched = np.array([0.3, -0.9, 0.0, -0.7, 0.3, 0.3])
-    q = stretched + np.linspace(0.4, 0.0, 41)[:, None] * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    targets = forward_targets(arm, q)
-    away = targets.position - np.array([0.0, 0.0, 0.1625])
-    away /= np.linalg.norm(away, axis=1)[:, None]
-    targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
-    path = LeastMotionPath(arm, targets, q[0], SearchOptions(tolerance=0.0035), lambda share: None)
-    assert np.isfinite(path.q).all()
-    assert (path.shortfall > 0.0).sum() > 10
-    # rad: restarts find other turns of the same points, 6.28 away
-    assert np.abs(np.diff(path.q, axis=0)).max() < 1.0
-
-
-def test_a_sample_that_is_none_stops_no_other() -> None:
-    arm = planar(1.0, 1.0, 1.0)
-    line = np.column_stack((np.linspace(2.0, 2.2, 21), np.zeros((21, 2))))
-    whole = solve_path(arm, Targets(line), times(21), start=np.array([0.6, -1.0, 0.1]))
-    broken = line.copy()
-    broken[10] = math.nan
-    path = solve_path(arm, Targets(broken), times(21), start=np.array([0.6, -1.0, 0.1]))
-    assert path.reasons[10] == "the position is nan, nan, nan m, allowed: finite numbers"
+def test_a_sample_that_is_not_finite_stops_no_other() -> None:
+    x = np.linspace(2.0, 2.2, 21)
+    start = np.array([[0.6, -1.0, 0.1]])
+    whole = follow(ARM, start, in_plane(x))
+    x[10] = math.nan
+    path = follow(ARM, start, in_plane(x))
+    assert path.reasons[10] == "the position is nan, 0, 0 m, allowed: finite numbers"
     assert path.reached.sum() == 20
     # rad: least motion of two steps and of one, 0.01 m each, differ in second order
     np.testing.assert_allclose(np.delete(path.q, 10, 0), np.delete(whole.q, 10, 0), rtol=0.0, atol=1e-4)
 
 
 def test_one_sample_and_equal_samples_are_paths_too() -> None:
-    arm = load_robot("urm6")
-    start = np.array([0.3, 2.0, 0.4, 2.5, 0.2, 1.0])
-    one = forward_targets(arm, start[None] + 0.05)
-    assert_met(solve_path(arm, one, times(1), start=start), one)
-    twice = Targets(np.repeat(one.position, 2, axis=0))
-    path = solve_path(arm, twice, times(2), start=start)
+    arm, start = load_robot("urm6"), np.array([[0.3, 2.0, 0.4, 2.5, 0.2, 1.0]])
+    single = forward_targets(arm, start + 0.05)
+    assert_met(follow(arm, start, single), single)
+    twice = Targets(np.repeat(single.position, 2, axis=0))
+    path = follow(arm, start, twice)
     assert_met(path, twice)
     # rad: there is nothing to move for
     np.testing.assert_allclose(path.q[0], path.q[1], rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "arm6", "urm6"])
-@pytest.mark.parametrize("place", [math.nan, 9.0])
-def test_a_path_of_which_no_sample_has_a_solution_has_a_reason_each(robot: str, place: float) -> None:
+@pytest.mark.parametrize(("place", "reason"), [(math.nan, "finite numbers"), (9.0, " m")])
+def test_a_path_of_which_no_sample_has_a_solution_has_a_reason_each(
+    robot: str, place: float, reason: str
+) -> None:
     arm = load_robot(robot)
     targets = forward_targets(arm, np.full((3, 6), 0.3))
     targets.position[:] = place
     path = solve_path(arm, targets, times(3), within_pi=True, search=SearchOptions(restarts=2))
     assert not path.reached.any()
-    assert all("finite numbers" in text if math.isnan(place) else " m" in text for text in path.reasons)
+    assert all(reason in text for text in path.reasons)
     assert list(path.branch) == ["", "", ""]
-    assert path.jumps == ()
-    assert path.too_fast == ()
-    assert path.singular == ()
+    assert not (path.jumps or path.too_fast or path.singular)
 
 
 def test_prismatic_joints_follow_too() -> None:
-    gantry = Chain(
-        "gantry",
-        (
-            Joint("x", "prismatic", axis=(1.0, 0.0, 0.0)),
-            Joint("y", "prismatic", axis=(0.0, 1.0, 0.0)),
-            Joint("z", "prismatic", upper=0.5),
-            Joint("c"),
-        ),
-        tip=Transform(),
-    )
+    slides = [Joint("x", "prismatic", axis=(1.0, 0.0, 0.0)), Joint("y", "prismatic", axis=(0.0, 1.0, 0.0))]
+    gantry = Chain("gantry", (*slides, Joint("z", "prismatic", upper=0.5), Joint("c")))
     t = np.linspace(0.0, 3.0, 100)
     q = np.column_stack((np.sin(t), np.cos(t), 0.4 * np.sin(t), 0.7 * t))
-    targets = forward_targets(gantry, q)
-    path = solve_path(gantry, targets, times(100), start=q[0])
     # m and rad: linear in the lengths, so as near as targets are met
-    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=5.0 * NANOMETRE)
-    positions = solve_path(gantry, Targets(targets.position), times(100), start=q[0])
+    np.testing.assert_allclose(follow(gantry, q).q, q, rtol=0.0, atol=5.0 * NANOMETRE)
+    positions = follow(gantry, q, Targets(forward_targets(gantry, q).position))
     np.testing.assert_allclose(positions.q[:, :3], q[:, :3], rtol=0.0, atol=NANOMETRE)
     assert (positions.q[:, 3] == q[0, 3]).all()  # nothing asks the last joint to turn
 
 
-def test_far_apart_samples_are_followed_one_by_one() -> None:
-    arm = planar(1.0, 1.0, 1.0)
-    angles = np.linspace(0.0, 3.0, 7)
-    circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(7)))
-    path = solve_path(arm, Targets(circle), times(7), start=np.array([0.8, -0.9, -0.9]))
-    assert_met(path, Targets(circle))
-    assert path.jumps == ()
+START = np.array([[0.8, -0.9, -0.9]])
+
+
+def test_far_apart_samples_are_followed_one_by_one_from_the_sample_before_turns_and_all() -> None:
+    for angles in (np.linspace(0.0, 3.0, 7), np.append(np.linspace(0.0, 9.0, 400), [10.5, 12.0])):
+        circle = in_plane(2.0 * np.cos(angles), 2.0 * np.sin(angles))
+        path = follow(ARM, START, circle)
+        assert_met(path, circle)
+        if len(angles) == 7:
+            assert path.jumps == ()
+        else:
+            assert path.q[-1, 0] - path.q[0, 0] > 9.0
+            # rad: the base turns by about 1.5 a step
+            assert np.abs(np.diff(path.q[-3:], axis=0)).max() < 2.0
 
 
 def test_from_a_nearly_singular_start_no_large_correction_is_trusted() -> None:
-    start = np.array([0.1, 0.02, 0.0])
-    target = Targets(np.array([[0.0, 1.2, 0.0]]))
-    path = solve_path(planar(1.0, 1.0, 1.0), target, times(1), start=start)
+    start = np.array([[0.1, 0.02, 0.0]])
+    target = in_plane(np.zeros(1), 1.2)
+    path = follow(ARM, start, target)
     assert_met(path, target)
     # rad: 2.07 by steps of 0.1; the whole first correction ends 8.03 away, after a turn in vain
-    assert np.linalg.norm(path.q[0] - start) < 2.5
+    assert np.linalg.norm(path.q - start) < 2.5
 
 
-def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
-    free, limited = planar(1.0, 1.0, 1.0), planar(1.0, 1.0, 1.0, upper=0.5)
-    q = np.array([0.45, -0.6, 0.3]) + np.linspace(0.0, 0.3, 40)[:, None] * np.array([1.0, 0.3, 0.0])
+def test_after_a_rescue_no_joint_stays_on_the_limit_of_before() -> None:
+    q = line([0.3, 0.09, 0.0], 40, np.array([0.45, -0.6, 0.3]))
     elsewhere = np.array([-1.8, 0.4, 0.3])  # out of reach with joint 1 at 0.5 rad
-    targets = forward_targets(free, np.vstack((q, elsewhere + np.linspace(0.0, 0.02, 20)[:, None])))
+    targets = forward_targets(ARM, np.vstack((q, line([0.02] * 3, 20, elsewhere))))
     asked = []
 
     def rescue(sample: int, last: FloatArray) -> FloatArray:
-        """The pose that the far samples were made from."""
+        """Return the pose that the far samples were made from."""
         asked.append(sample)
         assert last[0] == 0.5
         return elsewhere[None]
 
-    window = SlidingWindow(limited, Targets(targets.position), q[0], rescue)
-    found = window.slide(lambda share: None)
+    limited = planar(1.0, 1.0, 1.0, upper=0.5)
+    found = SlidingWindow(limited, Targets(targets.position), q[0], rescue).slide(lambda share: None)
     assert asked == [40]
     assert (found[30:40, 0] == 0.5).all()
     # rad: the joints go on from where the rescue brought them, 0.02 in 20 samples
     assert np.abs(found[40:] - elsewhere).max() < 0.05
 
 
-@pytest.mark.parametrize("robot", ["urm6", "ur5e"])
-def test_the_share_that_is_done_rises_to_the_whole(robot: str) -> None:
+@pytest.mark.parametrize(("robot", "reports"), [("urm6", 4), ("ur5e", 1)])  # window after window, or at once
+def test_the_completed_share_rises_to_the_whole(robot: str, reports: int) -> None:
     arm = load_robot(robot)
-    targets = forward_targets(arm, np.array(arm.start) + 0.3 + np.linspace(0.0, 0.5, 900)[:, None])
+    q = line([0.5] * 6, 900, np.array(arm.start) + 0.3)
+    targets = forward_targets(arm, q)
     targets.position[300:400] += 9.0
-    told: list[float] = []
-    solve_path(arm, targets, times(900), start=np.array(arm.start) + 0.3, progress=told.append)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-    assert told[0] >= 0.0
-    if robot == "urm6":
-        assert len(set(told)) > 3  # window after window
-
-
-def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
-    arm = planar(1.0, 1.0, 1.0)
-    angles = np.append(np.linspace(0.0, 9.0, 400), [10.5, 12.0])
-    circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(402)))
-    start = np.array([0.8, -0.9, -0.9])
-    path = solve_path(arm, Targets(circle), times(402), start=start)
-    assert_met(path, Targets(circle))
-    assert path.q[-1, 0] - path.q[0, 0] > 9.0
-    assert np.abs(np.diff(path.q[-3:], axis=0)).max() < 2.0  # rad: the base turns by about 1.5 a step
+    shares: list[float] = []
+    follow(arm, q, targets, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[0] >= 0.0 and shares[-1] == 1.0
+    assert len(set(shares)) >= reports
 
 
 def test_the_same_seed_gives_the_same_motion_bit_for_bit() -> None:
-    arm = planar(1.0, 1.0, 1.0)
-    rng = np.random.default_rng(5)
-    targets = Targets(np.column_stack((rng.uniform(-2.5, 2.5, (8, 2)), np.zeros(8))))
-    one, other = (
-        solve_path(arm, targets, times(8), search=SearchOptions(seed=3, restarts=5)) for _ in range(2)
-    )
-    assert np.array_equal(one.q, other.q, equal_nan=True)
+    targets = in_plane(*np.random.default_rng(5).uniform(-2.5, 2.5, (8, 2)).T)
+    search = SearchOptions(seed=3, restarts=5)
+    first, again = (solve_path(ARM, targets, times(8), search=search).q for _ in range(2))
+    assert np.array_equal(first, again, equal_nan=True)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 15, 16, 17, 100, 384])
@@ -424,10 +363,9 @@ def test_a_stretched_planar_arm_reaches_the_bound_and_no_farther() -> None:
     arm = planar(1.0, 0.5)
     assert max_reach(arm) == 1.5
     assert forward_targets(arm, np.zeros((1, 2))).position[0, 0] == 1.5
-    away = Targets(np.array([[1.5, 0.0, 0.0], [0.0, 1.502, 0.0], [math.nan, 0.0, 0.0]]))
-    assert find_out_of_reach(arm, away, None) == [
-        "", "the target is 1.502 m from the first joint, allowed: 1.500 m at most", ""
-    ]  # fmt: skip
+    away = in_plane(np.array([1.5, 0.0, math.nan]), np.array([0.0, 1.502, 0.0]))
+    far = "the target is 1.502 m from the first joint, allowed: 1.500 m at most"
+    assert find_out_of_reach(arm, away, None) == ["", far, ""]
     assert find_out_of_reach(arm, away, 0.002) == ["", "", ""]
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 from asserting import there
+from closed_forms import assert_met
 from ik_arms import by_shorter_way, joints_within, limited, planar
 from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import closed_form
 from urmpipe_models.ik.limits import joint_limits, limit_solutions
 from urmpipe_models.ik.numeric import refine
@@ -23,23 +26,14 @@ from urmpipe_models.ik.restarts import (
 from urmpipe_models.ik.solutions import (
     NEAREST_POINT,
     SearchOptions,
-    Solutions,
     Targets,
     forward_targets,
-    pose_errors,
 )
-from urmpipe_models.math3d import translation
+from urmpipe_models.math3d import rotation_about, translation
 from urmpipe_models.robots.catalogue import load_robot
 
 MET = 1.01e-10  # in [m] and [rad]: what is promised, and the rounding of the peer's rotation vector
-
-
-def assert_solved(chain: Chain, targets: Targets, solutions: Solutions) -> None:
-    for column in range(solutions.q.shape[1]):
-        rows = solutions.reached[:, column] & (solutions.shortfall[:, column] == 0.0)
-        distance, turn = pose_errors(chain, solutions.q[rows, column], targets.rows(rows))
-        assert np.linalg.norm(distance, axis=1).max(initial=0.0) < MET
-        assert np.linalg.norm(turn, axis=1).max(initial=0.0) < MET
+URM6, ARM, NEAR = load_robot("urm6"), planar(0.5, 0.4), SearchOptions(tolerance=0.0035)
 
 
 @pytest.mark.slow
@@ -50,7 +44,7 @@ def test_random_reachable_poses_are_solved(robot: str) -> None:
     solutions = solve_iteratively(chain, targets, start=np.zeros(len(chain.coordinates)))
     assert solutions.branches == ("1",)
     assert solutions.reached.all()
-    assert_solved(chain, targets, solutions)
+    assert_met(chain, targets, solutions.q, MET)
     lower, upper = joint_limits(chain)
     assert ((solutions.q >= lower) & (solutions.q <= upper)).all()
 
@@ -58,22 +52,17 @@ def test_random_reachable_poses_are_solved(robot: str) -> None:
 @pytest.mark.slow
 def test_random_poses_of_urm6_take_no_more_restarts_than_promised() -> None:
     """995 of 1000 within 20 restarts, all within 200; the poses and the starts are uniformly random."""
-    chain = load_robot("urm6")
-    targets = forward_targets(chain, joints_within(chain, 1000, 2021))
+    targets = forward_targets(URM6, joints_within(URM6, 1000, 2021))
     start = np.random.default_rng(9).uniform(-math.pi, math.pi, (1000, 6))
-    few = solve_iteratively(chain, targets, start=start, search=SearchOptions(restarts=20))
-    print(f"within 20 restarts: {few.reached.sum()} of 1000")
-    assert few.reached.sum() >= 995
-    many = solve_iteratively(chain, targets, start=start, search=SearchOptions(restarts=200))
-    print(f"within 200 restarts: {many.reached.sum()} of 1000")
-    assert many.reached.all()
-    assert_solved(chain, targets, many)
+    for restarts, least in ((20, 995), (200, 1000)):
+        found = solve_iteratively(URM6, targets, start=start, search=SearchOptions(restarts=restarts))
+        assert found.reached.sum() >= least
+        assert_met(URM6, targets, found.q, MET)
 
 
 def test_the_solution_from_the_start_is_kept_where_there_is_one() -> None:
-    chain = load_robot("urm6")
     q = np.random.default_rng(1).uniform(-math.pi, math.pi, (50, 6))
-    solutions = solve_iteratively(chain, forward_targets(chain, q), start=q + 1e-3)
+    solutions = solve_iteratively(URM6, forward_targets(URM6, q), start=q + 1e-3)
     np.testing.assert_allclose(solutions.q[:, 0], q, atol=1e-6)  # poses of conditions up to 1e4
 
 
@@ -84,85 +73,79 @@ def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
     targets = forward_targets(chain, q)
     found = solve_iteratively(chain, targets)
     assert found.reached.all()
-    assert_solved(chain, targets, found)
+    assert_met(chain, targets, found.q, MET)
 
 
 @pytest.mark.slow
 def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken() -> None:
     """Attempts come one, two, four, ... at a time; here each is made alone."""
-    chain = load_robot("urm6")
-    targets, start = forward_targets(chain, joints_within(chain, 40, 6)), np.array(chain.start)
-    found = solve_iteratively(chain, targets).q[:, 0]
-    restarts, others = random_starts(chain, 7, 0), 0
-    for row in np.flatnonzero(~refine(chain, targets, start).converged):
-        one = targets.rows(np.full(7, row))
-        refined = refine(chain, one, restarts, stationary=ATTEMPT_STATIONARY)
+    targets, start = forward_targets(URM6, joints_within(URM6, 40, 6)), np.array(URM6.start)
+    found = solve_iteratively(URM6, targets).q[:, 0]
+    restarts, others = random_starts(URM6, 7, 0), 0
+    for row in np.flatnonzero(~refine(URM6, targets, start).converged):
+        repeated = targets.rows(np.full(7, row))
+        refined = refine(URM6, repeated, restarts, stationary=ATTEMPT_STATIONARY)
         for some in (slice(0, 1), slice(1, 3), slice(3, 7)):
-            if refined.converged[some].any():
-                q = refined.q[some][refined.converged[some]]
+            q = refined.q[some][refined.converged[some]]
+            if len(q):
                 away = np.square(by_shorter_way(q - start)).sum(axis=1)
-                nearest = q[np.argmin(away)]
-                turned = by_shorter_way(found[row] - nearest)
+                turned = by_shorter_way(found[row] - q[np.argmin(away)])
                 np.testing.assert_allclose(turned, 0.0, atol=1e-9)  # whole turns apart
                 others += int(np.argmin(away) > 0)
                 break
     assert others > 0  # of some the first is not the nearest
 
 
-def test_both_solutions_of_a_planar_arm_are_found_nearest_to_the_start_first() -> None:
-    arm = planar(0.5, 0.4)
-    q = np.array([[0.3, 0.8]])
-    found = solve_iteratively(arm, Targets(forward_targets(arm, q).position), start=q[0] - 0.1, every=True)
-    angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
+@pytest.mark.parametrize(
+    ("limit", "q1", "start", "nearer"),
+    [
+        (math.inf, 0.3, (0.2, 0.7), 0),
+        (
+            3.1,
+            -2.9,
+            (3.0, 0.8),
+            1,
+        ),  # from 3.0 rad a joint that ends at +-3.1 gets to -2.9 by 5.9, not by 0.38
+    ],
+)
+def test_both_solutions_of_a_planar_arm_are_found_nearest_first_by_the_way_that_limits_leave(
+    limit: float, q1: float, start: tuple[float, float], nearer: int
+) -> None:
+    arm = limited(planar(0.5, 0.4), -limit, limit)
+    position = Targets(forward_targets(arm, np.array([[q1, 0.8]])).position)
+    found = solve_iteratively(arm, position, start=np.array(start), every=True)
     assert found.branches == ("1", "2")
-    np.testing.assert_allclose(found.q[0], [[0.3, 0.8], [0.3 + angle, -0.8]], atol=1e-8)
-
-
-def test_nearest_counts_the_way_that_limits_leave() -> None:
-    """From 3.0 rad a joint that ends at +-3.1 gets to -2.9 rad by 5.9 rad, not by 0.38."""
-    arm = limited(planar(0.5, 0.4), -3.1, 3.1)
-    position = Targets(forward_targets(arm, np.array([[-2.9, 0.8]])).position)
-    start = np.array([3.0, 0.8])
     angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
-    found = solve_iteratively(arm, position, start=start, every=True)
-    np.testing.assert_allclose(found.q[0], [[-2.9 + angle, -0.8], [-2.9, 0.8]], atol=1e-8)
+    both = [[q1, 0.8], [q1 + angle, -0.8]]
+    np.testing.assert_allclose(found.q[0], [both[nearer], both[1 - nearer]], atol=1e-8)
 
 
 def test_every_solution_of_a_closed_form_is_found() -> None:
     """Of the UR5e: as many as the three parallel axes have, the same values."""
     chain = load_robot("ur5e")
     targets = forward_targets(chain, joints_within(chain, 12, 6))
-    form = there(closed_form(chain))
-    start = np.array(chain.start)
-    peer = limit_solutions(chain, form.solve(targets), start)
+    peer = limit_solutions(chain, there(closed_form(chain)).solve(targets), np.array(chain.start))
     found = solve_iteratively(chain, targets, every=True, search=SearchOptions(restarts=150))
+    np.testing.assert_array_equal(found.reached.sum(axis=1), peer.reached.sum(axis=1))
     for row in range(12):
-        ours = found.q[row][found.reached[row]]
-        theirs = peer.q[row][peer.reached[row]]
-        assert len(ours) == len(theirs)
-        for q in theirs:
-            away = by_shorter_way(ours - q)
-            assert np.abs(away).max(axis=1).min() < 1e-6  # a miss of 1e-10, conditions up to 1e4
+        for q in peer.q[row][peer.reached[row]]:  # a miss of 1e-10, conditions up to 1e4
+            assert np.nanmin(np.abs(by_shorter_way(found.q[row] - q)).max(axis=1)) < 1e-6
 
 
 def test_every_solution_is_distinct_ordered_and_met() -> None:
-    chain = load_robot("urm6")
-    targets = forward_targets(chain, joints_within(chain, 30, 6))
-    start = np.array(chain.start)
-    found = solve_iteratively(chain, targets, every=True)
-    assert_solved(chain, targets, found)
+    targets = forward_targets(URM6, joints_within(URM6, 30, 6))
+    found = solve_iteratively(URM6, targets, every=True)
+    assert_met(URM6, targets, found.q, MET)
     counts = found.reached.sum(axis=1)
     assert counts.min() >= 1
     assert counts.max() >= 6
-    distance = np.square(found.q - start).sum(axis=2)
+    away = found.q - np.array(URM6.start)
     for row, count in enumerate(counts):
         assert found.reached[row, :count].all()
-        assert (np.diff(distance[row, :count]) >= -1e-9).all()
-        assert np.abs(found.q[row, :count] - start).max() <= math.pi + 1e-9
-        for a in range(count):
-            for b in range(a):
-                apart = by_shorter_way(found.q[row, a] - found.q[row, b])
-                assert np.abs(apart).max() > DISTINCT_TOLERANCE
+        assert (np.diff(np.square(away[row, :count]).sum(axis=1)) >= -1e-9).all()
+        assert np.abs(away[row, :count]).max() <= math.pi + 1e-9
+        for a, b in combinations(found.q[row, :count], 2):
+            assert np.abs(by_shorter_way(a - b)).max() > DISTINCT_TOLERANCE
         assert set(found.reasons[row, count:]) <= {"no further solution in 20 restarts"}
         assert set(found.reasons[row, :count]) == {""}
 
@@ -171,11 +154,8 @@ def test_every_solution_is_distinct_ordered_and_met() -> None:
 @pytest.mark.parametrize("robot", ["urm6", "urm8"])
 def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: str) -> None:
     chain = load_robot(robot)
-    targets = forward_targets(chain, joints_within(chain, 12, 6))
-    first, again = (
-        solve_iteratively(chain, targets, every=True, search=SearchOptions(restarts=6, seed=4))
-        for _ in range(2)
-    )
+    targets, search = forward_targets(chain, joints_within(chain, 12, 6)), SearchOptions(restarts=6, seed=4)
+    first, again = (solve_iteratively(chain, targets, every=True, search=search) for _ in range(2))
     np.testing.assert_array_equal(first.q, again.q)
     assert (random_starts(chain, 6, 4) != random_starts(chain, 6, 5)).all()
     np.testing.assert_array_equal(random_starts(chain, 6, 4), random_starts(chain, 20, 4)[:6])
@@ -183,13 +163,10 @@ def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: s
 
 @pytest.mark.parametrize("every", [False, True])
 def test_what_is_found_for_a_target_does_not_depend_on_the_others(every: bool) -> None:
-    chain = load_robot("urm6")
-    targets = forward_targets(chain, joints_within(chain, 15, 6))
-    together = solve_iteratively(chain, targets, every=every, search=SearchOptions(restarts=8))
+    targets, search = forward_targets(URM6, joints_within(URM6, 15, 6)), SearchOptions(restarts=8)
+    together = solve_iteratively(URM6, targets, every=every, search=search)
     for row in (14, 3):
-        alone = solve_iteratively(
-            chain, targets.rows(slice(row, row + 1)), every=every, search=SearchOptions(restarts=8)
-        )
+        alone = solve_iteratively(URM6, targets.rows(slice(row, row + 1)), every=every, search=search)
         count = alone.q.shape[1]
         np.testing.assert_array_equal(together.q[row, :count], alone.q[0])
         assert not together.reached[row, count:].any()
@@ -210,25 +187,19 @@ def test_random_starts_lie_within_limits() -> None:
 
 
 def test_a_target_out_of_reach_says_how_near_the_tool_comes() -> None:
-    arm = planar(0.5, 0.4)
-    found = solve_iteratively(
-        arm, Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]])), search=SearchOptions(restarts=3)
-    )
+    far = Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]]))
+    found = solve_iteratively(ARM, far, search=SearchOptions(restarts=3))
     assert found.reached[:, 0].tolist() == [False, True]
     assert found.reason(0) == "no solution in 3 restarts; nearest: 0.3 m away"
-    pose = forward_targets(arm, np.array([[0.0, 0.0]]))
-    found = solve_iteratively(
-        arm, replace(pose, position=pose.position + 0.1), search=SearchOptions(restarts=1)
-    )
-    assert found.reason(0) is not None
-    assert str(found.reason(0)).startswith("no solution in 1 restart; nearest: 0.1")
-    assert str(found.reason(0)).endswith(" rad away")
-    found = solve_iteratively(
-        arm, Targets(np.array([[1.2, 0.0, 0.0]])), search=SearchOptions(restarts=0, tolerance=0.29)
-    )
-    assert found.reason(0) == (
+    search = SearchOptions(restarts=0, tolerance=0.29)
+    assert solve_iteratively(ARM, far.rows(slice(0, 1)), search=search).reason(0) == (
         "no solution from the start; nearest: 0.3 m away, allowed: 0.29 m along each axis"
     )
+    pose = forward_targets(ARM, np.array([[0.0, 0.0]]))
+    pose.position[:] += 0.1
+    reason = there(solve_iteratively(ARM, pose, search=SearchOptions(restarts=1)).reason(0))
+    assert reason.startswith("no solution in 1 restart; nearest: 0.1")
+    assert reason.endswith(" rad away")
 
 
 @pytest.mark.parametrize("every", [True, False])
@@ -243,11 +214,8 @@ def test_of_all_attempts_the_one_that_came_nearest_counts(every: bool) -> None:
 
 
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
-    arm = planar(0.5, 0.4)
     targets = Targets(np.array([[0.903, 0.0, 0.0], [0.91, 0.0, 0.0], [0.5, 0.1, 0.0]]))
-    found = solve_iteratively(
-        arm, targets, start=np.array([0.1, 0.2]), search=SearchOptions(tolerance=0.0035)
-    )
+    found = solve_iteratively(ARM, targets, start=np.array([0.1, 0.2]), search=NEAR)
     assert found.reached[:, 0].tolist() == [True, False, True]
     np.testing.assert_allclose(found.shortfall[:, 0], [0.003, 0.0, 0.0], atol=1e-9)
     assert found.labels[:, 0].tolist() == [NEAREST_POINT, "1", "1"]
@@ -257,26 +225,17 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
 
 def test_a_nearest_pose_that_is_turned_too_far_is_none() -> None:
     """The point is met only with another orientation: the arm in the plane cannot tilt its tool."""
-    arm = planar(0.5, 0.4)
-    tilted = forward_targets(arm, np.array([[0.3, 0.8]]))
-    c, s = math.cos(0.1), math.sin(0.1)
-    tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-    found = solve_iteratively(
-        arm, replace(tilted, rotation=tilt @ tilted.rotation), search=SearchOptions(tolerance=0.0035)
-    )
+    tilted = forward_targets(ARM, np.array([[0.3, 0.8]]))
+    tilt: FloatArray = np.array(rotation_about((1.0, 0.0, 0.0), 0.1).rotation)
+    found = solve_iteratively(ARM, replace(tilted, rotation=tilt @ tilted.rotation), search=NEAR)
     assert found.reason(0) is not None
 
 
 def test_a_target_that_is_not_finite_has_a_reason_and_stops_no_other() -> None:
-    chain = load_robot("urm6")
-    targets = forward_targets(chain, joints_within(chain, 3, 6))
+    targets = forward_targets(URM6, joints_within(URM6, 3, 6))
     targets.position[1, 2] = np.inf
-    found = solve_iteratively(chain, targets)
+    found = solve_iteratively(URM6, targets)
     assert found.reached[:, 0].tolist() == [True, False, True]
     assert found.reason(1) == "the target is not finite, allowed: finite numbers"
-
-
-def test_no_targets_have_no_solutions() -> None:
-    chain = load_robot("urm6")
-    found = solve_iteratively(chain, Targets(np.empty((0, 3)), np.empty((0, 3, 3))), every=True)
-    assert found.q.shape == (0, 1, 6)
+    nothing = solve_iteratively(URM6, Targets(np.empty((0, 3)), np.empty((0, 3, 3))), every=True)
+    assert nothing.q.shape == (0, 1, 6)

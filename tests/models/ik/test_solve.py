@@ -1,24 +1,25 @@
-"""The entry for targets: closed form or iterative, starts, limits, invalid targets, options."""
+"""The entry for targets: closed form or iterative, starts, limits, invalid targets."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from asserting import refusal, there
+from asserting import there
+from closed_forms import assert_solved, distances
 from ik_arms import joints_within, limited
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import OptionError
 from urmpipe_models.ik.limits import joint_limits
 from urmpipe_models.ik.solutions import SearchOptions, Solutions, Targets, forward_targets, pose_errors
-from urmpipe_models.ik.solve import Method, solve
+from urmpipe_models.ik.solve import solve
 from urmpipe_models.robots.catalogue import load_robot
 
-MET = 1e-9  # what the iterative solver stops at; the closed forms are at 1e-12
+UR5E = load_robot("ur5e")
 
 
 def poses(chain: Chain, count: int, seed: int = 0) -> tuple[FloatArray, Targets]:
@@ -26,66 +27,65 @@ def poses(chain: Chain, count: int, seed: int = 0) -> tuple[FloatArray, Targets]
     return q, forward_targets(chain, q)
 
 
-def assert_met(chain: Chain, targets: Targets, found: Solutions, within: float = MET) -> None:
-    row, column = np.nonzero(found.reached)
-    position, angle = pose_errors(chain, found.q[row, column], targets.rows(row))
-    assert np.abs(position).max(initial=0.0) < within
-    assert np.abs(angle).max(initial=0.0) < within
+def solved(chain: Chain, targets: Targets, **options: Any) -> Solutions:
+    """Solve targets, and assert that every solution is within limits and meets its target or has a reason."""
+    found = solve(chain, targets, **options)
+    assert_solved(chain, targets, found, 1e-9)  # the iterative solver stops there; closed forms: 1e-12
     lower, upper = joint_limits(chain)
-    assert ((found.q[row, column] >= lower) & (found.q[row, column] <= upper)).all()
+    q = found.q[found.reached]
+    assert ((q >= lower) & (q <= upper)).all()
+    return found
 
 
 @pytest.mark.parametrize("name", ["ur5e", "urm6", "arm6"])
 def test_joints_that_a_pose_came_from_are_found_from_near_by(name: str) -> None:
     chain = load_robot(name)
     q, targets = poses(chain, 20)
-    found = solve(chain, targets, start=q + 1e-3)
+    found = solved(chain, targets, start=q + 1e-3)
     assert found.q.shape == (20, 1, 6)
-    assert_met(chain, targets, found)
     # an iterative solution is the pose's to 1e-9; the joints near singular poses follow to less
     np.testing.assert_allclose(found.q[:, 0], q, atol=1e-5)
 
 
 def test_one_solution_is_the_nearest_of_all_and_keeps_the_name_of_its_branch() -> None:
-    chain = load_robot("ur5e")
-    _, targets = poses(chain, 50)
+    _, targets = poses(UR5E, 50)
     start = np.full(6, 0.4)
-    one, every = solve(chain, targets, start=start), solve(chain, targets, start=start, every=True)
-    assert one.branches == ("nearest",) and len(every.branches) == 8
+    nearest, every = solve(UR5E, targets, start=start), solve(UR5E, targets, start=start, every=True)
+    assert nearest.branches == ("nearest",) and len(every.branches) == 8
     distance = np.where(every.reached, np.square(every.q - start).sum(axis=2), np.inf)
     best = distance.argmin(axis=1)
-    np.testing.assert_array_equal(one.q[:, 0], every.q[np.arange(50), best])
-    assert one.labels[:, 0].tolist() == [every.branches[k] for k in best]
-    assert len(set(one.labels[:, 0])) > 2
+    np.testing.assert_array_equal(nearest.q[:, 0], every.q[np.arange(50), best])
+    assert nearest.labels[:, 0].tolist() == [every.branches[k] for k in best]
+    assert len(set(nearest.labels[:, 0])) > 2
+    # a tolerance changes nothing where the target is met
+    within = solve(UR5E, targets, start=start, search=SearchOptions(tolerance=0.01))
+    np.testing.assert_array_equal(nearest.q, within.q)
 
 
 def test_a_joint_that_a_singular_pose_leaves_free_is_taken_from_the_start() -> None:
-    chain = load_robot("ur5e")
     q = np.array([0.3, -1.0, 1.2, -0.5, 0.0, 0.8])  # an aligned wrist: q6 is free
-    targets = forward_targets(chain, q[None])
-    np.testing.assert_allclose(solve(chain, targets, start=q).q[0, 0], q, atol=1e-9)
-    every = solve(chain, targets, start=q, every=True)
-    assert np.abs(every.q[0] - q).max(axis=1)[every.reached[0]].min() < 1e-9
-    assert [one.chosen[:24] for one in every.singular] == ["wrist_3_joint as near, a"]
+    targets = forward_targets(UR5E, q[None])
+    np.testing.assert_allclose(solve(UR5E, targets, start=q).q[0, 0], q, atol=1e-9)
+    every = solve(UR5E, targets, start=q, every=True)
+    assert distances(UR5E, every, q[None]).min() < 1e-9
     # all solutions without a start: by the convention, not by the robot's own start
-    turned = replace(chain, start=(*chain.start[:5], 0.8))
-    (aligned,) = solve(turned, targets, every=True).singular
-    assert aligned.chosen.startswith("wrist_3_joint = 0, and pi more for the flipped wrist")
-    (aligned,) = solve(turned, targets).singular
-    assert aligned.chosen.startswith("wrist_3_joint as near")
+    turned = replace(UR5E, start=(*UR5E.start[:5], 0.8))
+    without = [solve(turned, targets, every=True), solve(turned, targets)]
+    assert [pose.chosen[:24] for found in (every, *without) for pose in found.singular] == [
+        "wrist_3_joint as near, a", "wrist_3_joint = 0, and p", "wrist_3_joint as near, a"
+    ]  # fmt: skip
 
 
 def test_solutions_are_in_the_turn_nearest_to_the_start_that_the_limits_allow() -> None:
-    chain = load_robot("ur5e")
-    q, targets = poses(chain, 20)
-    start = q + np.array([2.0 * math.pi, 0.0, 0.0, 0.0, 0.0, 2.0 * math.pi]) * np.where(q < 0.0, 1.0, -1.0)
-    found = solve(chain, targets, start=start)
-    np.testing.assert_allclose(found.q[:, 0], start, atol=1e-8)
-    home = np.array([chain.start])  # the start by default; three singular families meet there
-    np.testing.assert_allclose(solve(chain, forward_targets(chain, home)).q[0], home, atol=1e-7)
-    beyond = solve(chain, targets, start=start + 4.0 * math.pi)
-    assert_met(chain, targets, beyond)
+    q, targets = poses(UR5E, 20)
+    start = q + 2.0 * math.pi * np.array([1, 0, 0, 0, 0, 1]) * np.where(q < 0.0, 1.0, -1.0)
+    np.testing.assert_allclose(solve(UR5E, targets, start=start).q[:, 0], start, atol=1e-8)
+    home = np.array([UR5E.start])  # the start by default; three singular families meet there
+    np.testing.assert_allclose(solve(UR5E, forward_targets(UR5E, home)).q[0], home, atol=1e-7)
+    beyond = solved(UR5E, targets, start=start + 4.0 * math.pi)
     assert beyond.reached.all() and (beyond.q[:, 0] > -1e-9).all()  # the last turn that +-2 pi allows
+    narrow = limited(UR5E, -2.0, 2.0)
+    assert solved(narrow, poses(narrow, 5)[1], start=np.full(6, 50.0)).reached.all()  # a start outside
 
 
 @pytest.mark.parametrize(
@@ -103,54 +103,37 @@ def test_where_limits_refuse_the_choice_of_a_free_joint_they_choose(
     chain = limited(load_robot(name), -limit, limit)
     targets = forward_targets(chain, np.array([q]))
     for start in (None, np.zeros(6), np.array(q)):
-        found = solve(chain, targets, start=start, every=True)
-        assert found.reached.any()
-        assert_met(chain, targets, found)
-        assert ((found.reasons != "") == ~found.reached).all()
-        aligned = [one for one in found.singular if one.family == "wrist aligned"]
-        assert aligned and (aligned[0].where & found.reached).any()
-        if start is None:
-            assert aligned[0].chosen.endswith(", or what the limits of the joints allow")
+        found = solved(chain, targets, start=start, every=True)
+        (aligned,) = [pose for pose in found.singular if pose.family == "wrist aligned"]
+        assert (aligned.where & found.reached).any()
+        assert start is not None or aligned.chosen.endswith(", or what the limits of the joints allow")
         distinct = np.round(found.q[0][found.reached[0]], 4)
         assert len(np.unique(distinct, axis=0)) == len(distinct)
-    here = solve(chain, targets, start=np.array(q))
-    np.testing.assert_allclose(here.q[0, 0], q, atol=1e-9)
+    np.testing.assert_allclose(solve(chain, targets, start=np.array(q)).q[0, 0], q, atol=1e-9)
 
 
 def test_limits_leave_out_branches_and_say_which_joint() -> None:
-    chain = limited(load_robot("ur5e"), -1.5, 1.5)
-    _, targets = poses(chain, 200)
-    found = solve(chain, targets, every=True)
-    assert_met(chain, targets, found)
+    chain = limited(UR5E, -1.5, 1.5)
+    found = solved(chain, poses(chain, 200)[1], every=True)
     assert found.reached.any(axis=1).all() and not found.reached.all()
     texts = {text.split(" at ")[0] for text in found.reasons.ravel() if text.startswith("joint")}
     assert texts == {f"joint {name}" for name in chain.coordinates}
 
 
-def bad_targets(chain: Chain) -> Targets:
-    """Seven targets of which the first and the last are good."""
-    _, targets = poses(chain, 7)
-    position, rotation = targets.position.copy(), there(targets.rotation).copy()
-    position[1, 2] = np.nan
-    position[2, 0] = np.inf
-    rotation[3] *= 1.01
-    rotation[4, :, 0] *= -1.0
-    rotation[5, 0, 0] = np.nan
-    return Targets(position, rotation)
-
-
-@pytest.mark.parametrize("name", ["ur5e", "urm6"])
-@pytest.mark.parametrize("every", [False, True])
+@pytest.mark.parametrize(("name", "every"), [("ur5e", True), ("urm6", False), ("urm6", True)])
 def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) -> None:
     chain = load_robot(name)
-    targets = bad_targets(chain)
-    found = solve(chain, targets, every=every, search=SearchOptions(restarts=40 if name == "urm6" else 0))
+    _, targets = poses(chain, 7)
     good = targets.rows(np.array([0, 6]))
-    alone = solve(chain, good, every=every, search=SearchOptions(restarts=40 if name == "urm6" else 0))
+    position, rotation = targets.position, there(targets.rotation)
+    position[1, 2], position[2, 0], rotation[5, 0, 0] = np.nan, np.inf, np.nan
+    rotation[3] *= 1.01
+    rotation[4, :, 0] *= -1.0
+    search = SearchOptions(restarts=40 if name == "urm6" else 0)
+    found, alone = (solve(chain, these, every=every, search=search) for these in (targets, good))
     np.testing.assert_allclose(found.q[[0, 6]], alone.q, atol=1e-9)
     assert alone.reached.any(axis=1).all()
-    x, y = (f"{value:g}" for value in targets.position[1, :2])
-    below, z = (f"{value:g}" for value in targets.position[2, 1:])
+    (x, y, _), (_, below, z) = ([f"{value:g}" for value in position[row]] for row in (1, 2))
     assert [found.reason(row) for row in range(7)] == [
         None,
         f"the position is {x}, {y}, nan m, allowed: finite numbers",
@@ -163,79 +146,57 @@ def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) ->
     assert len(found) == 7 and found.shortfall.shape == found.labels.shape == found.reasons.shape
 
 
-@pytest.mark.parametrize("far", [1.1e9, 1e160, -1e308])
 @pytest.mark.parametrize("name", ["ur5e", "arm6", "urm6"])
-def test_a_position_beyond_all_digits_stops_no_other(name: str, far: float) -> None:
+def test_a_position_beyond_all_digits_stops_no_other_and_there_may_be_no_target(name: str) -> None:
     chain = load_robot(name)
     q, targets = poses(chain, 1)
-    position = np.vstack((targets.position, [0.1, far, 0.3]))
-    both = Targets(position, np.repeat(there(targets.rotation), 2, axis=0))
-    found = solve(chain, both, start=q[0])
-    assert found.reached[:, 0].tolist() == [True, False]
-    assert found.reason(1) == (f"the position is 0.1, {far:g}, 0.3 m, allowed: up to 1e+09 m along each axis")
+    far = np.array([1.1e9, 1e160, -1e308])
+    position = np.vstack((targets.position, np.column_stack((0.1 + 0 * far, far, 0.3 + 0 * far))))
+    found = solve(chain, Targets(position, np.repeat(there(targets.rotation), 4, axis=0)), start=q[0])
+    assert found.reached[:, 0].tolist() == [True, False, False, False]
+    for row, y in enumerate(far, start=1):
+        text = f"the position is 0.1, {y:g}, 0.3 m, allowed: up to 1e+09 m along each axis"
+        assert found.reason(row) == text
+    nothing = Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2))
+    found = solve(chain, nothing)
+    assert len(found) == 2 and not found.reached.any()
+    assert found.reason(1) == "the position is nan, nan, nan m, allowed: finite numbers"
+    assert len(solve(chain, Targets(np.empty((0, 3)), np.empty((0, 3, 3))))) == 0
 
 
 def test_a_bad_target_before_a_singular_one_leaves_the_family_where_it_is() -> None:
-    chain = load_robot("ur5e")
-    targets = forward_targets(
-        chain, np.array([[0.3, -1.0, 1.2, -0.5, 1.0, 0.8], [0.3, -1.0, 1.2, -0.5, 0.0, 0.8]])
-    )
-    position = np.vstack((np.full((1, 3), math.nan), targets.position))
-    found = solve(chain, Targets(position, np.vstack((np.eye(3)[None], there(targets.rotation)))), every=True)
+    targets = forward_targets(UR5E, np.array([[0.3, -1.0, 1.2, -0.5, q5, 0.8] for q5 in (0.5, 1.0, 0.0)]))
+    targets.position[0] = math.nan
+    found = solve(UR5E, targets, every=True)
     assert [found.families(row) for row in range(3)] == [[], [], ["wrist aligned"]]
 
 
-def test_only_bad_targets_are_no_error() -> None:
-    for name in ("ur5e", "urm6"):
-        found = solve(load_robot(name), Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2)))
-        assert len(found) == 2 and not found.reached.any()
-        assert found.reason(1) == "the position is nan, nan, nan m, allowed: finite numbers"
-
-
-def test_no_targets_give_no_solutions() -> None:
-    empty = Targets(np.empty((0, 3)), np.empty((0, 3, 3)))
-    for name in ("ur5e", "arm6", "urm6"):
-        assert len(solve(load_robot(name), empty)) == 0
-
-
 def test_a_rotation_written_with_seven_digits_is_the_nearest_rotation() -> None:
-    chain = load_robot("ur5e")
-    q, targets = poses(chain, 20)
+    q, targets = poses(UR5E, 20)
     written = Targets(targets.position, np.round(there(targets.rotation), 7))
-    found = solve(chain, written, start=q)
+    found = solve(UR5E, written, start=q)
     assert found.reached.all()
-    position, angle = pose_errors(chain, found.q[:, 0], targets)
+    position, angle = pose_errors(UR5E, found.q[:, 0], targets)
     assert np.abs(position).max() < 1e-12  # position is kept exactly, and the orientation to its digits
     assert 1e-9 < np.abs(angle).max() < 2e-7
 
 
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
-    chain = load_robot("ur5e")
     q = np.array([0.3, -math.pi / 2, 0.0, -math.pi / 2, 1.2, 0.2])  # stretched straight up
-    targets = forward_targets(chain, q[None])
-    above = targets.position + np.array([[0.0, 0.0, 0.002], [0.0, 0.0, 0.2]])
-    out = Targets(above, np.repeat(there(targets.rotation), 2, axis=0))
-    refused = solve(chain, out, start=q)
-    assert not refused.reached.any()
-    found = solve(chain, out, start=q, search=SearchOptions(tolerance=0.0035))
+    targets = forward_targets(UR5E, np.array([q, q]))
+    targets.position[:, 2] += [0.002, 0.2]
+    assert not solve(UR5E, targets, start=q).reached.any()
+    found = solve(UR5E, targets, start=q, search=SearchOptions(tolerance=0.0035))
     assert found.reached[:, 0].tolist() == [True, False]
     assert found.labels[0, 0] == "nearest point"
-    position, _ = pose_errors(chain, found.q[:1, 0], out.rows(slice(0, 1)))
+    position, _ = pose_errors(UR5E, found.q[:1, 0], targets.rows(slice(0, 1)))
     assert np.abs(position).max() <= 0.0035
     np.testing.assert_allclose(found.shortfall[0, 0], np.linalg.norm(position), rtol=1e-6)
     assert found.shortfall[0, 0] > 1e-4 and found.shortfall[1, 0] == 0.0
-    assert found.reason(1) is not None and "from axis" in str(found.reason(1))
-    every = solve(chain, out, start=q, every=True, search=SearchOptions(tolerance=0.0035))
+    assert "from axis" in there(found.reason(1))
+    every = solve(UR5E, targets, start=q, every=True, search=SearchOptions(tolerance=0.0035))
     assert every.reached.sum(axis=1).tolist() == [1, 0]
     assert every.labels[0, 0] == "nearest point"
-
-
-def test_a_tolerance_changes_nothing_where_the_target_is_met() -> None:
-    chain = load_robot("ur5e")
-    _, targets = poses(chain, 20)
-    np.testing.assert_array_equal(
-        solve(chain, targets).q, solve(chain, targets, search=SearchOptions(tolerance=0.01)).q
-    )
 
 
 @pytest.mark.parametrize("name", ["ur5e", "arm6"])
@@ -254,58 +215,5 @@ def test_positions_and_redundant_arms_are_solved_iteratively(name: str, pose: bo
     chain = load_robot(name)
     _, targets = poses(chain, 5)
     targets = targets if pose else Targets(targets.position)
-    found = solve(chain, targets, search=SearchOptions(restarts=40))
+    found = solved(chain, targets, search=SearchOptions(restarts=40))
     assert found.reached.all() and found.q.shape == (5, 1, len(chain.coordinates))
-    assert_met(chain, targets, found)
-
-
-def test_a_start_outside_the_limits_is_a_place_to_be_near_to() -> None:
-    chain = limited(load_robot("ur5e"), -2.0, 2.0)
-    _, targets = poses(chain, 5)
-    found = solve(chain, targets, start=np.full(6, 50.0))
-    assert_met(chain, targets, found)
-    assert found.reached.all()
-
-
-def test_everything_wrong_with_the_options_is_told_at_once() -> None:
-    chain = load_robot("urm6")
-    _, targets = poses(chain, 2)
-    odd: Method = "exact"  # type: ignore[assignment]
-    search = SearchOptions(tolerance=-1.0, restarts=-2, seed=-1)
-    with pytest.raises(OptionError) as caught:
-        solve(chain, targets, start=np.zeros(5), method=odd, search=search)
-    assert [str(one) for one in caught.value.findings] == [
-        f"start: found values of shape (5,), allowed: (6,), one each of {', '.join(chain.coordinates)},"
-        " or (2, 6), as many for each target",
-        *map(str, search.faults()),
-        "method: found 'exact', allowed: auto, closed, iterative",
-    ]
-    with pytest.raises(OptionError) as caught:
-        solve(chain, targets, start=np.array([0, 0, 0, 0, 0, math.nan]), method="closed")
-    assert [str(one) for one in caught.value.findings] == [
-        "start: found a value that is not finite, allowed: finite numbers in rad and m",
-        "method: robot urm6 has no closed form, allowed: closed for six joints whose last three axes meet in"
-        ' a point or whose axes 2, 3 and 4 are parallel, exactly or nearly; method="iterative" searches',
-    ]
-
-
-def test_a_closed_form_needs_poses() -> None:
-    assert refusal(OptionError, solve, load_robot("ur5e"), Targets(np.zeros((1, 3))), method="closed") == (
-        "method: positions with any orientation have no closed form, allowed: closed for poses;"
-        ' method="iterative" searches'
-    )
-
-
-@pytest.mark.parametrize(
-    ("targets", "text"),
-    [
-        (Targets(np.zeros(3)), "targets: found positions of shape (3,), allowed: (n, 3)"),
-        (Targets(np.zeros((2, 2))), "targets: found positions of shape (2, 2), allowed: (n, 3)"),
-        (
-            Targets(np.zeros((2, 3)), np.zeros((3, 3, 3))),
-            "targets: found rotations of shape (3, 3, 3) for 2 positions, allowed: (2, 3, 3)",
-        ),
-    ],
-)
-def test_targets_of_another_shape_are_refused(targets: Targets, text: str) -> None:
-    assert refusal(OptionError, solve, load_robot("ur5e"), targets) == text
