@@ -10,30 +10,10 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from urmpipe_models.arm.chain import (
-    Box,
-    Capsule,
-    Chain,
-    Cylinder,
-    Inertial,
-    Joint,
-    JointKind,
-    Mesh,
-    Mimic,
-    Shape,
-    Sphere,
-    Visual,
-)
+from urmpipe_models import drives as driving
+from urmpipe_models.arm import chain as arms
+from urmpipe_models.arm.chain import Chain, Inertial, Joint, JointKind, Shape, Visual
 from urmpipe_models.arm.denavit_hartenberg import DHRow
-from urmpipe_models.drives import (
-    NO_SPRING,
-    CounterbalanceSpring,
-    Drive,
-    DrivenJoint,
-    Gains,
-    JointDrive,
-    PassiveJoint,
-)
 from urmpipe_models.math3d import Transform, from_offset
 
 lengths = st.floats(-1.0, 1.0, allow_subnormal=False)
@@ -44,7 +24,6 @@ kinds: SearchStrategy[JointKind] = st.sampled_from(["revolute", "prismatic"])
 texts = st.text(
     st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"), max_size=20
 )
-
 
 # Strategies are made once: what they are made of is checked anew for each that is made while drawing.
 frames = st.just(Transform()) | st.tuples(lengths, lengths, lengths, angles, angles, angles).map(from_offset)
@@ -73,7 +52,7 @@ def drawn_joint(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
     kind = "revolute" if kind == "fixed" else kind
     mimic = None
     if leaders and bool(draw(one_in_four)):
-        mimic = Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
+        mimic = arms.Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
     lower, upper = draw(limits)
     most = draw(rates), draw(rates), draw(rates)
     return Joint(name, kind, draw(frames), draw(axes), lower, upper, *most, mimic)
@@ -82,8 +61,7 @@ def drawn_joint(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
 @st.composite
 def random_chains(draw: DrawFn) -> Chain:
     """A chain of one to seven joints of every kind, mimics and sensor frames among them."""
-    chosen: list[Joint] = []
-    leaders: list[str] = []
+    chosen, leaders = list[Joint](), list[str]()
     for k in range(draw(counts)):
         joint = drawn_joint(draw, f"j{k}", leaders)
         chosen.append(joint)
@@ -112,13 +90,17 @@ def inertials(draw: DrawFn, joint: str | None) -> Inertial:
 
 
 @st.composite
-def drives(draw: DrawFn, joint: str) -> JointDrive:
-    """A joint that is held, or one with a drive and a controller."""
+def drives(draw: DrawFn, joint: str) -> driving.JointDrive:
+    """A passive joint, or one with a drive and a controller."""
     if draw(st.booleans()):
-        return PassiveJoint(joint, draw(above_zero), draw(above_zero))
-    drive, gains = Drive(*(draw(above_zero) for _ in range(7))), Gains(*(draw(lengths) for _ in range(3)))
-    spring = CounterbalanceSpring(draw(above_zero), draw(lengths)) if draw(st.booleans()) else NO_SPRING
-    return DrivenJoint(joint, drive, draw(above_zero), gains, draw(above_zero), spring)
+        return driving.PassiveJoint(joint, draw(above_zero), draw(above_zero))
+    drive = driving.Drive(*(draw(above_zero) for _ in range(7)))
+    gains = driving.Gains(*(draw(lengths) for _ in range(3)))
+    has_spring = draw(st.booleans())
+    spring = (
+        driving.CounterbalanceSpring(draw(above_zero), draw(lengths)) if has_spring else driving.NO_SPRING
+    )
+    return driving.DrivenJoint(joint, drive, draw(above_zero), gains, draw(above_zero), spring)
 
 
 @st.composite
@@ -137,12 +119,12 @@ sizes = st.floats(0.0, 2.0)
 factors = st.floats(-2.0, 2.0)
 shares = st.floats(0.0, 1.0)
 shapes: SearchStrategy[Shape] = st.one_of(
-    st.builds(Box, st.tuples(sizes, sizes, sizes)),
-    st.builds(Cylinder, sizes, sizes),
-    st.builds(Capsule, sizes, sizes),
-    st.builds(Sphere, sizes),
+    st.builds(arms.Box, st.tuples(sizes, sizes, sizes)),
+    st.builds(arms.Cylinder, sizes, sizes),
+    st.builds(arms.Capsule, sizes, sizes),
+    st.builds(arms.Sphere, sizes),
     st.builds(
-        Mesh,
+        arms.Mesh,
         st.sampled_from(["file:///nowhere/a%20b.stl", "package://p/b & c.obj"]),
         st.tuples(factors, factors, factors),
     ),

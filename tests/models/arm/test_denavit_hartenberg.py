@@ -54,37 +54,32 @@ def homogeneous(frame: Transform) -> FloatArray:
     return result
 
 
+MATRICES = pytest.mark.parametrize(
+    ("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)], ids=["standard", "modified"]
+)
+
+
 @pytest.mark.slow
 @settings(max_examples=50, deadline=None)
-@pytest.mark.parametrize(("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)])
+@MATRICES
 @given(data=st.data())
 def test_the_tip_is_the_product_of_the_matrices(
     build: Any, matrix: Any, dh_rows: SearchStrategy[list[DHRow]], data: st.DataObject
 ) -> None:
+    """And the points of a standard arm are the origins of its frames."""
     rows = data.draw(dh_rows)
     q = data.draw(st.lists(st.floats(-4.0, 4.0), min_size=len(rows), max_size=len(rows)))
     base, tool = from_offset([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]), from_offset([0.0, 0.0, 0.15])
-    chain = build("arm", rows, base=base, tool=tool)
+    *_, tip = points = forward(build("arm", rows, base=base, tool=tool), q)
     expected = homogeneous(base)
-    for row, value in zip(rows, q, strict=True):
+    for row, value, point in zip(rows, q, points, strict=True):
         expected = expected @ matrix(row, value)
-    got = homogeneous(forward(chain, q)[-1])
-    np.testing.assert_allclose(got, expected @ homogeneous(tool), rtol=0.0, atol=ROUNDING)
+        if matrix is standard and point is not tip:
+            np.testing.assert_allclose(point.translation, expected[:3, 3], rtol=0.0, atol=ROUNDING)
+    np.testing.assert_allclose(homogeneous(tip), expected @ homogeneous(tool), rtol=0.0, atol=ROUNDING)
 
 
-@pytest.mark.slow
-@given(data=st.data())
-def test_the_points_of_a_standard_arm_are_its_frames_origins(
-    dh_rows: SearchStrategy[list[DHRow]], data: st.DataObject
-) -> None:
-    rows = data.draw(dh_rows)
-    expected = np.eye(4)
-    for row, point in zip(rows, forward(dh_chain("arm", rows), [0.3] * len(rows)), strict=True):
-        expected = expected @ standard(row, 0.3)
-        np.testing.assert_allclose(point.translation, expected[:3, 3], rtol=0.0, atol=ROUNDING)
-
-
-@pytest.mark.parametrize(("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)])
+@MATRICES
 def test_a_fixed_row_is_its_matrix_and_takes_no_coordinate(build: Any, matrix: Any) -> None:
     rows = [
         DHRow(0.1, 0.2, 0.3, 0.4),
