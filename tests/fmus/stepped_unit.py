@@ -41,9 +41,13 @@ class SteppedUnit(Instance):
 
     def read(self, *names: str) -> FloatArray:
         """Return variables, one after the other."""
+        references = [self.reference(scalar) for scalar in self.scalars(*names)]
+        return np.array(self.get(references), dtype=np.float64)
+
+    def scalars(self, *names: str) -> list[str]:
+        """Return the names of the scalars of variables."""
         variables = {one.name: one.names for one in self.model.variables}
-        scalars = [scalar for name in names for scalar in variables[name]]
-        return np.array(self.get([self.reference(scalar) for scalar in scalars]), dtype=np.float64)
+        return [scalar for name in names for scalar in variables[name]]
 
     def steps(self, count: int, step: float) -> None:
         """Take steps from the time 0 on."""

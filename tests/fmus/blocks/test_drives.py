@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drive_oracle import DAMPING, I1, K, L, motor_after
+from drive_oracle import I1, K, L, motor_after
 from stepped_unit import SteppedUnit
 from urmpipe_fmus.block import BlockModel, State, Values
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.run import run
-from urmpipe_models.drives import ramp, step, trapezoid
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import UnitError
 
 STEP = 0.04
 HALVINGS = [2e-3 / 2**n for n in range(5)]
@@ -97,16 +95,6 @@ def test_the_energy_balance_closes_with_the_fourth_power_of_the_internal_step() 
     assert orders(open_by)[1:] == pytest.approx(4.0, abs=0.2), open_by
 
 
-def test_torque_and_acceleration_are_those_of_the_driven_end() -> None:
-    unit = SteppedUnit("dc_drive", {"theta1": 0.3, "omega1": 2.0})
-    # the same sums in another order: the rounding of the last place
-    assert unit.read("Mk")[0] == pytest.approx(K * 0.3 + DAMPING * 2.0, rel=1e-15)
-    unit.put(theta2=0.1, omega2=1.0)
-    torque, acceleration = unit.read("Mk", "alpha1")
-    assert torque == pytest.approx(K * 0.2 + DAMPING * 1.0, rel=1e-15)
-    assert acceleration == pytest.approx(-torque / I1, rel=1e-15)
-
-
 def test_over_a_log_the_inputs_are_held_from_sample_to_sample() -> None:
     rng = np.random.default_rng(3)
     limits = {"u": 24.0, "theta2": 0.1, "omega2": 1.0}
@@ -120,109 +108,11 @@ def test_over_a_log_the_inputs_are_held_from_sample_to_sample() -> None:
         np.testing.assert_allclose([found[name][k + 1] for name in MOTOR], state, rtol=1e-8)
 
 
-def test_a_step_that_diverges_is_refused_and_undone() -> None:
-    unit = SteppedUnit("dc_drive", BEGIN | {"internal_step": 1.0, "L": 1e-9})
-    before = unit.save()
-    with pytest.raises(UnitError, match=r"unit dc_drive: state .* is not finite"):
-        unit.do_step(0.0, 100.0)
-    assert unit.save()[2] == before[2]
-    assert unit.time == 0.0
-
-
-GAINS = {"Kphi": 1.0, "Kw": 0.0, "Keps": 0.0}
-
-
-def test_at_a_sample_the_voltage_follows_its_inputs_without_delay_and_then_is_held() -> None:
-    unit = SteppedUnit("drive_controller", GAINS)
-    for angle in (2.0, 3.0):
-        unit.put(set_theta=angle)
-        assert unit.read("u")[0] == angle
-    unit.do_step(0.0, 1e-3)
-    unit.put(set_theta=50.0)
-    assert unit.read("u")[0] == 3.0
-    for k in range(1, 5):
-        unit.do_step(k * 1e-3, 1e-3)
-    assert unit.read("u")[0] == 3.0 + 50.0 - 5.0  # limited to 48: the sample at 5 ms
-
-
 @pytest.mark.parametrize("parts", [1, 2, 5, 7])
 def test_the_communication_step_changes_no_sample(parts: int) -> None:
+    gains = {"Kphi": 1.0, "Kw": 0.0, "Keps": 0.0}
     t = 5e-3 / parts * np.arange(200 * parts + 1, dtype=np.float64)
-    found = run(make_block("drive_controller"), t, {"set_theta": np.sin(17.0 * t)}, GAINS)["u"]
+    found = run(make_block("drive_controller"), t, {"set_theta": np.sin(17.0 * t)}, gains)["u"]
     samples = np.cumsum(np.sin(17.0 * np.arange(201) * 5e-3))
     # The limit is not met; the times of a sample differ in their last bit.
     np.testing.assert_allclose(found, np.repeat(samples, parts)[: len(t)], rtol=0.0, atol=1e-10)
-
-
-def test_eq_20_weighs_the_three_errors_and_keeps_within_the_limit() -> None:
-    unit = SteppedUnit("drive_controller", {"last": 10.0})
-    unit.put(set_theta=1.0, set_omega=2.0, set_alpha=30.0, real_theta=0.5, real_omega=3.0, real_alpha=10.0)
-    # the same sum in another order: the rounding of the last place
-    assert unit.read("u")[0] == pytest.approx(10.0 + 7.5 * 0.5 - 0.75 * 1.0 + 0.01 * 20.0, rel=1e-15)
-    for sign in (1.0, -1.0):
-        unit.put(set_theta=sign * 1e6)
-        assert unit.read("u")[0] == sign * 48.0
-
-
-def test_going_back_takes_the_same_sample_again() -> None:
-    unit = SteppedUnit("drive_controller", GAINS | {"set_theta": 2.0})
-    unit.do_step(0.0, 5e-3)
-    saved = unit.save()
-    first = unit.read("u")[0]
-    unit.do_step(5e-3, 5e-3)
-    unit.restore(saved)
-    assert unit.read("u")[0] == first == 4.0
-
-
-TIMES = np.linspace(0.0, 2.0, 41)
-
-
-def moved_inertia(start: dict[str, float], **torques: float) -> dict[str, FloatArray]:
-    inputs = {name: np.full(len(TIMES), torque) for name, torque in torques.items()}
-    return run(make_block("inertia"), TIMES, inputs, start)
-
-
-def test_without_friction_a_constant_torque_makes_a_parabola() -> None:
-    found = moved_inertia({"J": 4.0}, tau=3.0, tau_ext=-1.0)
-    # RK4 is exact for it; sums of 4000 internal steps round.
-    np.testing.assert_allclose(found["theta"], 0.25 * TIMES**2, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(found["omega"], 0.5 * TIMES, rtol=0.0, atol=1e-12)
-    np.testing.assert_array_equal(found["alpha"], 0.5)
-
-
-def test_with_friction_the_speed_nears_torque_over_friction() -> None:
-    found = moved_inertia({"J": 2.0, "d": 4.0, "omega": 3.0, "theta": 1.0}, tau=8.0)
-    decay = np.exp(-2.0 * TIMES)
-    # (h d / J)^5 / 120 a step of 0.5 ms: far below rounding.
-    np.testing.assert_allclose(found["omega"], 2.0 + decay, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(found["theta"], 1.5 + 2.0 * TIMES - 0.5 * decay, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(found["alpha"], -2.0 * decay, rtol=0.0, atol=1e-11)
-
-
-def test_the_acceleration_is_that_of_the_present_torques() -> None:
-    unit = SteppedUnit("inertia")
-    for torque in (5.0, -3.0):
-        unit.put(tau=torque)
-        assert unit.read("alpha")[0] == pytest.approx(torque, rel=1e-15)  # divided by 1: rounding
-
-
-T = np.linspace(0.0, 2.0, 81)
-MOVE = {"begin": 0.25, "initial": 0.5, "target": -1.0, "speed": 1.5, "acceleration": 6.0}
-
-
-KINDS = [
-    step(T, 0.25, 0.5, -1.0),
-    ramp(T, 0.25, 0.5, -1.0, 1.5),
-    trapezoid(T, 0.25, 0.5, -1.0, 1.5, 6.0),
-]
-
-
-@pytest.mark.parametrize("kind", [0, 1, 2])
-def test_each_kind_of_set_point_is_its_form_for_a_log_and_for_an_instance(kind: int) -> None:
-    start = MOVE | {"kind": float(kind)}
-    found, unit = run(make_block("set_point"), T, start=start), SteppedUnit("set_point", start)
-    for name, column in zip(("theta", "omega", "alpha"), KINDS[kind], strict=True):
-        np.testing.assert_array_equal(found[name], column)
-    for k in range(3):
-        assert unit.read("theta", "omega", "alpha").tolist() == [column[k] for column in KINDS[kind]]
-        unit.do_step(float(T[k]), float(T[k + 1] - T[k]))

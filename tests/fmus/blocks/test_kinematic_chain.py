@@ -13,7 +13,7 @@ from sliding_arm import sliding_arm
 from stepped_unit import SteppedUnit
 from urmpipe_fmus.blocks.kinematic_chain import kinematic_chain
 from urmpipe_fmus.run import run
-from urmpipe_models.arm.chain import Chain, Sphere, Visual
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log, points_over_log, positions_over_log
@@ -66,14 +66,6 @@ def test_the_points_of_a_urm_arm_are_those_of_a_log_to_the_last_bit() -> None:
     assert np.array_equal(found["p7"], points_over_log(robot, q)[:, -1])
 
 
-def test_it_starts_at_the_calibration_pose_that_the_paper_prints() -> None:
-    unit = SteppedUnit("kinematic_chain", robot=load_robot("urm6"))
-    assert unit.read("phi").tolist() == [0.0, np.pi, 0.0, np.pi, 0.0, np.pi]
-    assert np.round(unit.read("p7"), 9).tolist() == [0.167397124, 0.0, 1.102644902]
-    assert unit.read("lengths").tolist() == [0.243215, *[0.21243] * 5, 0.042215]
-    assert np.degrees(unit.read("tilts")).round(12).tolist() == [52.0] * 6
-
-
 def test_lengths_and_tilts_are_tuned_while_it_runs() -> None:
     unit, rng = SteppedUnit("kinematic_chain", robot=load_robot("urm4")), np.random.default_rng(5)
     unit.do_step(0.0, 0.005)
@@ -101,33 +93,9 @@ def test_the_frames_of_any_arm_are_tuned() -> None:
     np.testing.assert_allclose(unit.read("p5"), place, rtol=0.0, atol=ROUNDING)
 
 
-def test_an_angle_beyond_a_joints_range_has_its_place() -> None:
-    robot = load_robot("ur5e")
-    assert all(joint.upper < 10.0 for joint in robot.moving)
-    unit = SteppedUnit("kinematic_chain", {"phi": 20.0 * np.pi}, robot=robot)
-    place = positions_over_log(robot, np.zeros((1, 6)))[0]
-    # 20 pi is no multiple of 2 pi in doubles: 1e-14 rad off
-    np.testing.assert_allclose(unit.read("p6"), place, rtol=0.0, atol=1e-13)
-
-
-def test_at_ry_of_a_right_angle_rx_is_0_by_convention() -> None:
-    unit = SteppedUnit("kinematic_chain", robot=urm_chain("wrist", [0.3, 0.1], [np.pi / 2]))
-    for angle in (0.5, 0.2):
-        unit.put(phi=angle)
-        assert unit.read("singular2", "rx2").tolist() == [1.0, 0.0]
-        assert unit.read("rz2")[0] == pytest.approx(angle, rel=0.0, abs=1e-15)
-
-
 def test_an_arm_of_a_urdf_is_taken(shared: Path) -> None:
     robot = load_robot(min((shared / "robots").rglob("*.urdf")))
     q = np.random.default_rng(6).uniform(-1.0, 1.0, (5, len(robot.coordinates)))
     found = run(kinematic_chain(robot), np.linspace(0.0, 1.0, 5, dtype=np.float64), joint_inputs(robot, q))
     last = found[robot.point_names[-1]]
     np.testing.assert_allclose(last, positions_over_log(robot, q), rtol=0.0, atol=ROUNDING)
-
-
-def test_the_visuals_of_an_arm_are_not_in_the_recipe() -> None:
-    model, robot = kinematic_chain(load_robot("urm4")), load_robot("urm4")
-    recipe = kinematic_chain(replace(robot, visuals=(Visual(None, shape=Sphere(0.1)),))).recipe
-    assert recipe == model.recipe
-    assert "visuals" not in recipe.arguments["robot"]

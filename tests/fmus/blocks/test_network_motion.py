@@ -27,21 +27,6 @@ POINTS, TURN = 1000, 2.0 * math.pi
 CLOSED = 1e-9
 """What the issue asks for, in rad and m, against a converged solution."""
 
-FIVE_BAR: dict[str, Any] = {
-    "angle_unit": "deg",
-    "length_unit": "mm",
-    "controls": {"turn": {"start": 60}, "opposite": {"value": "2 * turn - 60"}},
-    "dh": {
-        "closed": True,
-        "elements": {
-            "left": {"kind": "R", "a": 300, "driven": "turn"},
-            "left_elbow": {"kind": "R", "a": 200, "theta": 75},
-            "tip": {"kind": "R", "a": 350, "theta": 90},
-            "right_elbow": {"kind": "R", "a": 350, "theta": 75},
-            "right": {"kind": "R", "a": 200, "value": "opposite"},
-        },
-    },
-}
 DOOR: dict[str, Any] = {
     "angle_unit": "deg",
     "controls": {"opening": {"start": 20}},
@@ -60,31 +45,13 @@ DOOR: dict[str, Any] = {
 }  # fmt: skip
 
 
-def on_circle(radius: float, k: int, shift: float) -> list[float]:
-    """Return one of six points of a circle, which lie in pairs."""
-    angle = k * math.pi / 3.0 + shift * (-1) ** k
-    return [radius * math.cos(angle), radius * math.sin(angle), 0.0]
-
-
-PLATFORM: dict[str, Any] = {
-    "controls": {f"l{k}": {"start": 0.55} for k in range(6)},
-    "bodies": {"plate": {"start": [0, 0, 0.5, 0, 0, 0]}},
-    "elements": {
-        f"leg{k}": {
-            "kind": "gg", "bodies": ["ground", "plate"], "d": f"l{k}",
-            "a": [on_circle(0.4, k, 0.3), on_circle(0.2, k, -0.2)],
-        }
-        for k in range(6)
-    },
-}  # fmt: skip
-"""A platform on six legs with lengths of their own."""
-
 CASES: dict[str, tuple[Any, str, float]] = {
     **{name: (name, "crank", TURN) for name in ("four-bar", "slider-crank", "rssr", "rccc")},
     **{name: (name, "turn", TURN) for name in ("bennett", "bricard", "screw-jack")},
-    "a function of a control": (FIVE_BAR, "turn", 0.7),
+    "geared-five-bar": ("geared-five-bar", "turn", 0.7),
+    "a function of a control": ("nine-revolute-controlled", "turn", 0.2),
     "an arm": (DOOR, "opening", 1.0),
-    "six legs": (PLATFORM, "l2", 0.1),
+    "six legs": ("stewart-gough-driven", "leg2", 0.1),
 }
 """A network, its control that moves, and how far in [rad] or [m]."""
 
@@ -222,10 +189,6 @@ def test_inputs_are_in_rad_and_m_and_start_as_requested() -> None:
     same = make_block("network_motion", network=DOOR, controls={"opening": 30})
     assert same.variables == model.variables
     assert "arm_shoulder_pan_joint" in [one.name for one in model.computed]
-    legs = make_block("network_motion", network=PLATFORM)
-    assert {one.unit for one in legs.inputs} == {"m"}
-    pose = [(one.name, one.size, one.unit) for one in legs.computed[:2]]
-    assert pose == [("plate_p", 3, "m"), ("plate_q", 3, "rad")]
 
 
 def test_start_values_of_joints_choose_the_branch() -> None:
