@@ -18,8 +18,7 @@ from urmpipe_models.drives import Drive, sampled_voltage
 from urmpipe_models.dynamics import driven_arm, equations, links
 from urmpipe_models.robots.catalogue import load_robot
 
-SAME = 1e-12
-"""Of the largest value, as is required: CasADi takes another sine and simplifies."""
+SAME = 1e-12  # of the largest value, as is required: CasADi takes another sine and simplifies
 
 
 def flat(results: Any) -> list[Any]:

@@ -24,8 +24,7 @@ from urmpipe_models.kinematics.forward import point_motions
 from urmpipe_models.math3d import from_offset
 from urmpipe_models.robots.catalogue import load_robot
 
-ROUNDED = 1e-11
-"""Sums of some thousand products, of values up to some hundred."""
+ROUNDED = 1e-11  # sums of some thousand products, of values up to some hundred
 
 
 def seeded_arm(seed: int) -> Chain:

@@ -19,8 +19,7 @@ PERIOD = 5e-3
 MASS, RADIUS = 2.0, 0.5
 GRAVITY = 9.81
 
-EXACT = 1e-7
-"""Of values of about 1: eigenvalues of rates up to 1e3 / s; differences of gravity, 1e-16 / 1e-5."""
+EXACT = 1e-7  # of values of about 1: eigenvalues of rates up to 1e3 / s; differences of gravity, 1e-16 / 1e-5
 
 
 @pytest.mark.parametrize("wrench", [None, Wrench((3.0, 2.0, -1.0), (0.1, 0.2, 0.3))])

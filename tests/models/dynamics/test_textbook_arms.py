@@ -17,18 +17,14 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.math3d import translation
 
-ROUNDED = 1e-12
-"""Some ten products of values up to some hundred."""
+ROUNDED = 1e-12  # some ten products of values up to some hundred
 
 G = 9.81
 UPRIGHT = (0.0, -1.0, 0.0)
 """An axis about which angles count from x towards z: the arm moves in the vertical plane."""
 
-ANGLES = st.lists(st.floats(-4.0, 4.0), min_size=2, max_size=2)
 
-
-L1, L2 = 0.6, 0.25
-"""Upper arm and crank of the parallelogram in [m]."""
+L1, L2 = 0.6, 0.25  # upper arm and crank of the parallelogram in [m]
 
 BODIES = {"q1": (8.0, 0.3, 0.3), "crank": (3.0, -0.1, 0.05), "rod": (2.0, 0.3, 0.07), "q2": (5.0, -0.2, 0.12)}
 """Masses in [kg], centres on the x axes of joints in [m], moments of inertia about y in [kg m2]."""
@@ -64,20 +60,18 @@ def textbook(q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> F
     d22 = m2 * c2**2 + m3 * L2**2 + m4 * c4**2 + i2 + i4
     coupling = m3 * L2 * c3 - m4 * L1 * c4
     d12, slope = coupling * math.cos(q[1] - q[0]), -coupling * math.sin(q[1] - q[0])
-    weight1 = G * math.cos(q[0]) * (m1 * c1 + m3 * c3 + m4 * L1)
-    weight2 = G * math.cos(q[1]) * (m2 * c2 + m3 * L2 - m4 * c4)
-    first = d11 * qdd[0] + d12 * qdd[1] + slope * qd[1] ** 2 + weight1
-    second = d12 * qdd[0] + d22 * qdd[1] - slope * qd[0] ** 2 + weight2
+    first = d11 * qdd[0] + d12 * qdd[1] + slope * qd[1] ** 2
+    second = d12 * qdd[0] + d22 * qdd[1] - slope * qd[0] ** 2
+    first += G * math.cos(q[0]) * (m1 * c1 + m3 * c3 + m4 * L1)
+    second += G * math.cos(q[1]) * (m2 * c2 + m3 * L2 - m4 * c4)
     return np.array([first, second])
 
 
 @pytest.mark.slow
 @settings(max_examples=50, deadline=None)
-@given(ANGLES, ANGLES, ANGLES)
-def test_a_parallelogram_has_the_equations_of_absolute_angles(
-    q: list[float], qd: list[float], qdd: list[float]
-) -> None:
-    chain = parallelogram()
+@given(st.lists(st.floats(-4.0, 4.0), min_size=6, max_size=6))
+def test_a_parallelogram_has_the_equations_of_absolute_angles(state: list[float]) -> None:
+    chain, q, qd, qdd = parallelogram(), state[:2], state[2:4], state[4:]
     assert chain.coordinates == ("q1", "q2")
     printed = textbook(q, qd, qdd)
     tau = np.array(inverse_dynamics(chain, q, qd, qdd), dtype=float)

@@ -94,9 +94,9 @@ def test_there_is_a_value_for_each_coordinate_and_a_name_for_each_screw(call: Ca
 
 ALTERNATING = (0.0, math.pi, 0.0, math.pi, 0.0, math.pi)
 
-AGREES = 1e-12
-"""Against other programs, in m and for the entries of R: rounding of some hundred operations on an arm of
-1 to 2 m reaches about 1e-15."""
+AGREES = (
+    1e-12  # in m and for the entries of R: rounding of some hundred operations on 1 to 2 m is about 1e-15
+)
 
 
 def random_poses(chain: Chain, count: int = 1000) -> FloatArray:
@@ -160,9 +160,8 @@ def test_motions_are_the_differences_of_poses_and_of_each_other(
         return [np.array(values, dtype=float) for values in (*parts, *rates)]
 
     here = point_motions(chain, q, qd, qdd)
-    spins = [
-        np.cross(motion.omega, np.array(motion.pose.rotation, float), axisb=0, axisc=0) for motion in here
-    ]
+    rotations = [np.array(motion.pose.rotation, dtype=float) for motion in here]
+    spins = [np.cross(motion.omega, R, axisb=0, axisc=0) for motion, R in zip(here, rotations, strict=True)]
     # levers of up to 10 m, each derivative times speeds of up to 7
     assert_slope(lambda t: at(t)[0], [motion.velocity for motion in here], third=1e4, size=10.0)
     assert_slope(lambda t: at(t)[1], spins, third=1e3)
@@ -171,9 +170,8 @@ def test_motions_are_the_differences_of_poses_and_of_each_other(
     for k, motion in enumerate(here):  # the very velocity that the recursion finds
         J = np.array(fk.jacobian(chain, q, k), dtype=float).T
         velocity = np.array([*motion.velocity, *motion.omega], dtype=float)
-        assert_allclose(
-            velocity, J @ qd, rtol=AGREES, atol=30 * AGREES
-        )  # levers of up to 10 m, speeds of up to 7
+        # levers of up to 10 m, times speeds of up to 7
+        assert_allclose(velocity, J @ qd, rtol=AGREES, atol=30 * AGREES)
 
 
 @pytest.mark.parametrize("count", [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 5])
@@ -191,9 +189,8 @@ def test_a_log_is_its_rows_in_blocks(count: int) -> None:
         assert_array_equal(position[k], tip.translation)
         assert_array_equal(rotation[k], tip.rotation)
         assert_same(skeleton[k], [(0.0, 0.0, 0.0), *(pose.translation for pose in poses)])
-        assert_same(point.position[k], motion.pose.translation)
-        assert_same(point.velocity[k], motion.velocity)
-        assert_same(point.acceleration[k], motion.acceleration)
+        vectors = [motion.pose.translation, motion.velocity, motion.acceleration]
+        assert_same([point.position[k], point.velocity[k], point.acceleration[k]], vectors)
         assert_same([*point.euler_zyx[k], point.singular[k]], math3d.euler_zyx(motion.pose.rotation))
         assert_same(J[k].T, fk.jacobian(chain, q[k], 3))
     assert_array_equal(fk.positions_over_log(chain, q), position)
@@ -238,10 +235,8 @@ def test_screws_are_those_of_the_world_base_and_tool_included() -> None:
     assert SCREWS.size == 2.0 + 3.0  # from axis to axis, and to the tip
     assert there(chain_to_screws(Chain("point", (Joint("a"),)))).size == 1.0  # never 0
     assert chain_to_screws(Chain("arm", (Joint("a"), Joint("b", mimic=Mimic("a"))))) is None
-    integers = Chain(
-        "arm", (Joint("a", origin=translation(1, 2, 3), axis=(0, 0, 1)),), base=translation(0, 0, 1)
-    )
-    screws = there(chain_to_screws(integers))
+    joint, base = Joint("a", origin=translation(1, 2, 3), axis=(0, 0, 1)), ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    screws = there(chain_to_screws(Chain("of integers", (joint,), base=Transform(base))))
     columns = (screws.direction, screws.point, screws.rotation, screws.position)
     assert [values.dtype for values in columns] == [np.float64] * 4
 

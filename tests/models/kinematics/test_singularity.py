@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import casadi
 import numpy as np
 import pytest
 from hypothesis import given
@@ -26,11 +25,9 @@ from urmpipe_models.robots.catalogue import load_robot, robot_names
 
 ARM6 = load_robot("arm6")
 
-SINGULAR = 1e-14
-"""A singular value that is zero but for the rounding of entries of about 1."""
+SINGULAR = 1e-14  # a singular value that is zero but for the rounding of entries of about 1
 
-REGULAR = 1e-3
-"""Far from singular: twelve digits of the least motion remain."""
+REGULAR = 1e-3  # far from singular: twelve digits of the least motion remain
 
 
 def poses(chain: Chain, count: int, seed: int) -> FloatArray:
@@ -42,41 +39,30 @@ def smallest(*q: list[float], orientation: bool = True) -> list[float]:
 
 
 def test_the_factors_of_arm6_are_its_determinant() -> None:
-    q = poses(ARM6, 2000, 1)
-    base, tool = from_offset((1.0, 2.0, 3.0, 0.1, 0.2, 0.3)), from_offset((0.0, 0.1, 0.2, 1.0, 0.0, 0.5))
-    factors = arm6_determinant(list(q.T))
-    assert np.abs(factors).max() > 3e-3
-    # products of six entries of up to 0.3 m and 1, of up to 4 m on the other base: rounding
-    for chain, rounding in ((ARM6, 2e-17), (ARM6.placed(base, tool), 1e-15)):
-        assert_allclose(factors, np.linalg.det(jacobian_over_log(chain, q)), rtol=0.0, atol=rounding)
     joints = {joint.name: joint.origin.translation for joint in ARM6.joints}
     lengths = (-joints["aux2"][0], joints["theta3"][0], joints["theta4"][0], joints["aux5"][2])
     assert lengths == Arm6Lengths()
-    casadi.GlobalOptions.setNumpyMode(-1)
-    symbols = casadi.SX.sym("q", 6)
-    function = casadi.Function("determinant", [symbols], [arm6_determinant(symbols.elements())])
-    for row, expected in zip(q[:5].tolist(), factors, strict=False):
-        assert arm6_determinant(row) == pytest.approx(expected, abs=1e-18)
-        assert float(function(row)) == pytest.approx(expected, abs=1e-18)
-
-
-def test_the_factors_with_other_lengths() -> None:
-    a1, a2, a4, d5 = lengths = Arm6Lengths(-0.1, 0.4, 0.3, 0.2)
+    base, tool = from_offset((1.0, 2.0, 3.0, 0.1, 0.2, 0.3)), from_offset((0.0, 0.1, 0.2, 1.0, 0.0, 0.5))
+    a1, a2, a4, d5 = others = Arm6Lengths(-0.1, 0.4, 0.3, 0.2)
     half = math.pi / 2
     rows = [
         *(DHRow(d=0.2, a=-a1, alpha=half), DHRow(a=a2), DHRow(theta=half, a=a4, alpha=-half)),
         *(DHRow(d=d5, alpha=half), DHRow(alpha=-half), DHRow(d=0.1)),
     ]
-    chain = dh_chain("other", rows)
-    q = poses(chain, 200, 2)
-    expected = np.linalg.det(jacobian_over_log(chain, q))
-    assert_allclose(arm6_determinant(list(q.T), lengths), expected, rtol=0.0, atol=1e-16)
+    q = poses(ARM6, 2000, 1)
+    assert np.abs(arm6_determinant(list(q.T))).max() > 3e-3
+    # products of six entries of up to 0.3 m and 1, of up to 4 m on the other base: rounding
+    for chain, lengths, count, rounding in (
+        (ARM6, Arm6Lengths(), 2000, 2e-17),
+        (ARM6.placed(base, tool), Arm6Lengths(), 2000, 1e-15),
+        (dh_chain("other", rows), others, 200, 1e-16),
+    ):
+        determinants = np.linalg.det(jacobian_over_log(chain, q[:count]))
+        assert_allclose(arm6_determinant(list(q[:count].T), lengths), determinants, rtol=0.0, atol=rounding)
 
 
-# --- singular poses of the paper, and corrections in errata.md -----------------------------------------
-
-ELBOW = 0.7 - math.pi / 2
-"""theta3 of an elbow that is neither stretched nor withdrawn."""
+# Singular poses of the paper, and corrections in errata.md
+ELBOW = 0.7 - math.pi / 2  # theta3 of an elbow that is neither stretched nor withdrawn
 
 
 def wrist_on_axis_1(t3: float) -> float:
@@ -129,9 +115,6 @@ def test_every_family_makes_the_determinant_zero() -> None:
     assert_allclose(determinant[:3], 0.0, atol=2e-17)
     assert_allclose(values.manipulability[:3], 0.0, atol=2e-17)
     assert abs(determinant[3]) > 1e-5
-
-
-# --- laws ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", robot_names())
@@ -193,9 +176,6 @@ def test_rows_without_values_stay_without_and_stop_no_other() -> None:
         assert singularity_over_log(ARM6, missing).smallest.shape == (len(missing),)
 
 
-# --- joints that cannot move ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("orientation", [True, False])
 def test_a_joint_whose_limits_are_equal_counts_as_if_it_were_fixed_there(orientation: bool) -> None:
     panda = replace(load_robot("panda"), inertials=())  # a joint with a mass may not lose its name
@@ -225,8 +205,6 @@ def test_where_no_joint_can_move_all_count() -> None:
     q = poses(ARM6, 5, 9)
     assert_array_equal(columns(singularity_over_log(statue, q)), columns(singularity_over_log(ARM6, q)))
 
-
-# --- the characteristic length ---------------------------------------------------------------------
 
 SKEW = dh_chain(  # its axes pass each other at any angle
     "skew",

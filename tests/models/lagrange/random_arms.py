@@ -19,8 +19,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.lagrange.formulas import ARGUMENTS, c_name
 from urmpipe_models.math3d import Transform, from_xyz_rpy
 
-Motion = tuple[FloatArray, FloatArray, FloatArray]
-"""q, q', q'' of each coordinate."""
+Motion = tuple[FloatArray, FloatArray, FloatArray]  # q, q', q'' of each coordinate
 
 
 def random_arm(rng: np.random.Generator, coordinates: int) -> Chain:

@@ -22,18 +22,14 @@ from urmpipe_models.lagrange.derivation import TERMS
 from urmpipe_models.lagrange.formulas import OpenForm, c_code, equations_text, open_form
 from urmpipe_models.math3d import from_offset
 
+# Numbers of coordinates and seeds of arms
 CASES = [(1, 2), (1, 11), (1, 14), (2, 2), (2, 8), (3, 2), (3, 8), (3, 19), (4, 19)]
-"""Numbers of coordinates and seeds of arms."""
-
-
-def seeded_arm(count: int, seed: int) -> Chain:
-    return random_arm(np.random.default_rng(seed), count)
 
 
 @cache
 def seeded_form(count: int, seed: int) -> OpenForm:
     """Return the open form of an arm: seconds of SymPy, once for all tests."""
-    return open_form(seeded_arm(count, seed))
+    return open_form(random_arm(np.random.default_rng(seed), count))
 
 
 def has_parallel_neighbours(chain: Chain) -> bool:
@@ -45,7 +41,7 @@ def has_parallel_neighbours(chain: Chain) -> bool:
 
 
 def test_the_arms_have_all_kinds_of_joints_and_parallel_axes_and_others() -> None:
-    arms = [seeded_arm(*case) for case in CASES]
+    arms = [random_arm(np.random.default_rng(seed), count) for count, seed in CASES]
     kinds = {(len(arm.coordinates), joint.kind, joint.mimic is None) for arm in arms for joint in arm.joints}
     for count in (1, 2, 3, 4):
         assert kinds >= {(count, kind, free) for kind in ("revolute", "prismatic") for free in (False, True)}
@@ -125,4 +121,4 @@ def test_names_that_have_no_meaning_in_a_formula_or_in_c(tmp_path: Path) -> None
 def test_sympy_missing_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sympy", None)
     message = 'found equations without sympy, allowed: with sympy: pip install "urmpipe[planning]"'
-    assert refusal(OptionError, open_form, seeded_arm(1, 2)) == message
+    assert refusal(OptionError, open_form, random_arm(np.random.default_rng(2), 1)) == message

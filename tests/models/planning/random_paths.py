@@ -15,14 +15,11 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import PathRows
 
+# What an arc takes from a line, and what is left of it, in [m]
 legs = st.integers(50, 500).map(lambda mm: mm / 1000.0)
-"""What an arc takes from a line, and what is left of it, in [m]."""
-
+# Angles of corners in [rad]: the plane of each is known to 1e-14, and its radius is more than 5 mm
 turns = st.floats(0.05, 2.9)
-"""Angles of corners in [rad]: the plane of each is known to 1e-14, and its radius is more than 5 mm."""
-
-rolls = st.floats(0.0, 2.0 * math.pi)
-"""Angles of the planes of corners about the lines before them in [rad]."""
+rolls = st.floats(0.0, 2.0 * math.pi)  # angles of the planes of corners about the lines before them in [rad]
 
 
 @st.composite

@@ -22,8 +22,7 @@ from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.laws import ARCS, Arcs, TimeLaw, jerk_law, trapezoid_law
 from urmpipe_models.planning.path import LineArcPath, PathRows
 
-KEPT = 1.0 + 1e-9
-"""So much of a limit may be used: rounding."""
+KEPT = 1.0 + 1e-9  # so much of a limit may be used: rounding
 
 speeds, rises, jerks = st.floats(0.05, 2.0), st.floats(0.2, 20.0), st.floats(1.0, 300.0)
 places = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5)
