@@ -11,7 +11,6 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from asserting import there
-from pair_tables import CAM, GEARED, RACK, UNEVEN, shaft, wheels
 from random_networks import difference
 from urmpipe import load_network, network_check, network_drive, network_solve
 from urmpipe_models.elementwise import FloatArray
@@ -21,6 +20,29 @@ from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.joint_motion import transmission
 from urmpipe_models.networks.mechanism import build_mechanism
 
+UNEVEN = [[10, 0.0], [55, 4.0], [90, 9.0], [200, -3.0], [310, 1.5]]  # deg and mm
+
+
+def shaft(bodies: tuple[str, str], x: float = 0.0, **more: Any) -> dict[str, Any]:
+    return {"kind": "revolute", "bodies": bodies, "n": [0, 0, 1], "a": [[x, 0, 0], [0, 0, 0]], **more}
+
+
+def wheels(element: dict[str, Any], **joints: dict[str, Any]) -> dict[str, Any]:
+    """Return tables of a driven shaft A, what else is on the ground, and a pair; in mm and deg."""
+    names = ["A", *joints]
+    return {
+        "length_unit": "mm", "angle_unit": "deg",
+        "bodies": {name.lower(): {} for name in names},
+        "controls": {"turn": {"start": 50}},
+        "joints": {"A": shaft(("ground", "a"), driven="turn"), **joints},
+        "elements": {"pair": {"joints": ["A", names[-1]], **element}},
+    }  # fmt: skip
+
+
+SLIDE = {"kind": "prismatic", "bodies": ["ground", "s"], "n": [1, 0, 0]}
+GEARED = wheels({"kind": "gear", "teeth": [20, 40], "offset": 30}, B=shaft(("ground", "b"), 300))
+RACK = wheels({"kind": "rack", "radius": -8, "offset": 3}, S=SLIDE)
+CAM = wheels({"kind": "cam", "profile": UNEVEN}, S=SLIDE)
 ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps
 
 
