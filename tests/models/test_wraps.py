@@ -82,14 +82,6 @@ def test_a_log_of_many_blocks_is_judged_across_their_edges() -> None:
     assert result.joints.tolist() == joints.tolist()
 
 
-def test_values_that_are_no_joint_values_are_missing_and_warn_of_nothing() -> None:
-    q = np.array([[3.0, 3.0, 3.0], [1e308, np.inf, np.nan], [1e308, -np.inf, np.nan], [-3.0, -3.0, -3.0]])
-    with np.errstate(all="raise"):
-        result = repolarize(q, np.full(4, TSP))
-    assert result.rows.tolist() == [3, 3, 3]
-    assert len(result.unexplained) == 0
-
-
 def test_the_step_traces_with_casadi() -> None:
     casadi.GlobalOptions.setNumpyMode(-1)
     state = WrapState(*casadi.SX.sym("state", 6).elements())
@@ -246,27 +238,6 @@ def test_continuous_vectors_are_the_same_rotations(vectors: list[tuple[float, ..
     np.testing.assert_allclose(same, 1.0, rtol=0, atol=1e-12)
 
 
-FULL = 2 * np.pi
-
-
-@pytest.mark.parametrize(
-    ("recorded", "expected"),
-    [
-        # a flip at pi, a missing sample, and a rest, which keeps its axis
-        ([[0, 0, 3.1], [0, 0, -3.1], [np.nan] * 3, [0, 0, -0.1], [0, 0, 0]],
-         [[0, 0, 3.1], [0, 0, FULL - 3.1], [np.nan] * 3, [0, 0, FULL - 0.1], [0, 0, FULL]]),
-        # a log that begins with rests: the first axis counts
-        ([[0] * 3, [0] * 3, [0, 3, 0], [0, 3 - FULL, 0], [0] * 3],
-         [[0] * 3, [0] * 3, [0, 3, 0], [0, 3, 0], [0] * 3]),
-        # none of its components is large: two square roots of 3 back, or a turn less that
-        ([[1.0] * 3, [-1.0] * 3], [[1.0] * 3, [FULL / np.sqrt(3.0) - 1.0] * 3]),
-    ],
-)  # fmt: skip
-def test_vectors_continue_by_whole_turns(recorded: list[list[float]], expected: list[list[float]]) -> None:
-    v = np.array(recorded, dtype=float)
-    np.testing.assert_allclose(unwrap_rotation_vectors(v), expected, rtol=0, atol=1e-15)
-
-
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
@@ -297,14 +268,6 @@ def test_euler_angles_go_straight_through_the_vertical() -> None:
     beyond = (ry > np.pi / 2)[:, np.newaxis]
     recorded = np.where(beyond, wrap(true * [1.0, -1.0, 1.0] + np.pi), true)
     np.testing.assert_allclose(unwrap_euler(recorded), true, rtol=0, atol=1e-14)
-
-
-def test_of_two_names_that_are_equally_near_the_recorded_one_stays() -> None:
-    """A quarter turn of two axes: the other family, half a turn off, is a quarter turn away as well."""
-    recorded = np.array([[0.0, 0.0, 0.0], [-np.pi / 2, 0.0, -np.pi / 2]])
-    np.testing.assert_array_equal(unwrap_euler(recorded, proper=True), recorded)
-    half_a_turn = np.array([[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0]])
-    np.testing.assert_array_equal(unwrap_quaternions(half_a_turn), half_a_turn)
 
 
 # Two representations of one rotation in each form.
