@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from random_networks import KINDS, Vec, axis_frame, transform, unit, vec
+from random_networks import KINDS, Vec, axis_frame, matrix, transform, unit, vec
 from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import rotation_x, rotation_z, translation
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, JointKind
 
@@ -76,24 +78,16 @@ def four_bar(
     return ring("rrrr", np.tile(Z, (4, 1)), points, drive)
 
 
-def screw_displacement(t: float, a: float, alpha: float) -> FloatArray:
-    """Return Rz(t) Tx(a) Rx(alpha)."""
-    c, s, ca, sa = np.cos(t), np.sin(t), np.cos(alpha), np.sin(alpha)
-    return np.array(
-        [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0.0, sa, ca, 0.0], [0.0, 0.0, 0.0, 1.0]]
-    )
-
-
 def bennett(drive: str | None = None, alpha: float = 0.6, beta: float = 1.1, t: float = 0.8) -> Network:
     """Return Bennett's linkage: a / sin(alpha) = b / sin(beta)."""
     a, b = np.sin(alpha), np.sin(beta)
     other = 2.0 * np.arctan(np.sin((beta + alpha) / 2) / np.sin((beta - alpha) / 2) / np.tan(t / 2))
     steps = [(t, a, alpha), (other, b, beta), (-t, a, alpha), (-other, b, beta)]
     frame, axes, points = np.eye(4), [], []
-    for one in steps:
+    for turn, length, twist in steps:
         axes.append(frame[:3, 2])
         points.append(frame[:3, 3])
-        frame = frame @ screw_displacement(*one)
+        frame = frame @ matrix(rotation_z(turn) @ translation(length, 0.0, 0.0) @ rotation_x(twist))
     np.testing.assert_allclose(frame, np.eye(4), rtol=0.0, atol=1e-14)  # it closes
     return ring("rrrr", np.array(axes), np.array(points), drive)
 
@@ -114,12 +108,7 @@ def random_ring(kinds: str, seed: int, drive: str | None = None) -> Network:
     return ring(kinds, axes, rng.uniform(-1.0, 1.0, (len(kinds), 3)), drive)
 
 
-def rssr(drive: str | None = None) -> Network:
-    return random_ring("rggr", 6, drive)
-
-
-def rccc(drive: str | None = None) -> Network:
-    return random_ring("rccc", 4, drive)
+rssr, rccc = partial(random_ring, "rggr", 6), partial(random_ring, "rccc", 4)
 
 
 def nine_revolutes(drive: str | None = None) -> Network:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from random_networks import distance_of
 from urmpipe_datasets import NETWORKS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import Assembly, AssemblyResult, assemble
@@ -385,18 +386,10 @@ def assert_same_answers(
 
 
 def assert_elements_measure(tables: Tables, pose: FloatArray, tolerance: float = CLOSED) -> None:
-    """Hold the lengths of elements between the ground and a body against the file."""
-    R, p = pose[:3, :3], pose[:3, 3]
-    for one in tables["elements"].values():
-        first, second = (np.zeros(3), one["a"]) if one["kind"] == "eg" else one["a"]
-        apart = R @ np.array(second) + p - np.array(first)
-        if one["kind"] == "gg":
-            found = np.linalg.norm(apart)
-        elif one["kind"] == "eg":
-            found = np.dot(one["n"], apart)
-        elif one["kind"] == "gc":
-            found = np.linalg.norm(np.cross(apart, one["n"]))
-        else:
-            across = np.cross(one["n"][0], R @ np.array(one["n"][1]))
-            found = abs(across @ apart) / np.linalg.norm(across)
-        assert found == pytest.approx(one.get("d", one.get("h")), abs=tolerance)
+    """Compare the lengths of elements between the ground and a body with the file."""
+    R, origin = pose[:3, :3], pose[:3, 3]
+    for element in load_network(tables).elements:
+        (p, q), (n, other) = np.array(element.points), np.array(element.normals)
+        found = distance_of(element.kind, p, n, R @ q + origin, R @ other, np.zeros(3))
+        row = tables["elements"][element.name]
+        assert found == pytest.approx(row.get("d", row.get("h")), abs=tolerance)
