@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from closed_forms import assert_met as assert_poses_met
 from ik_arms import follow, line, planar, times
 from urmpipe_datasets import LOGS
-from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik import path_numeric as sliding_window
 from urmpipe_models.ik.path import JointPath, solve_path
@@ -19,30 +18,24 @@ from urmpipe_models.ik.path_numeric import (
     DAMPING,
     SlidingWindow,
     find_out_of_reach,
-    max_reach,
     newton_sweep,
     solve_recurrence,
 )
 from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.task import build_task
 from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.math3d import Transform, translation
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.wraps import repolarize
 
 NANOMETRE = 1e-9  # what the solver promises: targets are met within it
 ARM = planar(1.0, 1.0, 1.0)
+DEMO = Targets(np.loadtxt(LOGS / "path.csv", delimiter=",", skiprows=1)[:, 1:])  # 7383 samples at 5 ms
 
 
 @pytest.fixture(scope="module")
-def demo_path() -> FloatArray:
-    """The bundled path in m: 7383 samples at 5 ms."""
-    return np.loadtxt(LOGS / "path.csv", delimiter=",", skiprows=1)[:, 1:]
-
-
-@pytest.fixture(scope="module")
-def followed(demo_path: FloatArray) -> JointPath:
-    return solve_path(load_robot("urm6"), Targets(demo_path), times(len(demo_path)))
+def followed() -> JointPath:
+    return solve_path(load_robot("urm6"), DEMO, times(len(DEMO)))
 
 
 def assert_met(path: JointPath, targets: Targets) -> None:
@@ -68,10 +61,8 @@ def assert_least_motion(path: JointPath, least_singular: float) -> None:
     assert np.abs(left[regular]).max() < 1e-9
 
 
-def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(
-    followed: JointPath, demo_path: FloatArray
-) -> None:
-    assert_met(followed, Targets(demo_path))
+def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(followed: JointPath) -> None:
+    assert_met(followed, DEMO)
     assert not (followed.jumps or followed.too_fast or followed.singular)
     assert set(followed.branch) == {"1"}
     assert followed.method == "least motion"
@@ -92,13 +83,11 @@ def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(
 
 
 @pytest.mark.slow
-def test_windows_give_what_one_sample_after_the_other_gives(
-    followed: JointPath, demo_path: FloatArray
-) -> None:
+def test_windows_give_what_one_sample_after_the_other_gives(followed: JointPath) -> None:
     """Newton's method on min |q - q_{k-1}|^2 subject to FK(q) = x_k, written plainly, sample by sample."""
     chain, rows = followed.chain, slice(1000, 1060)
     expected = [followed.q[rows.start]]
-    for target in demo_path[rows.start + 1 : rows.stop]:
+    for target in DEMO.position[rows.start + 1 : rows.stop]:
         q = last = expected[-1]
         for _ in range(6):
             error, _ = pose_errors(chain, q[None], Targets(target[None]))
@@ -111,11 +100,11 @@ def test_windows_give_what_one_sample_after_the_other_gives(
 
 @pytest.mark.parametrize("longest", [96, 1000])
 def test_windows_of_other_sizes_give_the_same_motion(
-    followed: JointPath, demo_path: FloatArray, longest: int, monkeypatch: pytest.MonkeyPatch
+    followed: JointPath, longest: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sliding_window, "WINDOW_SIZE", longest)
     count = 1500
-    path = solve_path(followed.chain, Targets(demo_path[:count]), times(count))
+    path = solve_path(followed.chain, DEMO.rows(slice(count)), times(count))
     # rad: at the singular start the nanometre leaves that open; what comes after goes on from there
     np.testing.assert_allclose(path.q, followed.q[:count], rtol=0.0, atol=2e-6)
     steps, expected = np.diff(path.q[1000:], axis=0), np.diff(followed.q[1000:count], axis=0)
@@ -123,10 +112,8 @@ def test_windows_of_other_sizes_give_the_same_motion(
     np.testing.assert_allclose(steps, expected, rtol=0.0, atol=2e-8)
 
 
-def test_joints_within_pi_are_unwrapped_by_the_repolarizer(
-    followed: JointPath, demo_path: FloatArray
-) -> None:
-    wrapped = solve_path(followed.chain, Targets(demo_path), followed.t_ns, within_pi=True)
+def test_joints_within_pi_are_unwrapped_by_the_repolarizer(followed: JointPath) -> None:
+    wrapped = solve_path(followed.chain, DEMO, followed.t_ns, within_pi=True)
     assert np.abs(followed.q).max() > math.pi
     assert wrapped.q.max() <= math.pi
     assert wrapped.q.min() > -math.pi
@@ -357,25 +344,3 @@ def test_no_posture_is_too_far(robot: str) -> None:
     arm = load_robot(robot).placed(base=translation(5.0, -3.0, 1.0), tool=translation(0.1, 0.0, 0.2))
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (5000, len(arm.coordinates)))
     assert not any(find_out_of_reach(arm, forward_targets(arm, q), None))
-
-
-def test_a_stretched_planar_arm_reaches_the_bound_and_no_farther() -> None:
-    arm = planar(1.0, 0.5)
-    assert max_reach(arm) == 1.5
-    assert forward_targets(arm, np.zeros((1, 2))).position[0, 0] == 1.5
-    away = in_plane(np.array([1.5, 0.0, math.nan]), np.array([0.0, 1.502, 0.0]))
-    far = "the target is 1.502 m from the first joint, allowed: 1.500 m at most"
-    assert find_out_of_reach(arm, away, None) == ["", far, ""]
-    assert find_out_of_reach(arm, away, 0.002) == ["", "", ""]
-
-
-def test_prismatic_joints_add_their_strokes() -> None:
-    slide = Joint("x", "prismatic", lower=-0.7, upper=0.5)
-    arm = Chain("slide", (slide, Joint("a")), tip=translation(0.2, 0.0, 0.0))
-    assert max_reach(arm) == pytest.approx(0.9, abs=1e-15)
-    follower = Joint("y", "prismatic", mimic=Mimic("x", -2.0, 0.1))
-    both = replace(arm, joints=(slide, follower), tip=Transform(), start=())
-    assert max_reach(both) == pytest.approx(0.7 + 1.5, abs=1e-15)
-    endless = replace(arm, joints=(Joint("x", "prismatic"), Joint("a")))
-    assert max_reach(endless) == math.inf
-    assert find_out_of_reach(endless, Targets(np.array([[1e9, 0.0, 0.0]])), None) == [""]

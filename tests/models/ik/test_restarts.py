@@ -227,7 +227,7 @@ def test_a_nearest_pose_that_is_turned_too_far_is_none() -> None:
     """The point is met only with another orientation: the arm in the plane cannot tilt its tool."""
     tilted = forward_targets(ARM, np.array([[0.3, 0.8]]))
     tilt: FloatArray = np.array(rotation_about((1.0, 0.0, 0.0), 0.1).rotation)
-    found = solve_iteratively(ARM, replace(tilted, rotation=tilt @ tilted.rotation), search=NEAR)
+    found = solve_iteratively(ARM, replace(tilted, rotation=tilt @ there(tilted.rotation)), search=NEAR)
     assert found.reason(0) is not None
 
 

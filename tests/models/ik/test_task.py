@@ -12,10 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from scipy.spatial.transform import Rotation
 
-from ik_arms import planar
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.ik.task import (
     column_squares,
     dot_product,
@@ -25,7 +23,6 @@ from urmpipe_models.ik.task import (
     outer_sum,
     prepare_chain,
     product,
-    redundancy,
     rotation_error,
     take_rows,
     tool_motion,
@@ -44,20 +41,17 @@ def matrices(k: int, p: int, n: int = 50) -> FloatArray:
 
 
 @pytest.mark.parametrize("k", SIZES)
-def test_a_positive_definite_system_is_solved_as_lapack_solves_it(k: int) -> None:
-    A, b = gram(matrices(k, k + 3)), matrices(k, 1)[:, 0]
-    peer = np.linalg.solve(A.transpose(2, 0, 1), b.T[..., None])[..., 0].T
-    # normal random matrices k x (k + 3) have conditions up to 1e3 squared: 1e-16 * 1e6, with room
-    np.testing.assert_allclose(factor(A).solve(b), peer, rtol=1e-8, atol=1e-9)
-
-
-@pytest.mark.parametrize("k", SIZES)
-def test_a_damped_system_is_that_with_the_damping_on_the_diagonal(k: int) -> None:
-    A, b = gram(matrices(k, 2)), matrices(k, 1)[:, 0]
+def test_systems_are_solved_as_lapack_solves_them_with_the_damping_on_the_diagonal(k: int) -> None:
+    b = matrices(k, 1)[:, 0]
     damping = np.random.default_rng(1).uniform(0.1, 1.0, (b.shape[1],))
-    damped = A.transpose(2, 0, 1) + damping[:, None, None] * np.eye(k)
-    peer = np.linalg.solve(damped, b.T[..., None])[..., 0].T
-    np.testing.assert_allclose(factor(A, damping).solve(b), peer, rtol=1e-10, atol=1e-12)  # condition < 1e3
+    # normal random matrices k x (k + 3) have conditions up to 1e3 squared: 1e-16 * 1e6, with room
+    for columns, damped, rtol, atol in ((k + 3, (), 1e-8, 1e-9), (2, (damping,), 1e-10, 1e-12)):
+        A = gram(matrices(k, columns))
+        each = A.transpose(2, 0, 1) + np.sum(damped, axis=0)[..., None, None] * np.eye(
+            k
+        )  # damped: conditions < 1e3
+        peer = np.linalg.solve(each, b.T[..., None])[..., 0].T
+        np.testing.assert_allclose(factor(A, *damped).solve(b), peer, rtol=rtol, atol=atol)
 
 
 def test_a_singular_system_has_a_finite_damped_solution() -> None:
@@ -73,33 +67,30 @@ def test_a_singular_system_has_a_finite_damped_solution() -> None:
 
 
 def test_products_are_those_of_matrices() -> None:
-    M, x, y = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0]
+    M, x, y, other = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0], matrices(6, 2)
     each = M.transpose(2, 0, 1)
-    np.testing.assert_allclose(product(M, x), np.einsum("nij,jn->in", each, x), atol=1e-13)
-    np.testing.assert_allclose(transposed_product(M, y), np.einsum("nij,in->jn", each, y), atol=1e-13)
-    np.testing.assert_allclose(gram(M), np.einsum("nij,nkj->ikn", each, each), atol=1e-13)
-    np.testing.assert_allclose(column_squares(M), np.square(each).sum(axis=1).T, atol=1e-13)
-    np.testing.assert_allclose(dot_product(y, y), np.square(y).sum(axis=0), atol=1e-13)
-    other = matrices(6, 2)
-    peer = each.transpose(0, 2, 1) @ other.transpose(2, 0, 1)
-    np.testing.assert_allclose(outer_sum(M, other).transpose(2, 0, 1), peer, atol=1e-13)
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 7])
-def test_a_system_has_the_same_solution_to_the_last_bit_beside_any_others(n: int) -> None:
-    A, b = gram(matrices(6, 7, 100)), matrices(6, 1, 100)[:, 0]
-    whole, part = factor(A, 0.01).solve(b), factor(A[..., :n], 0.01).solve(b[:, :n])
-    np.testing.assert_array_equal(whole[:, :n], part)
+    for found, subscripts, factors in (
+        (product(M, x), "nij,jn->in", (each, x)),
+        (transposed_product(M, y), "nij,in->jn", (each, y)),
+        (gram(M), "nij,nkj->ikn", (each, each)),
+        (column_squares(M), "nij,nij->jn", (each, each)),
+        (dot_product(y, y), "in,in->n", (y, y)),
+        (outer_sum(M, other), "nij,ikn->jkn", (each, other)),
+    ):
+        np.testing.assert_allclose(found, np.einsum(subscripts, *factors), atol=1e-13)
 
 
 @pytest.mark.parametrize("rows", [[5], [5, 6], [9, 2, 40], list(range(31))], ids=len)
-def test_a_sum_has_the_same_bits_beside_any_others_however_its_rows_are_stored(rows: list[int]) -> None:
+def test_rows_have_the_same_bits_among_any_others_however_they_are_stored(rows: list[int]) -> None:
     M, x, y = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0]
     for form, a, b in ((product, M, x), (transposed_product, M, y), (outer_sum, M, M), (dot_product, x, x)):
         whole = form(a, b)[..., rows]
         np.testing.assert_array_equal(form(take_rows(a, np.array(rows)), take_rows(b, np.array(rows))), whole)
         np.testing.assert_array_equal(form(a[..., rows], b[..., rows]), whole)  # a matrix apart
         assert take_rows(a, np.array(rows)).flags.c_contiguous
+    A = gram(M)
+    part = factor(A[..., rows], 0.01).solve(y[:, rows])
+    np.testing.assert_array_equal(factor(A, 0.01).solve(y)[:, rows], part)
 
 
 @settings(max_examples=40, deadline=None)
@@ -129,9 +120,9 @@ def test_a_row_has_the_same_bits_alone_and_beside_others(robot: str) -> None:
 
 def test_what_a_radian_counts_as_does_not_depend_on_where_a_description_puts_frames() -> None:
     chain = load_robot("ur5e")
-    there = Joint("aside", "fixed", translation(0.0, 0.0, 100.0))  # axis 2 of a calibrated arm
+    aside = Joint("aside", "fixed", translation(0.0, 0.0, 100.0))  # axis 2 of a calibrated arm
     back = replace(chain.joints[2], origin=translation(0.0, 0.0, -100.0) @ chain.joints[2].origin)
-    other = replace(chain, joints=(*chain.joints[:2], there, back, *chain.joints[3:]), visuals=())
+    other = replace(chain, joints=(*chain.joints[:2], aside, back, *chain.joints[3:]), visuals=())
     assert orientation_length(other) == pytest.approx(orientation_length(chain), rel=1e-12)
     assert orientation_length(chain) == characteristic_length(chain) / 4.0
 
@@ -154,19 +145,3 @@ def test_the_turn_between_two_frames_is_scipys_rotation_vector(
     np.testing.assert_allclose(again, wanted, atol=3e-8)  # within 1e-6 of half a turn the axis has 8 digits
     if angle < 3.0:
         np.testing.assert_allclose(found, vector, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("robot", "pose", "free"),
-    [("urm6", True, 0), ("urm6", False, 3), ("urm8", True, 2), ("panda", True, 1), ("iiwa14", False, 4)],
-)
-def test_the_freedoms_that_a_target_leaves_are_counted(robot: str, pose: bool, free: int) -> None:
-    chain = load_robot(robot)
-    targets = forward_targets(chain, np.zeros((1, len(chain.coordinates))))
-    assert redundancy(chain, targets if pose else Targets(targets.position)) == free
-
-
-def test_the_freedoms_of_a_planar_arm_are_those_of_the_plane() -> None:
-    arm = planar(0.5, 0.4, 0.3)
-    assert redundancy(arm, forward_targets(arm, np.zeros((1, 3)))) == 0
-    assert redundancy(arm, Targets(np.zeros((1, 3)))) == 1

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -61,33 +61,25 @@ def test_angles_are_wrapped_into_a_half_open_turn() -> None:
 @given(a=factors, b=factors, x=angles)
 @example(a=1.0, b=0.0, x=math.pi)
 def test_a_root_put_in_is_found_and_the_first_one_falls(a: float, b: float, x: float) -> None:
-    r = math.hypot(a, b)
-    if r < 1e-100:
-        return
-    roots = np.array(linear_roots(np.array(a), np.array(b), np.array(a * math.cos(x) + b * math.sin(x))))
+    r, c = math.hypot(a, b), a * math.cos(x) + b * math.sin(x)
+    assume(r >= 1e-100)
+    roots = np.array(linear_roots(np.array(a), np.array(b), np.array(c)))
     # near the double root an error of 1e-16 in c moves x by its square root
     assert apart(roots, np.array(x)).min() < 5e-8
-    np.testing.assert_allclose(
-        a * np.cos(roots) + b * np.sin(roots), a * math.cos(x) + b * math.sin(x), atol=r * 1e-14
-    )
+    np.testing.assert_allclose(a * np.cos(roots) + b * np.sin(roots), c, atol=r * 1e-14)
     falling, rising = b * np.cos(roots) - a * np.sin(roots)
     assert falling <= r * 1e-14
     assert rising >= -r * 1e-14
 
 
-def test_the_boundary_counts_up_to_its_tolerance_and_not_beyond() -> None:
-    a, b = np.full(4, 3.0), np.full(4, 4.0)
+def test_the_boundary_counts_up_to_its_tolerance_and_an_equation_without_an_angle_has_no_root() -> None:
+    a, b = np.array([3.0, 3.0, 3.0, 3.0, 0.0, np.nan, 1.0]), np.array([4.0, 4.0, 4.0, 4.0, 0.0, 0.0, 0.0])
     inside, outside = 5.0 * (1.0 + BOUNDARY / 2), 5.0 * (1.0 + 2 * BOUNDARY)
-    first, second = linear_roots(a, b, np.array([inside, outside, -inside, -outside]))
+    roots = linear_roots(a, b, np.array([inside, outside, -inside, -outside, 0.0, 0.5, np.nan]))
     stretched = math.atan2(4.0, 3.0)
-    np.testing.assert_allclose(first, [stretched, np.nan, stretched - math.pi, np.nan], rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(second, first, rtol=0, atol=ROUNDING)
-
-
-def test_no_angle_in_the_equation_and_nan_have_no_root() -> None:
-    first, second = linear_roots(np.array([0.0, np.nan, 1.0]), np.zeros(3), np.array([0.0, 0.5, np.nan]))
-    assert np.isnan(first).all()
-    assert np.isnan(second).all()
+    for root in roots:
+        expected = [stretched, np.nan, stretched - math.pi, *[np.nan] * 4]
+        np.testing.assert_allclose(root, expected, rtol=0, atol=ROUNDING)
 
 
 @given(arrays(float, 4, elements=angles), st.floats(1e-3, 1e3))
@@ -107,24 +99,17 @@ def test_four_roots_put_in_are_found(put_in: FloatArray, factor: float) -> None:
 
 @given(arrays(float, 4, elements=angles))
 def test_simple_roots_are_found_to_the_last_digits(put_in: FloatArray) -> None:
-    away = apart(put_in[:, None], put_in[None, :])[np.triu_indices(4, 1)].min()
-    if away < 0.1:
-        return
+    assume(apart(put_in[:, None], put_in[None, :])[np.triu_indices(4, 1)].min() >= 0.1)
     roots = roots_of(product(through(put_in[0], put_in[1]), through(put_in[2], put_in[3])))
-    np.testing.assert_allclose(
-        np.sort(apart(roots[:, None], put_in[None, :]).min(axis=0)), 0.0, atol=1e-11
-    )  # 1e-16 through slopes of 0.1 ** 3 and more
+    away = apart(roots[:, None], put_in[None, :]).min(axis=0)
+    np.testing.assert_allclose(away, 0.0, atol=1e-11)  # 1e-16 through slopes of 0.1 ** 3 and more
 
 
 @given(arrays(float, 6, elements=factors))
 def test_there_are_as_many_roots_as_the_left_side_changes_sign(k: FloatArray) -> None:
     size = np.abs(k).sum()
-    if size < 1e-3:
-        return
-    x = np.linspace(-math.pi, math.pi, 2001)
-    values = left_side(k, x)
-    if np.abs(values).min() < 1e-9 * size:
-        return
+    values = left_side(k, np.linspace(-math.pi, math.pi, 2001))
+    assume(size >= 1e-3 and np.abs(values).min() >= 1e-9 * size)
     changes = np.count_nonzero(np.sign(values[1:]) != np.sign(values[:-1]))
     found = np.count_nonzero(np.isfinite(roots_of(k)))
     assert found >= changes
@@ -142,26 +127,18 @@ def test_roots_at_pi_are_roots_like_any_other() -> None:
     np.testing.assert_allclose(roots_of(k), [-math.pi / 2, 0.0, math.pi / 2, math.pi], rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("beyond", [1e-11, 1e-8, 1e-3])
-def test_an_extremum_that_fails_to_reach_zero_is_no_root(beyond: float) -> None:
-    k = np.array([0.0, 0.0, 0.0, 1.0, 0.0, -1.0 - beyond])
-    assert np.isnan(roots_of(k)).all()
-
-
-def test_an_extremum_within_the_rounding_is_a_double_root() -> None:
-    roots = roots_of(np.array([0.0, 0.0, 0.0, 1.0, 0.0, -1.0 - BOUNDARY / 10]))
-    np.testing.assert_allclose(roots, [0.0, 0.0, np.nan, np.nan], atol=1e-6)
+def test_an_extremum_is_a_double_root_within_the_rounding_alone() -> None:
+    for beyond in (BOUNDARY / 10, 1e-11, 1e-8, 1e-3):
+        roots = roots_of(np.array([0.0, 0.0, 0.0, 1.0, 0.0, -1.0 - beyond]))
+        expected = [0.0, 0.0, np.nan, np.nan] if beyond < BOUNDARY else [np.nan] * 4
+        np.testing.assert_allclose(roots, expected, atol=1e-6)
 
 
 def test_rows_do_not_know_each_other() -> None:
-    generator = np.random.default_rng(7)
-    k = generator.normal(size=(6, 50))
-    k[:, 10] = np.nan
-    k[:, 20] = 0.0
-    k[0, 30] = np.inf
+    k = np.random.default_rng(7).normal(size=(6, 50))
+    k[:, 10], k[:, 20], k[0, 30] = np.nan, 0.0, np.inf
     together = quadric_roots(k)
-    alone = np.stack([roots_of(k[:, i]) for i in range(50)], axis=1)
-    np.testing.assert_array_equal(together, alone)
+    np.testing.assert_array_equal(together.T, [roots_of(row) for row in k.T])
     assert np.isnan(together[:, [10, 20, 30]]).all()
 
 
