@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,13 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asserting import refusal
 from loaded_fmu import Loaded
 from urmpipe_fmus.block import Recipe, Table
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.user import load_block_file
-from urmpipe_fmus.build.fmu import cache_folder, cache_key, cached_fmu
-from urmpipe_models.errors import FmuError
+from urmpipe_fmus.build.fmu import cache_key, cached_fmu
 from written_units import unit_of
 
 
@@ -122,35 +119,3 @@ def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.splitlines()
     assert printed == [str(built), ""]
-
-
-def test_the_folder_is_the_users_or_of_the_variable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    assert cache_folder() == tmp_path / "cache"
-    monkeypatch.delenv("URMPIPE_CACHE")
-    monkeypatch.setenv("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME", str(tmp_path / "x"))
-    assert cache_folder() == tmp_path / "x" / "urmpipe"
-    monkeypatch.delenv("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
-    assert cache_folder() == Path.home() / ".cache" / "urmpipe"
-
-
-@pytest.mark.skipif(os.name == "nt", reason="needs POSIX's users")
-def test_a_user_without_a_home_is_asked_for_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    import pwd
-
-    for name in ("URMPIPE_CACHE", "XDG_CACHE_HOME", "HOME"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)  # raises KeyError, as for a user of no entry
-    assert refusal(FmuError, cached_fmu, unit_of("arm"), "python") == (
-        "cache of FMUs: found no home folder, allowed: a folder that the variable URMPIPE_CACHE names"
-    )
-
-
-def test_a_cache_that_cannot_be_written_is_an_error_that_names_the_variable(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "file"))
-    assert refusal(FmuError, cached_fmu, unit_of("arm"), "python") == (
-        f"{tmp_path / 'file' / 'fmus'}: cannot be written: Not a directory; the variable URMPIPE_CACHE names"
-        " another place"
-    )

@@ -71,22 +71,6 @@ def test_the_same_files_in_any_order_are_the_same_bytes_that_replace_a_file_at_o
     assert modes == {"a.xml": 0o644, "binaries/linux64/a.so": 0o755, "sources/b.c": 0o644}
 
 
-@pytest.mark.parametrize(
-    ("place", "why"),
-    [
-        ("missing/one.fmu", "No such file or directory"),
-        ("file/one.fmu", "Not a directory"),
-        (f"{'n' * 300}/one.fmu", "File name too long"),
-        (f"{'n' * 300}.fmu", "File name too long"),
-    ],
-)
-def test_where_nothing_can_be_written_nothing_is_left(tmp_path: Path, place: str, why: str) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OSError, match=why):
-        write_fmu(tmp_path / place, FILES)
-    assert [one.name for one in tmp_path.iterdir()] == ["file"]
-
-
 def test_a_guid_stays_the_same_from_version_to_version() -> None:
     """The first 16 bytes of the SHA-256 of name and content, each after its length in 8 bytes."""
     assert content_guid(FILES) == "{ab89020f-ef2c-b77b-13d8-c877f8ada7a7}"
