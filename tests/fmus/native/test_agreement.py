@@ -25,7 +25,8 @@ def random_value(one: Input | Parameter, random: np.random.Generator) -> float:
 )
 def test_every_value_is_that_of_the_instance_after_each_set_and_step(name: str, backend: Backend) -> None:
     model, random = unit_of(name), np.random.default_rng(5)
-    fmu, instance = loaded(name, backend, start=0.02), Instance(model, 0.02)
+    fmu, instance = loaded(name, backend, start=0.02), Instance(model)
+    instance.setup_experiment(0.02)
     names = [scalar for scalar, _ in model.scalars]
 
     def assert_same() -> None:
