@@ -14,16 +14,9 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from scipy.spatial.transform import Rotation
 
+from urmpipe_models.arm import denavit_hartenberg as builders
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
-from urmpipe_models.arm.denavit_hartenberg import (
-    DHRow,
-    GeometricModelRow,
-    articulated_6r,
-    dh_chain,
-    geometric_chain,
-    modified_dh_chain,
-    urm_chain,
-)
+from urmpipe_models.arm.denavit_hartenberg import DHRow, GeometricModelRow
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.math3d import Step, Transform, from_offset, rotation_x
@@ -52,25 +45,21 @@ def parameter_values(chain: Chain) -> dict[str, float]:
     return {one.name: one.value for one in chain.parameters}
 
 
-def assert_rebuilds_itself(chain: Chain) -> None:
+@pytest.mark.parametrize("file", [*robot_names(), *URDFS])
+def test_a_robot_with_its_own_values_is_the_same_bit_by_bit(
+    request: pytest.FixtureRequest, file: str
+) -> None:
+    if file in URDFS:
+        chain = load_robot(request.getfixturevalue("shared") / "robots" / file, tip_link=URDFS[file])
+        first = chain.joints[0].name
+        assert chain.parameters[6].name == f"{first}.x"
+        assert chain.parameters[6].source == f"URDF joint {first}"
+    else:
+        chain = load_robot(file)
     again = chain.with_parameters(parameter_values(chain))
     assert again == chain
     assert bits(again) == bits(chain)
     assert parameter_values(again) == parameter_values(chain)
-
-
-@pytest.mark.parametrize("name", robot_names())
-def test_a_robot_with_its_own_values_is_the_same_bit_by_bit(name: str) -> None:
-    assert_rebuilds_itself(load_robot(name))
-
-
-@pytest.mark.parametrize("file", URDFS)
-def test_a_urdf_with_its_own_values_is_the_same_bit_by_bit(shared: Path, file: str) -> None:
-    chain = load_robot(shared / "robots" / file, tip_link=URDFS[file])
-    assert_rebuilds_itself(chain)
-    first = chain.joints[0].name
-    assert chain.parameters[6].name == f"{first}.x"
-    assert chain.parameters[6].source == f"URDF joint {first}"
 
 
 @pytest.mark.slow
@@ -117,12 +106,12 @@ def dh_rows(v: Any) -> list[DHRow]:
 
 
 DESCRIBED: dict[str, tuple[Callable[..., Chain], str]] = {
-    "urm": (lambda *v: urm_chain("a", v[:3], v[3:5]), "r1 r2 r3 theta2 theta3"),
-    "dh": (lambda *v: dh_chain("a", dh_rows(v)), "theta_1 d_1 a_1 alpha_1 d_2"),
-    "modified_dh": (lambda *v: modified_dh_chain("a", dh_rows(v)), "theta_1 d_1 a_1 alpha_1 d_2"),
-    "articulated_6r": (articulated_6r, "l0 l1 l2 l3 l4"),
+    "urm": (lambda *v: builders.urm_chain("a", v[:3], v[3:5]), "r1 r2 r3 theta2 theta3"),
+    "dh": (lambda *v: builders.dh_chain("a", dh_rows(v)), "theta_1 d_1 a_1 alpha_1 d_2"),
+    "modified_dh": (lambda *v: builders.modified_dh_chain("a", dh_rows(v)), "theta_1 d_1 a_1 alpha_1 d_2"),
+    "articulated_6r": (builders.articulated_6r, "l0 l1 l2 l3 l4"),
     "geometric": (
-        lambda *v: geometric_chain("a", [GeometricModelRow("R", "y", v[:3])], tip=(v[3], v[4], 0.1)),
+        lambda *v: builders.geometric_chain("a", [GeometricModelRow("R", "y", v[:3])], tip=(v[3], v[4], 0.1)),
         "r1.x r1.y r1.z r2.x r2.y",
     ),
 }
@@ -183,9 +172,6 @@ def test_a_body_that_was_turned_and_printed_with_few_digits_is_a_body(
     moments = {"rod": (0.0, a, a), "plate": (a, b, a + b), "point": (0.0, 0.0, 0.0)}[what]
     turn = Rotation.random(rng=rng).as_matrix()
     matrix = turn @ np.diag(moments) @ turn.T + 1e-20 * rng.normal()
-    printed = [
-        float(f"{matrix[i, k]:.{digits}g}")
-        for i, k in zip((0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2), strict=True)
-    ]
-    ixx, iyy, izz, ixy, ixz, iyz = printed
+    places = (0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)
+    ixx, iyy, izz, ixy, ixz, iyz = (float(f"{matrix[place]:.{digits}g}") for place in places)
     assert list(Inertial("j", 1.0, inertia=(ixx, iyy, izz, ixy, ixz, iyz)).faults()) == []

@@ -54,6 +54,13 @@ def scaled(chain: Chain, factor: float) -> Chain:
     return replace(chain, joints=joints, tip=larger(chain.tip), tool=larger(chain.tool))
 
 
+def coloured(chain: Chain) -> dict[str, Visual]:
+    """Return the solids of the joints that are drawn, by name."""
+    colours = {joint.name: (0.1, 0.2, 0.3, 1.0) for joint in chain.joints}
+    found = [one for one in build_placeholder_solids(chain, colours) if one.colour is not None]
+    return {one.joint: one for one in found if one.joint is not None}
+
+
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
@@ -74,8 +81,17 @@ def test_solids_of_any_arm_can_be_drawn_and_hang_on_moving_joints(
 
 
 @pytest.mark.parametrize("name", robot_names())
-def test_links_lead_from_joint_to_joint_without_a_gap(name: str) -> None:
+def test_links_lead_from_joint_to_joint_without_a_gap_by_cylinders_on_the_axes(
+    name: str,
+) -> None:
     chain = load_robot(name)
+    solids = coloured(chain)
+    assert list(solids) == list(chain.coordinates)  # of irb60's mimics none
+    for joint in chain.moving:
+        assert isinstance(solids[joint.name].shape, Cylinder)
+        np.testing.assert_allclose(
+            np.cross(ends_of(solids[joint.name]), joint.axis), 0.0, atol=1e-15
+        )  # rounding
     moving = [k for k, joint in enumerate(chain.joints) if joint.kind != "fixed"]
     position, rotation = frames_over_log(chain, np.array([[0.3 + 0.2 * k for k in range(len(chain.start))]]))
     for k, following in pairwise([None, *moving[:-1]]):
@@ -136,24 +152,6 @@ def test_an_arm_without_any_length_is_a_joint_on_a_plate() -> None:
     solids = build_placeholder_solids(Chain("arm", (Joint("j"),)))
     assert all(isinstance(one.shape, Cylinder) and 0.01 < one.shape.radius < 0.1 for one in solids)
     assert [one.joint for one in solids] == [None, "j", "j"]
-
-
-def coloured(chain: Chain) -> dict[str, Visual]:
-    """Return the solids of the joints that are drawn, by name."""
-    colours = {joint.name: (0.1, 0.2, 0.3, 1.0) for joint in chain.joints}
-    found = [one for one in build_placeholder_solids(chain, colours) if one.colour is not None]
-    return {one.joint: one for one in found if one.joint is not None}
-
-
-@pytest.mark.parametrize("name", robot_names())
-def test_a_joint_is_a_cylinder_on_its_axis(name: str) -> None:
-    chain = load_robot(name)
-    solids = coloured(chain)
-    assert list(solids) == list(chain.coordinates)  # of irb60's mimics none
-    for joint in chain.moving:
-        ends = ends_of(solids[joint.name])
-        assert isinstance(solids[joint.name].shape, Cylinder)
-        np.testing.assert_allclose(np.cross(ends, joint.axis), 0.0, atol=1e-15)  # rounding
 
 
 def test_joints_at_one_place_do_not_hide_each_other() -> None:

@@ -44,17 +44,6 @@ def contour() -> FloatArray:
     return np.column_stack((1.7 + x, y, np.ones_like(x)))
 
 
-def test_its_lengths_are_assumptions_and_no_limits_are_invented() -> None:
-    assert set(LENGTHS) == {"l1", "l2", "l3", "l4"}
-    assert {one.name for one in ARM.parameters if one.value} == set(LENGTHS)
-    assert "assumed" in ARM.description
-    assert "all else is assumed" in ARM.source
-    limited = [one.name for one in ARM.joints if (one.lower, one.upper) != (-math.inf, math.inf)]
-    assert limited == ["theta4"]
-    assert (ARM.moving[3].lower, ARM.moving[3].upper) == (0.0, 0.0)
-    assert {(one.velocity, one.acceleration) for one in ARM.joints} == {(math.inf, math.inf)}
-
-
 @pytest.mark.parametrize("level", [True, False])
 def test_its_tip_is_the_closed_form_in_absolute_angles(level: bool) -> None:
     q = random_angles(level=level)

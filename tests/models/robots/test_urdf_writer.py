@@ -185,8 +185,5 @@ def test_pinocchio_sees_the_visuals_where_they_are() -> None:
     names = [None, *(joint.name for joint in chain.joints)]
     for visual, peer in zip(chain.visuals, placed.oMg, strict=True):
         k = names.index(visual.joint)
-        np.testing.assert_allclose(
-            position[0, k] + rotation[0, k] @ np.array(origin.translation), peer.translation, atol=SAME
-        )
-        np.testing.assert_allclose(rotation[0, k] @ np.array(origin.rotation), peer.rotation, atol=SAME)
+        assert_same_frame(Transform(rotation[0, k], position[0, k]) @ origin, peer)
     np.testing.assert_array_equal(geometry.geometryObjects[0].meshColor, [1.0, 0.5, 0.0, 1.0])
