@@ -67,9 +67,9 @@ def compiled(model: str) -> bytes:
     with TemporaryDirectory() as folder:
         Path(folder, "model.h").write_text(model)
         source, library = Path(__file__).with_suffix(".c"), Path(folder, "library")
-        includes = (f"-I{folder}", f"-I{Path(fmpy.__file__).parent / 'c-code'}")
+        headers = Path(fmpy.__file__).parent / "c-code"
         # not optimized: it takes longer to compile than to run
-        flags = ("-shared", "-fPIC", "-O0", "-w", *includes)
+        flags = ("-shared", "-fPIC", "-O0", "-w", f"-I{folder}", f"-I{headers}")
         subprocess.run([compiler, *flags, source, "-o", library, "-lm"], check=True)
         return library.read_bytes()
 
@@ -146,12 +146,7 @@ class Foreign:
 
 
 def gain(
-    name: str = "gain",
-    *,
-    formula: str = "k * u + c",
-    unit: str = "",
-    on: tuple[str, ...] | None = ("u",),
-    **options: Any,
+    name: str = "gain", formula: str = "k * u + c", unit: str = "", on: Any = ("u",), **options: Any
 ) -> Foreign:
     """y = k u + c, at once; or only after a step if it is not fresh."""
     k, c = Scalar("k", 0, "parameter", start="1"), Scalar("c", 1, "parameter", start="0")
@@ -207,33 +202,6 @@ COUNTER = Foreign(
     step="if (v->b[0]) v->i[1] += v->i[0];",
 )
 """Counts by an Integer while a Boolean is true."""
-
-TROUBLE = Foreign(
-    name="trouble",
-    scalars=(
-        Scalar("kind", 0, "parameter", "Integer", extra=' min="0" max="9"', start="0"),
-        Scalar("at", 0, "parameter", start="0.05"),
-        Scalar("y", 1),
-    ),
-    compute="v->r[1] = v->time;",
-    step="""
-    if (t < v->r[0] - 1e-9) return fmi2OK;
-    LOG(m, fmi2OK, "%s: all is well at %g s", "trouble", t);
-    switch (v->i[0]) {
-    case 1: LOG(m, fmi2Warning, "about to break"); raise(SIGSEGV); break;
-    case 2: abort();
-    case 3: exit(7);
-    case 4: LOG(m, fmi2Error, "the motor is %s", "hot"); return fmi2Error;
-    case 5: return fmi2Discard;
-    case 6: m->terminated = 1; return fmi2Discard;
-    case 7: LOG(m, fmi2Warning, "warm"); return fmi2Warning;
-    case 8: return fmi2Fatal;
-    case 9: for (;;) pause();
-    }
-    """,
-    start="m->v.r[0] = 0.05;",
-)
-"""Breaks from a time on, in the way of its parameter `kind`."""
 
 
 FOLDER = Path(mkdtemp(prefix="foreign-"))

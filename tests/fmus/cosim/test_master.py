@@ -13,47 +13,38 @@ from foreign_fmus import COUNTER, INTEGRATOR, Foreign, Scalar, follow, gain, pla
 from urmpipe_fmus.cosim import LogColumn, Port, simulate
 
 RAMP = Foreign(
-    name="ramp",
-    scalars=(*(Scalar(f"y[{i}]", i, unit="m") for i in range(1, 4)),),
+    name="ramp",  # y_i = i t
+    scalars=tuple(Scalar(f"y[{i}]", i, unit="m") for i in range(1, 4)),
     compute="for (int i = 1; i < 4; i++) v->r[i] = i * v->time;",
 )
-"""y_i = i t."""
-
+TERMS = tuple(Scalar(f"u[{i}]", i, "input", unit="m") for i in range(1, 4))
 SUM = Foreign(
     name="sum",
-    scalars=(
-        *(Scalar(f"u[{i}]", i, "input", unit="m") for i in range(1, 4)),
-        Scalar("y", 9, on=("u[1]", "u[2]", "u[3]"), unit="m"),
-    ),
+    scalars=(*TERMS, Scalar("y", 9, on=("u[1]", "u[2]", "u[3]"), unit="m")),
     compute="v->r[9] = v->r[1] + 10 * v->r[2] + 100 * v->r[3];",
 )
-"""y = u_1 + 10 u_2 + 100 u_3."""
 
 
 @pytest.mark.slow
-def test_a_row_of_blocks_with_feedthrough_has_no_delay() -> None:
+def test_a_row_of_blocks_with_feedthrough_has_no_delay_and_runs_again_with_the_same_bits() -> None:
     names = [f"b{i}" for i in range(12)]
     blocks = {name: gain("metres", unit="m") for name in reversed(names)} | {"ramp": RAMP}
     connections = {f"{b}.u": f"{a}.y" for a, b in pairwise(names)} | {"b0.u": "ramp.y[2]"}
-    recorded = ran(blocks, connections, {name: {"c": 1.0} for name in names})
-    t = 0.1 * np.arange(11)
+    plan = planned(blocks, connections, {name: {"c": 1.0} for name in names})
+    recorded, t = simulate(plan), 0.1 * np.arange(11)
     assert recorded.failed is None
     assert recorded.t_ns.tolist() == [round(k * 1e8) for k in range(11)]
     for passed in (1, 12):
         assert recorded.column(names[passed - 1], "y").tolist() == (2.0 * t + 1.0 * passed).tolist()
+    assert np.array_equal(simulate(plan).values, recorded.values)
 
 
 def test_a_ring_with_an_integrator_is_eulers_method() -> None:
-    recorded = ran(
-        {"decay": gain(), "x": INTEGRATOR},
-        {"decay.u": "x.y", "x.u": "decay.y"},
-        {"decay": {"k": -2.0}, "x": {"x": 3.0}},
-        step=0.01,
-    )
-    assert np.allclose(
-        recorded.column("x", "y"), 3.0 * 0.98 ** np.arange(101), rtol=1e-13, atol=0.0
-    )  # rounding
-    assert np.array_equal(recorded.column("decay", "y"), -2.0 * recorded.column("x", "y"))
+    ring, start = {"decay.u": "x.y", "x.u": "decay.y"}, {"decay": {"k": -2.0}, "x": {"x": 3.0}}
+    recorded = ran({"decay": gain(), "x": INTEGRATOR}, ring, start, step=0.01)
+    x = recorded.column("x", "y")
+    assert np.allclose(x, 3.0 * 0.98 ** np.arange(101), rtol=1e-13, atol=0.0)  # rounding
+    assert np.array_equal(recorded.column("decay", "y"), -2.0 * x)
 
 
 @pytest.mark.slow
@@ -107,45 +98,17 @@ def test_arrays_and_elements_are_connected_one_by_one() -> None:
     assert recorded.units == ("m",) * 7
 
 
-def test_blocks_are_initialized_with_what_their_inputs_are_at_the_start() -> None:
-    """A block that remembers its input when its initialization ends, behind one that doubles a log."""
-    remembers = Foreign(
-        name="remembers",
-        scalars=(Scalar("u", 0, "input"), Scalar("y", 1)),
-        compute="if (!v->i[0]) { v->r[1] = v->r[0]; v->i[0] = 1; }",
-        fresh=False,
-    )
-    column = LogColumn(np.array([0, 10**8]), np.array([3.0, 4.0]))
-    recorded = ran(
-        {"first": remembers, "double": gain()},
-        {"first.u": "double.y"},
-        {"double": {"k": 2.0}},
-        [follow("double.u")],
-        column=lambda _: column,
-    )
-    assert recorded.column("first", "y").tolist() == [6.0] * 11
-
-
 def test_inputs_follow_logs_held_or_interpolated() -> None:
     columns = {
         "u": LogColumn(np.array([100, 250, 800]) * 10**6, np.array([1.0, 4.0, -7.0]), "m"),
         "n": LogColumn(np.array([0, 300]) * 10**6, np.array([2.0, 5.0])),
         "on": LogColumn(np.array([0, 500]) * 10**6, np.array([1.0, 0.0])),
     }
-
-    recorded = ran(
-        {"held": gain("metres", unit="m"), "linear": gain("metres", unit="m"), "n": COUNTER},
-        None,
-        None,
-        [
-            follow("held.u", "u"),
-            follow("n.by", "n"),
-            follow("n.on", "on"),
-            follow("linear.u", "u", interpolate=True),
-        ],
-        column=lambda one: columns[one.column],
-    )
-    t = 0.1 * np.arange(11)
+    metres, t = gain("metres", unit="m"), 0.1 * np.arange(11)
+    inputs = [follow("held.u"), follow("linear.u", interpolate=True)]
+    inputs += [follow("n.by", "n"), follow("n.on", "on")]
+    blocks = {"held": metres, "linear": metres, "n": COUNTER}
+    recorded = ran(blocks, None, None, inputs, column=lambda log_input: columns[log_input.column])
     assert recorded.column("held", "y").tolist() == [1, 1, 1, 4, 4, 4, 4, 4, -7, -7, -7]
     assert recorded.column("held", "u").tolist() == recorded.column("held", "y").tolist()
     expected = np.interp(t, columns["u"].t_ns * 1e-9, columns["u"].values)
@@ -160,18 +123,10 @@ def test_one_fmu_under_two_names_is_two_instances() -> None:
     assert recorded.column("b", "y")[-1] == pytest.approx(3.0, rel=1e-15)
 
 
-@pytest.mark.slow
-def test_the_same_plan_runs_again_with_the_same_bits() -> None:
-    plan = planned(
-        {"decay": gain(), "x": INTEGRATOR}, {"decay.u": "x.y", "x.u": "decay.y"}, {"x": {"x": 1.0}}
-    )
-    assert np.array_equal(simulate(plan).values, simulate(plan).values)
-
-
 def test_progress_rises_to_what_is_done() -> None:
     slow = Foreign(name="slow", scalars=(Scalar("y", 0),), step="usleep(20000);")
     shares: list[float] = []
     simulate(planned({"slow": slow}, step=0.05), progress=shares.append)
     assert shares == sorted(shares)
-    assert all(0.0 <= one <= 1.0 for one in shares)
+    assert all(0.0 <= share <= 1.0 for share in shares)
     assert len(set(shares)) > 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import import_module
 from subprocess import PIPE, STDOUT, CompletedProcess, run
@@ -35,5 +36,5 @@ def fmutool(*arguments: str) -> CompletedProcess[str]:
 
 def python(*arguments: str) -> CompletedProcess[str]:
     """Run Python, whatever it ends with; its output and errors come in one stream."""
-    command = [sys.executable, *arguments]
-    return run(command, stdout=PIPE, stderr=STDOUT, encoding="utf-8", check=False, timeout=600)
+    command, env = [sys.executable, *arguments], os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    return run(command, stdout=PIPE, stderr=STDOUT, encoding="utf-8", check=False, timeout=600, env=env)
