@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from random_networks import KINDS, Vec, axis_frame, matrix, transform, unit, vec
+from urmpipe_datasets import NETWORKS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import rotation_x, rotation_z, translation
 from urmpipe_models.networks.file import Network
@@ -76,6 +79,16 @@ def four_bar(
     points = np.zeros((4, 3))
     points[1:, :2] = np.array([crank, joint, pivot])
     return ring("rrrr", np.tile(Z, (4, 1)), points, drive)
+
+
+def four_bar_tables(links: tuple[float, float, float, float], at: dict[str, float]) -> dict[str, Any]:
+    """Return the shipped four-bar with other links a, b, c, d [m], its crank and joints at angles [rad]."""
+    a, b, c, d = links
+    tables = tomllib.loads((NETWORKS / "four-bar.toml").read_text(encoding="utf-8"))
+    tables["controls"]["crank"]["start"] = at["crank"]
+    for name, first, second in (("A", a, 0.0), ("B", b, c), ("theta4", d, 0.0)):
+        tables["joints"][name] |= {"a": [[first, 0.0, 0.0], [second, 0.0, 0.0]], "start": at[name]}
+    return tables
 
 
 def bennett(drive: str | None = None, alpha: float = 0.6, beta: float = 1.1, t: float = 0.8) -> Network:

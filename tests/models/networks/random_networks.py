@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm, logm
+from scipy.linalg import expm, null_space
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.elementwise import FloatArray
@@ -23,6 +23,7 @@ from urmpipe_models.networks.parts import (
     Expression,
     Joint,
     JointKind,
+    frame_from_axes,
 )
 
 Poses = dict[str, FloatArray]
@@ -30,6 +31,9 @@ Vec = tuple[float, float, float]
 
 KINDS: tuple[JointKind, ...] = ("revolute", "prismatic", "cylindrical", "helical", "global")
 ELEMENTS: tuple[ElementKind, ...] = ("gg", "eg", "crc", "gc")
+# weights of central differences of eighth order of nine equally spaced values: first and second derivative
+FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
+SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
 
 
 def vec(array: FloatArray) -> Vec:
@@ -60,22 +64,19 @@ def random_pose(rng: np.random.Generator, size: float = 1.0) -> FloatArray:
 
 def axis_frame(n: FloatArray, a: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return a frame at a in [m] whose second column is n; its first is any across it."""
-    frame = np.eye(4)
-    m = unit(np.cross(n, rng.normal(size=3)))
-    frame[:3, :3] = np.column_stack((m, n, np.cross(m, n)))
-    frame[:3, 3] = a
-    return frame
-
-
-def skew(w: FloatArray) -> FloatArray:
-    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    return matrix(frame_from_axes(vec(unit(np.cross(n, rng.normal(size=3)))), vec(n), vec(a)))
 
 
 def generator(w: FloatArray | Sequence[float], v: FloatArray | Sequence[float]) -> FloatArray:
     """Return the 4 x 4 matrix of a twist in [rad] and [m]."""
     full = np.zeros((4, 4))
-    full[:3, :3], full[:3, 3] = skew(np.asarray(w)), v
+    full[:3, :3], full[:3, 3] = np.cross(np.eye(3), w), v
     return full
+
+
+def twist_of(full: FloatArray) -> FloatArray:
+    """Return the twist of a 4 x 4 matrix in [rad] and [m], shape (6,)."""
+    return np.array([full[2, 1], full[0, 2], full[1, 0], *full[:3, 3]])
 
 
 def motion(kind: JointKind, q: Sequence[float] | FloatArray, pitch: float = 0.0) -> FloatArray:
@@ -102,14 +103,7 @@ def joint_between(
 ) -> Joint:
     """Return a joint that closes where its bodies have these poses.
 
-    Args:
-        name: Its name.
-        kind: Its kind.
-        bodies: Its bodies.
-        poses: The bodies in the ground.
-        rng: Of what is left open.
-        at: Its frame a on the first body, in the ground.
-        start: Its variables there in [rad] and [m].
+    It is at a frame `at` in the ground, with variables `start` in [rad] and [m], or both at random.
     """
     at = random_pose(rng) if at is None else at
     q = random_values(kind, rng) if start is None else tuple(start)
@@ -194,29 +188,23 @@ def random_pair(names: Sequence[str], rng: np.random.Generator) -> tuple[str, st
 
 def reframed(network: Network, rng: np.random.Generator, size: float = 1.0) -> Network:
     """Return a network whose joints' frames in its bodies are seen from others: the same mechanism."""
-    moved = {one.name: random_pose(rng, size) for one in network.bodies}
-    moved[network.ground] = np.eye(4)
-    back = {name: np.linalg.inv(pose) for name, pose in moved.items()}
+    moved = {one.name: random_pose(rng, size) for one in network.bodies} | {network.ground: np.eye(4)}
 
     def frame(one: Joint, k: int) -> Transform:
-        return transform(back[one.bodies[k]] @ matrix(one.frames[k]))
+        return transform(np.linalg.inv(moved[one.bodies[k]]) @ matrix(one.frames[k]))
 
     def point(one: ConstraintElement, k: int) -> Vec:
         return vec(into(moved[one.bodies[k]], np.array(one.points[k])))
 
     def normal(one: ConstraintElement, k: int) -> Vec:
-        return vec(back[one.bodies[k]][:3, :3] @ np.array(one.normals[k]))
+        return vec(moved[one.bodies[k]][:3, :3].T @ np.array(one.normals[k]))
 
     joints = tuple(replace(one, frames=(frame(one, 0), frame(one, 1))) for one in network.joints)
     elements = tuple(
-        replace(
-            one,
-            length=lifted(one, moved[one.bodies[0]]),
-            points=(point(one, 0), point(one, 1)),
-            normals=(normal(one, 0), normal(one, 1)),
-        )
+        replace(one, length=lifted(one, moved[one.bodies[0]]), points=(point(one, 0), point(one, 1)),
+                normals=(normal(one, 0), normal(one, 1)))
         for one in network.elements
-    )
+    )  # fmt: skip
     return replace(network, joints=joints, elements=elements)
 
 
@@ -225,20 +213,6 @@ def lifted(element: ConstraintElement, moved: FloatArray) -> Expression:
     if element.kind != "eg":
         return element.length
     return Expression(f"{element.length.text} - ({float(np.array(element.normals[0]) @ moved[:3, 3])!r})")
-
-
-def null_space(jacobian: FloatArray, cutoff: float = 1e-8) -> FloatArray:
-    """Return a basis of what a matrix maps to 0; below this share of the largest singular values are 0."""
-    if not len(jacobian):
-        return np.eye(jacobian.shape[1])
-    _, values, rows = np.linalg.svd(jacobian)
-    rank = int((values > cutoff * values[0]).sum()) if values[0] > 0.0 else 0
-    return np.asarray(rows[rank:].T)
-
-
-def column_space(vectors: FloatArray, cutoff: float = 1e-6) -> FloatArray:
-    left, values, _ = np.linalg.svd(vectors, full_matrices=False)
-    return np.asarray(left[:, values > cutoff * max(1.0, values.max(initial=0.0))])
 
 
 def difference(function: Callable[[FloatArray], FloatArray], x: FloatArray, step: float = 1e-3) -> FloatArray:
@@ -254,11 +228,8 @@ def difference(function: Callable[[FloatArray], FloatArray], x: FloatArray, step
     """
     size = len(x)
     steps = np.concatenate([m * step * np.eye(size) for m in (1, 2, 3, -1, -2, -3)], axis=1)
-    values = function(x[:, np.newaxis] + steps)
-    sides = [
-        values[..., m * size : (m + 1) * size] - values[..., (m + 3) * size : (m + 4) * size]
-        for m in range(3)
-    ]
+    values = np.array_split(function(x[:, np.newaxis] + steps), 6, axis=-1)
+    sides = [ahead - behind for ahead, behind in zip(values[:3], values[3:], strict=True)]
     return np.asarray((45.0 * sides[0] - 9.0 * sides[1] + sides[2]) / (60.0 * step))
 
 
@@ -273,42 +244,36 @@ def pose_of(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
 
 def body_jacobian(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
     """Return a body's twists in the ground a unit of each variable, by differences, shape (6, variables)."""
-
-    def poses(at: FloatArray) -> FloatArray:
-        frame = mechanism.poses(at)[body]
-        full = np.zeros((4, 4, at.shape[1]))
-        for i in range(3):
-            full[i, 3] = frame.translation[i]
-            for j in range(3):
-                full[i, j] = frame.rotation[i][j]
-        return full
-
-    rates = difference(poses, x)
     now = np.linalg.inv(pose_of(mechanism, x, body))
-    twists = [rates[:, :, k] @ now for k in range(len(x))]
-    return np.array([[t[2, 1], t[0, 2], t[1, 0], *t[:3, 3]] for t in twists]).T
+    rates = difference(one_by_one(lambda at: pose_of(mechanism, at, body)), x)
+    return np.array([twist_of(rate @ now) for rate in np.moveaxis(rates, -1, 0)]).T
 
 
 def twist_space(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
     """Return a basis of the twists that a body can have in the closed network, shape (6, k)."""
-    ways = null_space(evaluate_closure(mechanism, x[:, np.newaxis]).jacobian[:, :, 0])
-    return column_space(body_jacobian(mechanism, x, body) @ ways)
+    return column_space(body_jacobian(mechanism, x, body) @ closed_motions(mechanism, x))
+
+
+def closed_motions(mechanism: Mechanism, x: FloatArray) -> FloatArray:
+    """Return a basis of the changes of the variables that leave a network closed, shape (variables, k)."""
+    jacobian = evaluate_closure(mechanism, x[:, np.newaxis]).jacobian[:, :, 0]
+    return np.asarray(null_space(jacobian, rcond=1e-8) if len(jacobian) else np.eye(len(x)))
+
+
+def column_space(vectors: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of what columns span, of singular values above 1e-6."""
+    left, values, _ = np.linalg.svd(vectors, full_matrices=False)
+    return np.asarray(left[:, values > 1e-6 * max(1.0, values.max(initial=0.0))])
 
 
 def assert_same_space(first: FloatArray, second: FloatArray, atol: float) -> None:
-    """Hold two orthonormal bases to the same space by their projections."""
+    """Compare the spaces of two orthonormal bases by their projections."""
     assert first.shape == second.shape
     np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=0.0, atol=atol)
 
 
 def assert_close(found: FloatArray | float, expected: FloatArray | float, atol: float) -> None:
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=atol)
-
-
-def log_of(matrix: FloatArray) -> FloatArray:
-    """Return the rotation vector in [rad] by the logarithm of a matrix."""
-    full = np.real(logm(matrix[:3, :3]))
-    return np.array([full[2, 1], full[0, 2], full[1, 0]])
 
 
 DOOR: dict[str, Any] = {

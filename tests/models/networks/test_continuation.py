@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from asserting import refusal
 from random_networks import matrix, motion
+from test_rates import KINDS
 from test_shipped import Answer, Rssr, Tables, bennett, rccc, rssr, slider_crank, tables_of
 from test_shipped import four_bar as four_bar_answers
-from test_tracing import KINDS
 from urmpipe import NetworkError, load_network, network_drive
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.driving import find_driven_variables

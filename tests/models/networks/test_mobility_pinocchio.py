@@ -1,16 +1,14 @@
-"""Mobility and motions against Pinocchio: open chains whose loops frame Jacobians close."""
+"""Mobility and motions against Pinocchio: open chains whose loops rigid constraints of it close."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+import random_networks as rn
 from known_mechanisms import bennett, coupled_loops, four_bar, nine_revolutes, ring, sarrus
-from random_networks import assert_same_space, matrix, null_space, random_network, reframed, unit
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
@@ -23,95 +21,71 @@ pin = pytest.importorskip("pinocchio")
 SAME = 1e-9  # of projections: both Jacobians round to 1e-15, the worst condition here is below 1e4
 
 
-@dataclass
 class Oracle:
-    """An open chain of Pinocchio: the joints one by one in the order of a network, loops closed by frames.
+    """An open chain of Pinocchio: a joint moves a copy of its far body; the first copy is the body itself.
 
     Attributes:
-        model: Pinocchio's.
-        frames: Of each body reached by a joint its frame's number.
-        closures: Pairs of frames that must be one: a body reached by a second joint, and the body.
-        columns: The number of each variable of the network by joint and index, in Pinocchio's velocity.
+        frames: Each body's frame.
+        closures: Pairs of frames that must be the same: a body reached by a second joint, and the body.
+        columns: The sign and name of each joint variable in Pinocchio's velocity.
     """
 
-    model: Any = field(default_factory=pin.Model)
-    frames: dict[str, int] = field(default_factory=dict)
-    closures: list[tuple[int, int]] = field(default_factory=list)
-    columns: dict[tuple[str, int], int] = field(default_factory=dict)
-    q: list[float] = field(default_factory=list)
+    def __init__(self, network: Network) -> None:
+        self.model, self.frames = pin.Model(), {network.ground: 0}
+        self.closures: list[tuple[Any, Any]] = []
+        self.columns: list[tuple[float, tuple[str, int]]] = []
+        self.q: list[float] = []
+        left = list(network.joints)
+        while left:
+            joint = next(one for one in left if self.frames.keys() & set(one.bodies))
+            left.remove(joint)
+            self.add(joint)
 
+    def add(self, joint: Joint) -> None:
+        """Append a joint behind the body that is there; where both are there, it closes a loop."""
+        way = 1 if joint.bodies[0] in self.frames else -1
+        (near, far), (first, second) = joint.bodies[::way], map(rn.matrix, joint.frames[::way])
+        base = self.model.frames[self.frames[near]]
+        parent, placement = base.parentJoint, base.placement * pin.SE3(first)
+        kinds = {
+            "r": (pin.JointModelRY,),
+            "p": (pin.JointModelPY,),
+            "c": (pin.JointModelRY, pin.JointModelPY),
+        }
+        for k, kind in enumerate(kinds[joint.kind[0]]):
+            parent = self.model.addJoint(parent, kind(), placement, f"{joint.name} {k}")
+            placement = pin.SE3.Identity()
+            self.columns.append((way, (joint.name, k)))
+            self.q.append(way * (joint.start[k] if joint.start else 0.0))
+        inverse = pin.SE3(np.linalg.inv(second))
+        copy = pin.Frame(f"{far} by {joint.name}", parent, 0, inverse, pin.FrameType.OP_FRAME)
+        number = self.model.addFrame(copy)
+        if far in self.frames:
+            self.closures.append((number, self.frames[far]))
+        else:
+            self.frames[far] = number
 
-def se3(full: NDArray[Any]) -> Any:
-    return pin.SE3(full[:3, :3], full[:3, 3])
+    def constraint_jacobians(self) -> tuple[FloatArray, FloatArray]:
+        """Return what each loop's frames move against each other, shape (6 loops, variables).
 
-
-def oracle_of(network: Network) -> Oracle:
-    """Return an open chain: every joint moves a copy of its far body; the first copy is the body itself."""
-    oracle = Oracle()
-    oracle.frames[network.ground] = 0
-    left = list(network.joints)
-    while left:
-        joint = next(one for one in left if oracle.frames.keys() & set(one.bodies))
-        left.remove(joint)
-        add_joint(oracle, joint)
-    return oracle
-
-
-def add_joint(oracle: Oracle, joint: Joint) -> None:
-    """Append a joint behind the body that is there; one of whose bodies both are there closes a loop."""
-    forward = joint.bodies[0] in oracle.frames
-    near, far = joint.bodies if forward else joint.bodies[::-1]
-    sign = 1.0 if forward else -1.0
-    first, second = (matrix(one) for one in (joint.frames if forward else joint.frames[::-1]))
-    base = oracle.model.frames[oracle.frames[near]]
-    parent, placement = base.parentJoint, base.placement * se3(first)
-    kinds = {
-        "revolute": (pin.JointModelRY,),
-        "prismatic": (pin.JointModelPY,),
-        "cylindrical": (pin.JointModelRY, pin.JointModelPY),
-    }
-    for k, kind in enumerate(kinds[joint.kind]):
-        number = oracle.model.addJoint(parent, kind(), placement, f"{joint.name} {k}")
-        oracle.columns[joint.name, k] = len(oracle.q)
-        oracle.q.append(sign * (joint.start[k] if joint.start else 0.0))
-        parent, placement = number, pin.SE3.Identity()
-    copy = oracle.model.addFrame(
-        pin.Frame(f"{far} by {joint.name}", parent, 0, se3(np.linalg.inv(second)), pin.FrameType.OP_FRAME)
-    )
-    if far in oracle.frames:
-        oracle.closures.append((copy, oracle.frames[far]))
-    else:
-        oracle.frames[far] = copy
-
-
-def constraint_jacobian(oracle: Oracle) -> FloatArray:
-    """Return what each loop's frames move against each other, shape (6 loops, variables)."""
-    data, q = oracle.model.createData(), np.array(oracle.q)
-    pin.computeJointJacobians(oracle.model, data, q)
-    pin.updateFramePlacements(oracle.model, data)
-    rows = []
-    for copy, body in oracle.closures:
-        gap = data.oMf[copy].actInv(data.oMf[body])
-        np.testing.assert_allclose(
-            gap.homogeneous, np.eye(4), rtol=0.0, atol=1e-12
-        )  # Pinocchio closes it, too
-        one, other = (
-            pin.getFrameJacobian(oracle.model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-            for frame in (copy, body)
-        )
-        rows.append(one - other)
-    return np.concatenate(rows)
-
-
-def signs_of(network: Network, oracle: Oracle) -> dict[str, float]:
-    """Return -1 of joints that Pinocchio walks from their second body to their first."""
-    found = {}
-    for one in network.joints:
-        number = oracle.model.getJointId(f"{one.name} 0")
-        name = next(f.name for f in oracle.model.frames if f.name.endswith(f" by {one.name}"))
-        assert number
-        found[one.name] = 1.0 if name == f"{one.bodies[1]} by {one.name}" else -1.0
-    return found
+        Both by frames' Jacobians and by `RigidConstraintModel`.
+        """
+        data, model = self.model.createData(), self.model
+        pin.computeJointJacobians(model, data, np.array(self.q))
+        pin.updateFramePlacements(model, data)
+        by_frames, by_constraints = [], []
+        for closure in self.closures:
+            gap = data.oMf[closure[0]].actInv(data.oMf[closure[1]])
+            rn.assert_close(gap.homogeneous, np.eye(4), 1e-12)  # Pinocchio closes it, too
+            world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            copy, body = (pin.getFrameJacobian(model, data, frame, world) for frame in closure)
+            by_frames.append(copy - body)
+            places = [(model.frames[k].parentJoint, model.frames[k].placement) for k in closure]
+            contact = pin.RigidConstraintModel(
+                pin.ContactType.CONTACT_6D, model, *places[0], *places[1], pin.ReferenceFrame.LOCAL
+            )
+            by_constraints.append(pin.getConstraintJacobian(model, data, contact, contact.createData()))
+        return np.concatenate(by_frames), np.concatenate(by_constraints)
 
 
 def row_space(jacobian: FloatArray) -> FloatArray:
@@ -120,20 +94,17 @@ def row_space(jacobian: FloatArray) -> FloatArray:
 
 
 def assert_as_pinocchio(network: Network) -> int:
-    """Hold mobility and the row space of the Jacobian to Pinocchio's; return the mobility."""
-    mechanism, oracle = build_mechanism(network), oracle_of(network)
-    theirs = constraint_jacobian(oracle)
+    """Compare mobility and the row space of the Jacobian with Pinocchio's; return the mobility."""
+    mechanism, oracle = build_mechanism(network), Oracle(network)
     ours = evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).jacobian[:, :, 0]
-    signs = signs_of(network, oracle)
-    aligned = np.zeros_like(theirs)
-    for column, one in enumerate(mechanism.variables):
-        aligned[:, column] = signs[one.owner] * theirs[:, oracle.columns[one.owner, one.index]]
-    rank = np.linalg.matrix_rank(theirs, tol=1e-8)
     found = analyse_mobility(mechanism, mechanism.start)
-    assert found.mobility == theirs.shape[1] - rank
-    assert found.rank == rank
-    assert_same_space(row_space(ours), row_space(aligned), SAME)
-    assert_same_space(null_space(ours), null_space(aligned), SAME)
+    columns = [mechanism.variable_index[name] for _, name in oracle.columns]
+    for jacobian in oracle.constraint_jacobians():
+        theirs = np.zeros_like(jacobian)
+        theirs[:, columns] = [sign for sign, _ in oracle.columns] * jacobian
+        rank = np.linalg.matrix_rank(theirs, tol=1e-8)
+        assert (found.mobility, found.rank) == (theirs.shape[1] - rank, rank)
+        rn.assert_same_space(row_space(ours), row_space(theirs), SAME)
     return found.mobility
 
 
@@ -153,7 +124,7 @@ MECHANISMS = {
 def test_known_mechanisms_move_as_in_pinocchio(name: str, seed: int | None) -> None:
     network, mobility = MECHANISMS[name]
     if seed is not None:
-        network = reframed(network, np.random.default_rng(seed))
+        network = rn.reframed(network, np.random.default_rng(seed))
     assert assert_as_pinocchio(network) == mobility
 
 
@@ -163,7 +134,7 @@ def test_random_loops_move_as_in_pinocchio(seed: int) -> None:
     """Revolute, prismatic and cylindrical joints at random, up to three loops, either direction."""
     rng = np.random.default_rng(seed)
     kinds: list[JointKind] = ["revolute", "prismatic", "cylindrical"]
-    network = random_network(rng, bodies=5, extra=1 + seed % 3, elements=0, kinds=kinds)
+    network = rn.random_network(rng, bodies=5, extra=1 + seed % 3, elements=0, kinds=kinds)
     assert_as_pinocchio(network)
 
 
@@ -171,23 +142,6 @@ def test_random_loops_move_as_in_pinocchio(seed: int) -> None:
 def test_slides_and_hinges_in_a_ring_move_as_in_pinocchio(seed: int) -> None:
     rng = np.random.default_rng(seed)
     kinds = "".join(rng.choice(list("rpc"), 7))
-    axes = np.array([unit(one) for one in rng.normal(size=(7, 3))])
-    network = reframed(ring(kinds, axes, rng.uniform(-1.0, 1.0, (7, 3))), rng)
+    axes = np.array([rn.unit(one) for one in rng.normal(size=(7, 3))])
+    network = rn.reframed(ring(kinds, axes, rng.uniform(-1.0, 1.0, (7, 3))), rng)
     assert assert_as_pinocchio(network) >= 1
-
-
-def test_a_rigid_constraint_of_pinocchio_gives_the_same_rank() -> None:
-    """`RigidConstraintModel` of 6 rows in the place of frame Jacobians, for Bennett's linkage."""
-    network = bennett()
-    oracle = oracle_of(network)
-    copy, body = (oracle.model.frames[k] for k in oracle.closures[0])
-    contact = pin.RigidConstraintModel(
-        pin.ContactType.CONTACT_6D, oracle.model, copy.parentJoint, copy.placement, body.parentJoint,
-        body.placement, pin.ReferenceFrame.LOCAL,
-    )  # fmt: skip
-    data, held = oracle.model.createData(), contact.createData()
-    pin.computeJointJacobians(oracle.model, data, np.array(oracle.q))
-    jacobian = pin.getConstraintJacobian(oracle.model, data, contact, held)
-    mechanism = build_mechanism(network)
-    assert jacobian.shape == (6, 4)
-    assert analyse_mobility(mechanism, mechanism.start).rank == np.linalg.matrix_rank(jacobian, tol=1e-8) == 3

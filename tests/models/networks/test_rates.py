@@ -1,37 +1,90 @@
-"""The closure elementwise: Newton steps of numbers, columns and symbols, and values with two derivatives."""
+"""Networks elementwise: poses and Newton steps of numbers, columns and symbols; values with derivatives."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
-from random_networks import DOOR
+from random_networks import DOOR, FIRST, SECOND
 from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.networks import rates
 from urmpipe_models.networks.assembly import assemble
-from urmpipe_models.networks.file import load_network, network_names
+from urmpipe_models.networks.elements import element_frame
+from urmpipe_models.networks.file import Network, load_network, network_names
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.rates import (
-    Taylor,
-    close_network,
-    closure_jacobian,
-    closure_residual,
-    damped_normal_step,
-    largest_residual,
-    predict_variables,
-    variable_changes,
-)
+from urmpipe_models.networks.rates import Taylor
+
+SHIPPED = [*map(load_network, network_names())]
+KINDS: dict[str, Any] = {  # each kind of joint, each operator and function
+    "bodies": {name: {} for name in "abcdef"},
+    "joints": {
+        "A": {"kind": "revolute", "bodies": ["ground", "a"], "value": "sin(s) / 2 + atan2(s, 2) ** 2"},
+        "B": {"kind": "prismatic", "bodies": ["b", "a"], "a": [0.1, 0.2, 0.3]},
+        "C": {"kind": "cylindrical", "bodies": ["b", "c"], "value": ["", "sqrt(u) - 0.1"]},
+        "D": {"kind": "helical", "bodies": ["c", "d"], "pitch": 0.01},
+        "E": {"kind": "global", "bodies": ["e", "d"], "a": [[0.2, 0.0, 0.0], [0.0, 0.1, 0.0]]},
+        "F": {
+            "kind": "user", "bodies": ["e", "f"],
+            "m": ["cos(s)", "sin(s)", 0], "n": ["-sin(s)", "cos(s)", 0], "a": ["s * s", "exp(-u)", "tan(s)"],
+        },
+    },
+    "controls": {"s": {"start": 0.3, "lower": 0.0, "upper": 1.0}, "u": {"value": "2 * s + 1"}},
+}  # fmt: skip
+
+
+def traced(function: Callable[[Any], Sequence[Any]], size: int) -> Callable[[Any], FloatArray]:
+    """Return a function of numbers that is computed by CasADi from symbols."""
+    import casadi as ca
+
+    symbols = [ca.SX.sym(f"x{k}") for k in range(size)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
+        call = ca.Function("traced", symbols, [ca.vertcat(*map(ca.SX, function(symbols)))])
+    return lambda x: np.array(call(*x)).ravel()
+
+
+# --- poses
+
+
+@pytest.mark.parametrize("network", [*SHIPPED, load_network(KINDS)], ids=lambda network: network.name)
+def test_poses_of_symbols_numbers_and_columns_are_the_same(network: Network) -> None:
+    mechanism = build_mechanism(network)
+
+    def entries(x: Any) -> list[Any]:
+        frames = mechanism.poses(x).values()
+        return [one for frame in frames for row in (*frame.rotation, frame.translation) for one in row]
+
+    x = np.random.default_rng(1).uniform(0.1, 0.9, (len(mechanism.variables), 5))
+    if mechanism.rotations:
+        x[mechanism.rotations[0], 0] = 0.0  # where series stand for quotients
+    columns, symbols = np.array([np.broadcast_to(one, 5) for one in entries(x)]), traced(entries, len(x))
+    for k in range(5):
+        numbers = np.array([float(one) for one in entries(x[:, k].tolist())])
+        # sums of products of numbers near 1: rounding
+        np.testing.assert_allclose(columns[:, k], numbers, atol=1e-14)
+        np.testing.assert_allclose(symbols(x[:, k]), numbers, atol=1e-14)
+
+
+def test_the_frame_of_an_element_of_symbols_is_that_of_numbers() -> None:
+    def entries(x: Sequence[Any]) -> list[Any]:
+        frame = element_frame(x[0], x[1], x[2], x[3])
+        return [*frame.rotation[0], *frame.translation]
+
+    row = (0.3, -0.7, 0.2, 2.5)  # rounding of numbers near 1
+    np.testing.assert_allclose(traced(entries, 4)(row), entries(row), atol=1e-15)
+
 
 # --- Newton steps
 
-NETWORKS = [*map(load_network, network_names()), load_network(DOOR)]
+NETWORKS = [*SHIPPED, load_network(DOOR)]
 
 
 def residual(mechanism: Mechanism, x: FloatArray) -> FloatArray:
-    return np.array(closure_residual(mechanism, x.tolist()), dtype=np.float64)
+    return np.array(rates.closure_residual(mechanism, x.tolist()), dtype=np.float64)
 
 
 @pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
@@ -40,7 +93,7 @@ def test_the_jacobian_is_that_of_finite_differences_where_the_network_is_closed(
     x = assemble(mechanism, restarts=0).x[:, 0]
     assert np.abs(residual(mechanism, x)).max() < 1e-13  # rounding
     step = 1e-6  # error of the quotient: step^2 and 1e-16 / step
-    for k, column in zip(mechanism.free, closure_jacobian(mechanism, x.tolist()), strict=True):
+    for k, column in zip(mechanism.free, rates.closure_jacobian(mechanism, x.tolist()), strict=True):
         ahead, behind = x.copy(), x.copy()
         ahead[k] += step * mechanism.column_scales[k]
         behind[k] -= step * mechanism.column_scales[k]
@@ -56,15 +109,15 @@ def test_steps_converge_quadratically_and_columns_give_what_floats_give(network:
     x[mechanism.free] += 1e-3 * scales * rng.uniform(-1.0, 1.0, (len(mechanism.free), 4))
 
     def left_over(steps: int) -> float:
-        rows = closure_residual(mechanism, close_network(mechanism, [*x], steps))
+        rows = rates.closure_residual(mechanism, rates.close_network(mechanism, [*x], steps))
         return max(float(np.abs(row).max()) for row in rows)
 
     # from 1e-3 a step leads below 1e-6 times the curvature, two below its square times the curvature
     assert left_over(1) < 3e-5
     assert left_over(2) < 1e-8
     assert left_over(3) < 1e-13
-    columns = close_network(mechanism, [*x], 2)
-    floats = np.array([close_network(mechanism, one.tolist(), 2) for one in x.T], dtype=np.float64).T
+    columns = rates.close_network(mechanism, [*x], 2)
+    floats = np.array([rates.close_network(mechanism, one.tolist(), 2) for one in x.T], dtype=np.float64).T
     for column, row in zip(columns, floats, strict=True):
         np.testing.assert_allclose(np.broadcast_to(column, 4), row, atol=1e-11)  # rounding over mu
 
@@ -75,7 +128,7 @@ def test_a_damped_step_is_that_of_least_squares_also_with_redundant_rows_and_idl
     J[:, 4] = J[:, 0] - 2.0 * J[:, 1]  # which no row determines
     J[5:] = J[:3] + J[2:5]
     e = J @ rng.normal(size=5)
-    step = np.array(damped_normal_step([[*map(float, column)] for column in J.T], [*map(float, e)]))
+    step = np.array(rates.damped_normal_step([[*map(float, column)] for column in J.T], [*map(float, e)]))
     np.testing.assert_allclose(J @ step, -e, atol=1e-10)
     least = np.linalg.lstsq(J, -e, rcond=1e-9)[0]
     # along the idle direction rounding of some 1e-15 of e over mu = 1e-13: some percent
@@ -84,32 +137,32 @@ def test_a_damped_step_is_that_of_least_squares_also_with_redundant_rows_and_idl
 
 @pytest.mark.parametrize("name", ["four-bar", "cam-follower", "stewart-gough-driven"])
 def test_steps_that_close_a_network_are_the_same_of_symbols_and_numbers(name: str) -> None:
-    import casadi as ca
-
     mechanism = build_mechanism(load_network(name))
     before = assemble(mechanism).x[:, 0]
     x = before + np.random.default_rng(2).normal(scale=1e-3, size=len(before))
 
     def step(x: Any) -> list[Any]:
         ahead = [x[k] + 0.01 for k in mechanism.controls]
-        predicted = predict_variables(mechanism, x, variable_changes(mechanism, before.tolist(), x), ahead)
-        entries = [one for column in closure_jacobian(mechanism, predicted) for one in column]
-        return [largest_residual(mechanism, predicted), *entries, *close_network(mechanism, predicted, 3)]
+        predicted = rates.predict_variables(
+            mechanism, x, rates.variable_changes(mechanism, before.tolist(), x), ahead
+        )
+        entries = [one for column in rates.closure_jacobian(mechanism, predicted) for one in column]
+        return [
+            rates.largest_residual(mechanism, predicted),
+            *entries,
+            *rates.close_network(mechanism, predicted, 3),
+        ]
 
-    symbols = [ca.SX.sym(f"x{k}") for k in range(len(x))]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
-        traced = ca.Function("step", symbols, [ca.vertcat(*map(ca.SX, step(symbols)))])
     numbers = np.array([float(one) for one in step(x.tolist())])
     # of sums of products of numbers near 1 rounding remains, which three Newton steps take along
-    np.testing.assert_allclose(np.array(traced(*x)).ravel(), numbers, atol=1e-11)
-    assert abs(largest_residual(mechanism, numbers[-len(x) :].tolist())) < 1e-9  # as far as steps of h^2 lead
+    np.testing.assert_allclose(traced(step, len(x))(x), numbers, atol=1e-11)
+    assert (
+        abs(rates.largest_residual(mechanism, numbers[-len(x) :].tolist())) < 1e-9
+    )  # as far as steps of h^2 lead
 
 
 # --- values with two derivatives: each rule against differences of the function itself, through NumPy
 
-FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
-SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
 STEP = 0.01
 
 RULES: dict[str, Callable[[Any, Any], Any]] = {
