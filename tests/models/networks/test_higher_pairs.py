@@ -46,15 +46,33 @@ CAM = wheels({"kind": "cam", "profile": UNEVEN}, S=SLIDE)
 ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps
 
 
-def value(tables: dict[str, Any], joint: str, turn: float) -> float:
-    """Return a joint's variable in [rad] or [m] with the first shaft at an angle in [deg]."""
-    return there(network_check(tables, controls={"turn": turn}).assemblies[0]).values[joint][-1]
+def oracle(profile: list[list[float]]) -> CubicSpline:
+    """Return SciPy's periodic spline of a profile in [deg] and [mm], in [rad] and [m]."""
+    x, y = np.array([*profile, [profile[0][0] + 360, profile[0][1]]]).T
+    return CubicSpline(np.radians(x), 1e-3 * y, bc_type="periodic", extrapolate="periodic")
 
 
-@pytest.mark.parametrize("turn", [0.0, 50.0, 1000.0, -2000.0])
-def test_full_turns_of_a_gear_and_a_rack_count(turn: float) -> None:
-    assert value(GEARED, "B", turn) == pytest.approx(math.radians(30 - 0.5 * turn), abs=ROUNDING)
-    assert value(RACK, "S", turn) == pytest.approx(0.003 - 0.008 * math.radians(turn), abs=ROUNDING)
+LIFT = float(oracle(UNEVEN)(math.radians(40)))  # m
+INTERNAL = wheels({"kind": "gear", "teeth": [20, -80]}, B=shaft(("ground", "b"), 300))
+ROCKER = wheels({"kind": "cam", "profile": UNEVEN, "offset": 5}, R=shaft(("ground", "r"), 100))
+
+
+@pytest.mark.parametrize(
+    ("tables", "joint", "turn", "expected"),
+    [
+        *((GEARED, "B", turn, math.radians(30 - 0.5 * turn)) for turn in (0, 50, 1000, -2000)),
+        *((RACK, "S", turn, 0.003 - 0.008 * math.radians(turn)) for turn in (0, 50, 1000, -2000)),
+        (INTERNAL, "B", 100, math.radians(25)),  # an internal wheel turns the same way
+        (CAM, "S", 400, LIFT),
+        (ROCKER, "R", 400, math.radians(5 + 1e3 * LIFT)),
+    ],
+)
+def test_a_pair_moves_by_its_closed_form_and_full_turns_count(
+    tables: dict[str, Any], joint: str, turn: float, expected: float
+) -> None:
+    """Joints in [rad] or [m], the first shaft in [deg]."""
+    found = there(network_check(tables, controls={"turn": turn}).assemblies[0])
+    assert found.values[joint][-1] == pytest.approx(expected, abs=ROUNDING)
 
 
 def test_full_turns_count_where_neither_joint_is_driven() -> None:
@@ -62,11 +80,6 @@ def test_full_turns_count_where_neither_joint_is_driven() -> None:
     found = network_check({**GEARED, "controls": {}, "joints": joints}).assemblies[0].values
     assert found["B"][0] == pytest.approx(math.pi / 6 - 0.5 * found["A"][0], abs=ROUNDING)
     assert found["A"][0] > 4 * math.pi  # near its start, 5 pi
-
-
-def test_an_internal_wheel_turns_the_same_way() -> None:
-    ring = {**GEARED, "elements": {"pair": {"kind": "gear", "joints": ["A", "B"], "teeth": [20, -80]}}}
-    assert value(ring, "B", 100.0) == pytest.approx(math.radians(25), abs=ROUNDING)
 
 
 def test_a_planetary_gear_moves_by_the_equation_of_willis() -> None:
@@ -94,12 +107,6 @@ def test_a_planetary_gear_moves_by_the_equation_of_willis() -> None:
     assert (there(found.mobility).mobility, found.structure) == (1, "closed chain")
 
 
-def oracle(profile: list[list[float]]) -> CubicSpline:
-    """Return SciPy's periodic spline of a profile in [deg] and [mm], in [rad] and [m]."""
-    x, y = np.array([*profile, [profile[0][0] + 360, profile[0][1]]]).T
-    return CubicSpline(np.radians(x), 1e-3 * y, bc_type="periodic", extrapolate="periodic")
-
-
 def test_a_cam_lifts_by_the_periodic_spline_of_its_profile() -> None:
     (cam,) = load_network(CAM).elements
     angles = np.linspace(-20.0, 20.0, 4001)
@@ -107,13 +114,6 @@ def test_a_cam_lifts_by_the_periodic_spline_of_its_profile() -> None:
     spline = oracle(UNEVEN)
     np.testing.assert_allclose(lift, spline(angles), atol=1e-15)  # lifts of 1e-2 m: rounding
     np.testing.assert_allclose(slope, spline(angles, 1), atol=1e-14)
-    assert value(CAM, "S", 400.0) == pytest.approx(float(spline(math.radians(40.0))), abs=ROUNDING)
-
-
-def test_a_rocker_follows_in_degrees() -> None:
-    tables = wheels({"kind": "cam", "profile": UNEVEN, "offset": 5}, R=shaft(("ground", "r"), 100))
-    expected = math.radians(5) + 1e3 * math.radians(float(oracle(UNEVEN)(math.radians(40.0))))
-    assert value(tables, "R", 400.0) == pytest.approx(expected, abs=ROUNDING)
 
 
 def test_numbers_columns_and_symbols_pass_through_the_same_lines() -> None:

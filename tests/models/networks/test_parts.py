@@ -75,18 +75,6 @@ def test_value_and_slopes_are_those_of_python_and_of_a_complex_step(text: str, x
         assert slopes.get(name, 0.0) == pytest.approx(slope, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "2 * x + y", "x - y - 1", "x / y / 2", "-x ** 2", "2 ** -x ** 2", "+x * -y", " (x + 1) * (y - 1)",
-        "1.5e-3 + 10 * pi", "atan2(x, -y) ** 3",
-    ],
-)  # fmt: skip
-def test_operators_bind_as_those_of_python(text: str) -> None:
-    values = {"x": 0.7, "y": 1.9}
-    assert Expression(text).value(values) == pytest.approx(eval(text.strip(), REAL | values), rel=1e-15)
-
-
 def test_arrays_go_through_as_numbers_do() -> None:
     x, y = np.linspace(-1.0, 1.0, 5), np.linspace(1.0, 2.0, 5)
     value, slopes = Expression("sqrt(y) * x ** 3 + atan2(x, y)").value_and_gradient({"x": x, "y": y})
