@@ -110,10 +110,10 @@ def rccc(a: FloatArray, alpha: FloatArray, s1: float, t1: float) -> list[Answer]
     e1 Ry(-alpha_2) Rx(-t1) Ry(-alpha_1) Rx(-t4) Ry(-alpha_4) e1 = cos(alpha_3). By the principle of
     transference it holds for dual angles, too: F_t1 s1 + F_t4 s4 + sum F_alpha a = 0.
     """
-    first = row_of(t1, alpha)
-    sine = math.sin(alpha[3])
+    at = [spherical(t1, t4, alpha).real for t4 in (0.0, math.pi / 2, math.pi)]
+    mean = (at[0] + at[2]) / 2  # of A cos(t4) + B sin(t4) - C
     answers: list[Answer] = []
-    for t4 in roots(sine * first[2], sine * first[1], math.cos(alpha[2]) - first[0] * math.cos(alpha[3])):
+    for t4 in roots((at[0] - at[2]) / 2, at[1] - mean, -mean):
         # steps of 1e-30 along the imaginary axis: exact derivatives, as dual numbers give them
         by_t4 = spherical(t1, t4 + 1e-30j, alpha).imag
         by_others = spherical(t1 + 1e-30j * s1, t4, alpha + 1e-30j * a).imag
@@ -121,17 +121,13 @@ def rccc(a: FloatArray, alpha: FloatArray, s1: float, t1: float) -> list[Answer]
     return answers
 
 
-def row_of(t1: complex, alpha: FloatArray) -> FloatArray:
-    """Return e1 Ry(-alpha_2) Rx(-t1) Ry(-alpha_1)."""
-    c1, s1, c2, s2 = np.cos(alpha[0]), np.sin(alpha[0]), np.cos(alpha[1]), np.sin(alpha[1])
-    c, s = np.cos(t1), np.sin(t1)
-    return np.array([c2 * c1 - s2 * c * s1, s2 * s, -c2 * s1 - s2 * c * c1])
-
-
 def spherical(t1: complex, t4: complex, alpha: FloatArray) -> complex:
-    """Return F of `rccc`."""
-    first, (c4, s4) = row_of(t1, alpha), (np.cos(alpha[3]), np.sin(alpha[3]))
-    return complex(first[0] * c4 + first[1] * s4 * np.sin(t4) + first[2] * s4 * np.cos(t4) - np.cos(alpha[2]))
+    """Return F of `rccc`: the first entry of the product, less cos(alpha_3)."""
+    row = np.array([1, 0, 0])
+    for x, y in ((0, alpha[1]), (t1, alpha[0]), (t4, alpha[3])):  # Rx(-x) Ry(-y)
+        c, s, cy, sy = np.cos(x), np.sin(x), np.cos(y), np.sin(y)
+        row = row @ [[1, 0, 0], [0, c, s], [0, -s, c]] @ [[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]
+    return complex(row[0] - np.cos(alpha[2]))
 
 
 # --- printed answers
