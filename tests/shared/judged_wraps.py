@@ -11,6 +11,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.wraps import (
     FULL_TURN,
     MAX_VALUE,
+    Repolarized,
     WrapState,
     find_interpolated_samples,
     repolarize,
@@ -33,21 +34,27 @@ class Judged(NamedTuple):
     unexplained: list[int]
 
 
+def batch_judged(batch: Repolarized, j: int) -> Judged:
+    """Return the results of a joint by `repolarize`."""
+    changes, of_joint = np.zeros(len(batch.q), dtype=np.int64), batch.joints == j
+    changes[batch.rows[of_joint]] = batch.change[of_joint]
+    lists = (rows[rows[:, 1] == j, 0].tolist() for rows in (batch.in_between, batch.unexplained))
+    return Judged(np.cumsum(changes).tolist(), *lists)
+
+
 def judge(
     q: FloatArray,
     dt: FloatArray | float = TSP,
     period: FloatArray | float = FULL_TURN,
     max_speed: float = math.inf,
 ) -> list[Judged]:
-    """Return the results of each joint, which the batch and the steps must give bit for bit.
-
-    The lists of the batch are sorted by row and joint.
-    """
+    """Return the results of each joint, which the batch and the steps must give bit for bit."""
     periods, times = np.broadcast_to(period, q.shape[1]), np.broadcast_to(dt, len(q))
     batch = repolarize(q, times, period=periods, max_speed=max_speed)
     assert batch.change.dtype == np.int64
+    assert batch.change.all()
     for rows in (np.column_stack((batch.rows, batch.joints)), batch.unexplained, batch.in_between):
-        assert rows.tolist() == sorted(rows.tolist())
+        assert rows.tolist() == sorted(rows.tolist())  # by row and joint
     joints = []
     for j, column in enumerate(q.T):
         state, out, changes, unexplained, in_between, last = WrapState(), [], [], set[int](), [], -1
@@ -57,33 +64,25 @@ def judge(
             )
             out.append(float(result))
             changes.append(int(flags.change))
-            if flags.unexplained:
-                unexplained.add(i)
+            unexplained |= {i} if flags.unexplained else set()
             if flags.in_between:
                 in_between.append(last)
-                unexplained.discard(last)
+                unexplained -= {last}
             last = i if abs(value) < MAX_VALUE else last
         turns = np.cumsum(changes)
         assert np.array(out).tobytes() == np.ascontiguousarray(batch.q[:, j]).tobytes()
         np.testing.assert_array_equal(out, column + periods[j] * turns)
         assert np.array(out)[turns == 0].tobytes() == column[turns == 0].tobytes()  # signs of zeros, too
-        of_joint = batch.joints == j
-        assert np.flatnonzero(changes).tolist() == batch.rows[of_joint].tolist()
-        assert [change for change in changes if change] == batch.change[of_joint].tolist()
-        assert sorted(unexplained) == batch.unexplained[batch.unexplained[:, 1] == j, 0].tolist()
-        assert in_between == batch.in_between[batch.in_between[:, 1] == j, 0].tolist()
         joints.append(Judged(turns.tolist(), in_between, sorted(unexplained)))
+        assert joints[j] == batch_judged(batch, j)
     return joints
 
 
 def find_in_between(q: FloatArray, max_speed: float = math.inf) -> Judged:
     """Return the results of a joint by the batch, with in-between samples that only the whole log shows."""
-    t = TSP * np.arange(len(q), dtype=np.float64)
-    result = repolarize(q[:, np.newaxis], np.full(len(q), TSP), max_speed=max_speed)
-    here = np.flatnonzero(~np.isnan(q))
-    wraps = np.searchsorted(here, result.rows)
-    found = here[find_interpolated_samples(q[here], result.q[here, 0], t[here], wraps, FULL_TURN)]
-    changes = np.zeros(len(q), dtype=np.int64)
-    changes[result.rows] = result.change
-    samples = sorted({*result.in_between[:, 0].tolist(), *found.tolist()})
-    return Judged(np.cumsum(changes).tolist(), samples, result.unexplained[:, 0].tolist())
+    t, here = TSP * np.arange(len(q), dtype=np.float64), np.flatnonzero(~np.isnan(q))
+    batch = repolarize(q[:, np.newaxis], np.full(len(q), TSP), max_speed=max_speed)
+    wraps = np.searchsorted(here, batch.rows)
+    found = here[find_interpolated_samples(q[here], batch.q[here, 0], t[here], wraps, FULL_TURN)]
+    judged = batch_judged(batch, 0)
+    return judged._replace(in_between=sorted({*judged.in_between, *found.tolist()}))
