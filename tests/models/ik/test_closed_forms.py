@@ -71,9 +71,8 @@ def test_random_arms_are_solved(kind: str) -> None:
             chain, within, given = arm_with_parallel_axes(rng, WRISTS[2], spread=0.05), 1e-12, 1e-5
         else:  # the root of the rounding
             chain, within, given = arm_of_kind(rng, kind, number), EXACT, 1e-6 if kind in WRISTS else FOLD
-        solve_poses(
-            chain, random_joints(rng, chain, 60 if kind in SPECIAL else 100), within=within, given=given
-        )
+        q = random_joints(rng, chain, 60 if kind in SPECIAL else 100)
+        solve_poses(chain, q, within=within, given=given)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ik_arms import UR, follow, limited, line, moved_over_a_gap, times
+from ik_arms import UR, follow, limited, line, times
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.limits import joint_limits
 from urmpipe_models.ik.path import find_jumps, solve_path
@@ -20,7 +20,6 @@ from urmpipe_models.robots.catalogue import load_robot
 
 ROUNDING = 1e-9  # rad: what a closed form's 1e-12 become where the Jacobian's least singular value is 1e-3
 UR5E, NEAR = load_robot("ur5e"), SearchOptions(tolerance=0.0035)
-BENT = np.array([0.3, 0.4, -0.5, 0.7, -0.4, 0.2])  # one of an arm with a spherical wrist
 
 
 amounts = st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)
@@ -37,36 +36,6 @@ def test_the_motion_that_a_path_was_made_from_is_found_again(
     assert not path.jumps and not path.singular
     assert path.method == "three parallel axes"
     assert len(set(path.branch)) == 1
-
-
-def test_turns_are_counted_on_up_to_the_limits() -> None:
-    q = line([3.5, 0.0, 0.0, 0.0, 0.0, 11.5], 600, UR + np.array([2.0, 0.0, 0.0, 0.0, 0.0, -6.0]))
-    path = follow(UR5E, q)
-    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
-    assert path.jumps == ()
-
-
-@pytest.mark.parametrize("robot", ["arm6", "articulated6r", "ur5e"])
-def test_through_an_aligned_wrist_the_joints_go_on_and_within_it_the_free_ones_stay_still(robot: str) -> None:
-    arm = load_robot(robot)
-    # joints 4 and 6 of the UR arm turn about axes apart from each other, so that it must come in straight
-    by = [0.3, 0.2, -0.2, 0.0, 0.0, 0.0] if robot == "ur5e" else [0.4, 0.3, 0.3, 0.0, 0.0, 0.0]
-    q = line(by, 201, UR if robot == "ur5e" else BENT)
-    q[:, 4] = np.linspace(-0.3, 0.3, 201)
-    q[100, 4] = 0.0
-    path = follow(arm, q)
-    # rad: 1e-12 over the sine of 0.003 rad, with a margin of ten
-    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=1e-8)
-    assert path.jumps == ()
-    assert path.branch[0].endswith(", flipped") != path.branch[-1].endswith(", flipped")
-    assert [stretch.text for stretch in path.singular] == ["sample 100 at 0.500 s: wrist aligned"]
-    q[:, 4] = 0.0
-    within = follow(arm, q)
-    # rad: nothing is near singular here, the family is resolved as it is
-    np.testing.assert_allclose(within.q, q, rtol=0.0, atol=ROUNDING)
-    assert within.jumps == ()
-    (stretch,) = within.singular
-    assert stretch.text == "samples 0 to 200, 0.000 to 1.000 s: wrist aligned"
 
 
 @pytest.mark.slow
@@ -97,31 +66,6 @@ def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, rob
         last = options[int(np.argmin([np.square(one - last).sum() for one in options]))]
         np.testing.assert_allclose(path.q[k], last, rtol=0.0, atol=ROUNDING)
         last = path.q[k]
-
-
-def test_what_is_out_of_reach_is_left_out_and_the_branch_goes_on() -> None:
-    q = line([1.0, 0.2, 0.1, 0.3, 0.2, -0.4], 300)
-    targets = forward_targets(UR5E, q)
-    targets.position[100:150, 0] += 3.0
-    targets.position[200] = math.nan
-    path = follow(UR5E, q, targets)
-    out = np.isin(np.arange(300), [*range(100, 150), 200])
-    assert (path.reached == ~out).all()
-    np.testing.assert_allclose(path.q[~out], q[~out], rtol=0.0, atol=ROUNDING)
-    assert path.jumps == ()
-    assert path.reasons[200] == "the position is nan, nan, nan m, allowed: finite numbers"
-    assert all(" m" in text and "allowed" in text for text in path.reasons[100:150])
-    assert set(path.branch[~out]) == {path.branch[0]}
-
-
-def test_after_a_gap_the_branch_of_before_goes_on_though_another_is_nearer() -> None:
-    q, targets = moved_over_a_gap([0.0, 0.0, 0.0, 2.9, 0.0, 2.9])
-    path = follow(UR5E, q, targets)
-    np.testing.assert_allclose(path.q[22:], q[22:], rtol=0.0, atol=ROUNDING)
-    assert path.branch[22] == path.branch[17]
-    assert path.jumps == ()
-    nearest = follow(UR5E, path.q[17:], targets.rows(slice(22, 40)))
-    assert nearest.branch[0] != path.branch[22]
 
 
 def stretching(beyond: FloatArray, q5: float = 1.2) -> tuple[FloatArray, Targets]:

@@ -44,12 +44,10 @@ def matrices(k: int, p: int, n: int = 50) -> FloatArray:
 def test_systems_are_solved_as_lapack_solves_them_with_the_damping_on_the_diagonal(k: int) -> None:
     b = matrices(k, 1)[:, 0]
     damping = np.random.default_rng(1).uniform(0.1, 1.0, (b.shape[1],))
-    # normal random matrices k x (k + 3) have conditions up to 1e3 squared: 1e-16 * 1e6, with room
+    # normal random matrices k x (k + 3) have conditions up to 1e3 squared: 1e-16 * 1e6; damped < 1e3
     for columns, damped, rtol, atol in ((k + 3, (), 1e-8, 1e-9), (2, (damping,), 1e-10, 1e-12)):
         A = gram(matrices(k, columns))
-        each = A.transpose(2, 0, 1) + np.sum(damped, axis=0)[..., None, None] * np.eye(
-            k
-        )  # damped: conditions < 1e3
+        each = A.transpose(2, 0, 1) + np.sum(damped, axis=0)[..., None, None] * np.eye(k)
         peer = np.linalg.solve(each, b.T[..., None])[..., 0].T
         np.testing.assert_allclose(factor(A, *damped).solve(b), peer, rtol=rtol, atol=atol)
 
