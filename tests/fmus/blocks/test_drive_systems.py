@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from drive_oracle import DAMPING, J, K, drive_matrix, integrate, motor_after
+from drive_oracle import DAMPING, J, K, drive_matrix, integrate
 from stepped_unit import SteppedUnit, needs_native, run_system
 from urmpipe_fmus.cosim import CosimulationRecord, load_system
 from urmpipe_models.drives import trapezoid
@@ -182,21 +182,3 @@ def test_six_drives_arrive_where_their_set_points_do_and_shake_at_the_wrist_with
     assert max(shaking(fine, i) for i in range(1, 7)) < 1e-3
     assert shaking(coarse, 6) > 0.01
     assert max(shaking(coarse, i) for i in range(1, 6)) < 0.01
-
-
-@pytest.mark.slow
-@needs_native
-def test_the_native_drives_error_falls_with_the_fourth_power_of_the_internal_step(tmp_path: Path) -> None:
-    steps, file = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4), tmp_path / "drives.toml"
-    blocks = (
-        f"[blocks.drive{k}]\nunit = 'dc_drive'\nstart = {{"
-        f"internal_step = {internal_step}, u = 24.0, theta2 = 0.0, omega2 = 0.0, i_a = 3.0 }}\n"
-        for k, internal_step in enumerate(steps)
-    )
-    file.write_text("[system]\nstep = 0.04\nduration = 0.04\n" + "".join(blocks), encoding="utf-8")
-    recorded, expected = finished(file, 0.04), motor_after({"u": 24.0, "i_a": 3.0}, 0.04)
-    errors = []
-    for k in range(len(steps)):
-        found = [recorded.column(f"drive{k}", name)[-1] for name in ("theta1", "omega1", "i_a")]
-        errors.append(float(np.abs(found - expected).max()))
-    assert -np.diff(np.log2(errors))[1:] == pytest.approx(4.0, abs=0.2), errors

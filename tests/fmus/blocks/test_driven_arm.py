@@ -52,34 +52,26 @@ def one_joint(drive: DrivenJoint | PassiveJoint, body: Inertial, **fields: Any) 
 
 
 class OneSystem:
-    """The model functions with DOP853, a controller's period at a time; springs hold joints without a drive.
+    """The model functions of an arm of two drives and a spring, with DOP853, a controller's period at a time.
 
     The state x is q and q', of the drives theta1, theta1' and the current, and integrals: of the power in and
-    lost, and of what the wrench gives and the springs' dampers take of them.
+    lost, and of what the wrench gives and the spring's damper takes of them.
     """
 
-    def __init__(self, chain: Chain, wrench: Wrench) -> None:
-        self.chain, self.wrench, self.n = chain, wrench, len(chain.coordinates)
-        self.links = chain_to_links(chain)
-        self.rests = find_equilibrium(chain)
-        by_joint = {one.joint: one for one in chain.drives}
-        self.joints = [by_joint[name] for name in chain.coordinates]
-        self.driven = [k for k, one in enumerate(self.joints) if isinstance(one, DrivenJoint)]
-        rest = [self.rests[k] for k in self.driven]
-        motors = [[one.rest for one in rest], [0.0 for _ in rest], [one.current for one in rest]]
-        self.voltages = [one.voltage for one in self.rests]
-        self.x = np.concatenate((chain.start, np.zeros(self.n), *motors, np.zeros(4)))
+    def __init__(self, chain: Chain, drives: list[DrivenJoint], spring: PassiveJoint, wrench: Wrench) -> None:
+        self.chain, self.drives, self.wrench, self.links = chain, drives, wrench, chain_to_links(chain)
+        first, second, held = find_equilibrium(chain)
+        self.spring = Spring(spring.stiffness, spring.damping, held.rest)
+        self.voltages = [first.voltage, second.voltage]
+        motors = [first.rest, second.rest, 0.0, 0.0, first.current, second.current]
+        self.x = np.array([*chain.start, *STILL[:3], *motors, *STILL[:4]])
 
     def state(self, x: FloatArray) -> ArmState:
-        motors = dict(zip(self.driven, x[2 * self.n : -4].reshape(3, -1).T, strict=True))
-        actuators: list[dynamics.Actuator] = []
-        for k, (one, rest) in enumerate(zip(self.joints, self.rests, strict=True)):
-            if isinstance(one, DrivenJoint):
-                theta1, omega1, current = motors[k]
-                actuators.append(Motor(one.drive, theta1, omega1, current, self.voltages[k], one.spring))
-            else:
-                actuators.append(Spring(one.stiffness, one.damping, rest.rest))
-        return ArmState(list(x[: self.n]), list(x[self.n : 2 * self.n]), actuators)
+        motors = [
+            Motor(one.drive, *values, voltage, one.spring)
+            for one, values, voltage in zip(self.drives, x[6:12].reshape(3, 2).T, self.voltages, strict=True)
+        ]
+        return ArmState(list(x[:3]), list(x[3:6]), [*motors, self.spring])
 
     def accelerations(self, state: ArmState) -> list[Any]:
         return dynamics.joint_accelerations(self.chain, state, self.wrench, self.links)
@@ -89,22 +81,15 @@ class OneSystem:
         motors = np.array([*dynamics.motor_derivatives(state).values()]).T
         flows = dynamics.power_flow(self.chain, state, self.wrench)
         pushed = wrench_power(self.chain, state.q, state.qd, self.wrench)
-        damped = sum(
-            one.damping * rate**2
-            for one, rate in zip(state.actuators, state.qd, strict=True)
-            if isinstance(one, Spring)
-        )
-        heat = [flows.supplied, flows.dissipated, pushed, damped]
+        heat = [flows.supplied, flows.dissipated, pushed, self.spring.damping * x[5] ** 2]
         return np.concatenate((state.qd, self.accelerations(state), *motors, heat))
 
     def sample(self, wanted: FloatArray) -> None:
-        """Take the sample of eq. 20: wanted are positions, velocities and accelerations, shape (3, n)."""
+        """Take the sample of eq. 20: wanted are positions, velocities and accelerations, shape (3, 3)."""
         state = self.state(self.x)
-        real = np.array([state.q, state.qd, self.accelerations(state)])
-        for k in self.driven:
-            one = self.joints[k]
-            assert isinstance(one, DrivenJoint)
-            added = float(np.dot(one.gains, (wanted - real)[:, k]))
+        errors = wanted - np.array([state.q, state.qd, self.accelerations(state)])
+        for k, one in enumerate(self.drives):
+            added = float(np.dot(one.gains, errors[:, k]))
             self.voltages[k] = float(np.clip(self.voltages[k] + added, -48.0, 48.0))
 
     def go(self, duration: float) -> None:
@@ -218,9 +203,6 @@ def test_robots_with_too_little_voltage_are_refused() -> None:
     ]
 
 
-# The system driven-arm
-
-
 SYSTEM = load_system("driven-arm")
 SMALL = Drive(50.0, 0.1, 100.0, 0.01, 2.0, 2e-3, 5e-3)  # of a wrist, as the system has it
 
@@ -315,16 +297,10 @@ def test_at_5_ms_the_blocks_are_unstable_and_at_2_5_ms_they_are_not() -> None:
         assert abs(late) < 1e-3
 
 
-# Springs beside drives
-
-
 def without_springs(chain: Chain) -> Chain:
     none = CounterbalanceSpring(0.0, 0.0)
     drives = (replace(one, spring=none) if isinstance(one, DrivenJoint) else one for one in chain.drives)
     return replace(chain, drives=tuple(drives))
-
-
-PUSH = Wrench((20.0, -15.0, 25.0), (1.0, -2.0, 1.5))
 
 
 @pytest.mark.slow
@@ -371,12 +347,14 @@ def test_the_torque_of_a_spring_is_what_its_energy_changes_by() -> None:
 @pytest.mark.slow
 def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() -> None:
     turn, slide, _ = sprung_arm().drives
+    assert isinstance(turn, DrivenJoint)
     assert isinstance(slide, DrivenJoint)
     slide = replace(slide, period=PERIOD, spring=CounterbalanceSpring(2000.0, 0.22))
-    drives = (turn, slide, PassiveJoint("wrist", 200.0, 5.0))
-    chain = replace(sprung_arm(), drives=drives)
-    whole = OneSystem(chain, PUSH)
-    values = {"internal_step": 2.5e-4, "force": PUSH.force, "moment": PUSH.moment}
+    wrist = PassiveJoint("wrist", 200.0, 5.0)
+    chain = replace(sprung_arm(), drives=(turn, slide, wrist))
+    push = Wrench((20.0, -15.0, 25.0), (1.0, -2.0, 1.5))
+    whole = OneSystem(chain, [turn, slide], wrist, push)
+    values = {"internal_step": 2.5e-4, "force": push.force, "moment": push.moment}
     model = SteppedUnit("driven_arm", values, robot=chain)
     before = whole.stored()
     for n in range(14):
@@ -387,7 +365,7 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
         for dots, points in zip(("", "d", "dd"), wanted, strict=True):
             model.put(**{f"set_phi{dots}": points[0], f"set_s{dots}": points[1]})
         model.do_step(n * PERIOD, PERIOD)
-    np.testing.assert_allclose(model.read("last", "last_s"), whole.voltages[:2], rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(model.read("last", "last_s"), whole.voltages, rtol=0.0, atol=1e-7)
     # RK4 in 0.25 ms: (h / 2 ms)^4 of the armature's time, of values that change by some 1
     found = model.read("phi", "s", "theta1", "theta1_s")[[0, 2, 1, 3, 4]]
     np.testing.assert_allclose(found, whole.x[[0, 1, 2, 6, 7]], rtol=0.0, atol=1e-7)
@@ -396,17 +374,13 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
     change = whole.stored() - before
     stretched = [
         0.5 * one.spring.stiffness * ((one.spring.rest - q) ** 2 - (one.spring.rest - start) ** 2)
-        for one, q, start in zip(chain.drives, whole.x, chain.start, strict=False)
-        if isinstance(one, DrivenJoint)
+        for one, q, start in zip(whole.drives, whole.x, chain.start, strict=False)
     ]
     # none of them is lost in the bound of the balance
     assert min(map(abs, (pushed, damped, *stretched))) > 1e-3 * abs(work) > 1e-4
     assert abs(work - change - lost) <= 1e-8 * abs(work)
     stored, given, heat = model.read("energy_stored", "energy_in", "energy_lost")
     assert abs(given - (stored - before) - heat) <= 1e-6 * abs(given)
-
-
-# At rest under a force
 
 
 LENGTH = 0.3
@@ -470,9 +444,6 @@ def test_a_force_that_is_too_large_for_the_springs_is_refused() -> None:
     )
     assert match
     assert needed < float(match[1]) < 2.0 * needed
-
-
-# The stability of the samples
 
 
 def radius_of_the_unit(chain: Chain, round_: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,9 +10,11 @@ import numpy as np
 import pytest
 
 from drive_oracle import I1, K, L, motor_after
-from stepped_unit import SteppedUnit
+from fmu_run import FmuRun
+from stepped_unit import SteppedUnit, needs_native
 from urmpipe_fmus.block import BlockModel, State, Values
 from urmpipe_fmus.blocks import make_block
+from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 
@@ -33,16 +36,26 @@ def stepped(duration: float, **changes: float) -> FloatArray:
     return unit.read(*MOTOR)
 
 
-def test_the_error_against_scipy_falls_with_the_fourth_power_of_the_internal_step() -> None:
+def native(duration: float, **changes: float) -> FloatArray:
+    """Return them of its native FMU."""
+    model = make_block("dc_drive")
+    with FmuRun(cached_fmu(model, "native"), model, BEGIN | changes) as fmu:
+        fmu.over(np.array([0.0, duration]), {})
+        return np.array(fmu.get([one for one in model.states if one.name in MOTOR]))
+
+
+@pytest.mark.parametrize("after", [stepped, pytest.param(native, marks=[pytest.mark.slow, needs_native])])
+def test_the_error_against_scipy_falls_with_the_fourth_power_of_the_internal_step(
+    after: Callable[..., FloatArray],
+) -> None:
     expected = motor_after(BEGIN, STEP)
     size = np.abs(expected).max()
-    errors = [float(np.abs(stepped(STEP, internal_step=h) - expected).max() / size) for h in HALVINGS]
-    assert (orders(errors)[1:] > 3.8).all(), errors
-    assert (orders(errors)[1:] < 4.2).all(), errors
+    errors = [float(np.abs(after(STEP, internal_step=h) - expected).max() / size) for h in HALVINGS]
+    assert orders(errors)[1:] == pytest.approx(4.0, abs=0.2), errors
     # RK4 in steps of 20 us errs by less, and so does SciPy.
-    np.testing.assert_allclose(stepped(STEP, internal_step=2e-5), expected, rtol=1e-9, atol=0.0)
+    np.testing.assert_allclose(after(STEP, internal_step=2e-5), expected, rtol=1e-9, atol=0.0)
     # By default, in a step of 0.5 ms, RK4 leaves (h R / L)^5 / 120 = 8e-6 of the current's own mode out.
-    np.testing.assert_allclose(stepped(5e-3), motor_after(BEGIN, 5e-3), rtol=2e-5, atol=0.0)
+    np.testing.assert_allclose(after(5e-3), motor_after(BEGIN, 5e-3), rtol=2e-5, atol=0.0)
 
 
 def load_motion(t: Any) -> tuple[Any, Any]:
