@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -17,13 +16,9 @@ from urmpipe_models.elementwise import FloatArray
 
 
 class FmuRun:
-    """An instance of an FMU, from which variables are set and got by the unit's names.
+    """An instance of the FMU of a unit, whose variables are set and got by the unit's names.
 
-    Args:
-        path: The FMU.
-        unit: What is in it.
-        start: Parameters, inputs and states to set before the first step.
-        time: Where it starts in [s].
+    `start` is set before the first step; `time` is where it starts in [s].
     """
 
     def __init__(self, path: Path, model: BlockModel, start: Mapping[str, Any], time: float = 0.0) -> None:
@@ -40,9 +35,7 @@ class FmuRun:
         self.fmu = loaded.fmu
         self.put(self.start)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.fmu.terminate()
         self.fmu.freeInstance()
         self._folder.cleanup()

@@ -28,6 +28,11 @@ PATIENT: dict[str, Any] = {
 """Settings of tests on random units: on a busy machine a large one takes some tenths of a second to draw."""
 
 numbers = st.integers(-2000, 2000).map(lambda k: k / 1000)
+OF_TYPE: dict[str, SearchStrategy[Any]] = {
+    "Real": numbers,
+    "Integer": st.integers(-3, 3),
+    "Boolean": st.integers(0, 1),
+}
 
 SMOOTH: tuple[str, ...] = (
     *("np.sin({a})", "np.cos({a})", "np.tanh({a})", "np.arctan({a})", "np.exp(-np.abs({a}))"),
@@ -48,12 +53,7 @@ CONDITIONS = (
 
 
 class Grammar:
-    """Draws expressions of a unit's values.
-
-    Attributes:
-        leaves: Expressions of values.
-        exact: Those that have the same bits wherever the unit runs.
-    """
+    """Draws expressions of leaves, and exact ones: of values with the same bits wherever the unit runs."""
 
     def __init__(self, draw: DrawFn, leaves: list[str], exact: list[str]) -> None:
         self.draw, self.leaves, self.exact = draw, leaves, exact
@@ -160,8 +160,7 @@ def random_columns(draw: DrawFn, model: BlockModel, count: int) -> dict[str, NDA
 
 def _values(variable: Variable, count: int) -> SearchStrategy[list[float]]:
     """Values that a variable takes."""
-    whole = {"Integer": st.integers(-3, 3), "Boolean": st.integers(0, 1)}
-    kind = whole[variable.type].map(float) if variable.type in whole else numbers
+    kind = OF_TYPE[variable.type].map(float)
     return st.lists(kind, min_size=count, max_size=count)
 
 
@@ -175,9 +174,7 @@ def _variable(draw: DrawFn, kind: str, name: str) -> dict[str, Any]:
     if of_type == "Real":
         made |= draw(st.sampled_from([{}, {"unit": "rad", "display_unit": "deg"}, {"unit": "N.m"}]))
     if kind != "Output":
-        made["start"] = draw(
-            {"Real": numbers, "Integer": st.integers(-3, 3), "Boolean": st.integers(0, 1)}[of_type]
-        )
+        made["start"] = draw(OF_TYPE[of_type])
     if kind == "Parameter":
         made["tunable"] = draw(st.booleans())
     if kind in ("State", "Memory"):
