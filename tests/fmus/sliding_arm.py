@@ -1,13 +1,14 @@
-"""An arm with joints of all kinds."""
+"""Arms for tests: with joints of all kinds, with one joint, and with a held wrist."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from made_masses import driven, with_masses
-from urmpipe_models.arm.chain import Chain, Joint, Mimic
-from urmpipe_models.drives import CounterbalanceSpring, Gains, PassiveJoint
-from urmpipe_models.math3d import from_offset
+from urmpipe_models.arm.chain import Chain, Inertial, Joint, Mimic
+from urmpipe_models.drives import CounterbalanceSpring, DrivenJoint, Gains, PassiveJoint
+from urmpipe_models.math3d import from_offset, translation
 
 
 def sliding_arm() -> Chain:
@@ -35,3 +36,21 @@ def sprung_arm() -> Chain:
     turn = replace(driven("turn"), gains=calm, spring=CounterbalanceSpring(1000.0, 0.315))
     slide = replace(driven("slide"), gains=calm, spring=CounterbalanceSpring(2000.0, 0.195), period=7.5e-3)
     return replace(with_masses(sliding_arm()), drives=(turn, slide, PassiveJoint("wrist", 2500.0, 5.0)))
+
+
+def one_joint(drive: DrivenJoint | PassiveJoint, body: Inertial, **fields: Any) -> Chain:
+    """Return an arm of one joint q about a level axis, which lifts."""
+    joint = Joint("q", axis=(0.0, -1.0, 0.0))
+    return Chain("one", (joint,), tip=translation(*body.centre), inertials=(body,), drives=(drive,), **fields)
+
+
+def wristed(stiffness: float = 2500.0) -> Chain:
+    """Return two level links of 0.5 m and 0.3 m: the shoulder with a drive, the wrist held by a spring."""
+    lifting = (0.0, -1.0, 0.0)
+    return Chain(
+        "wristed",
+        (Joint("shoulder", axis=lifting), Joint("wrist", origin=translation(0.5, 0.0, 0.0), axis=lifting)),
+        tip=translation(0.3, 0.0, 0.0),
+        inertials=(Inertial("shoulder", 3.0, (0.2, 0.0, 0.0)), Inertial("wrist", 1.0, (0.1, 0.0, 0.0))),
+        drives=(driven("shoulder"), PassiveJoint("wrist", stiffness, stiffness / 500.0)),
+    )

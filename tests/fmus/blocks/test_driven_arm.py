@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import re
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -16,14 +14,14 @@ from scipy.optimize import root
 from asserting import refusal
 from fmu_run import FmuRun
 from made_masses import DRIVE, driven, with_drives, with_masses
-from sliding_arm import sprung_arm
+from sliding_arm import one_joint, sprung_arm, wristed
 from stepped_unit import SteppedUnit, make_unit, needs_native, run_system
 from urmpipe_fmus.block import BlockModel, Output
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.driven_arm import start_values
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.cosim import Block, System, load_system, prepare, simulate
-from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.arm.chain import Chain, Inertial
 from urmpipe_models.drives import CounterbalanceSpring, Drive, DrivenJoint, Gains, PassiveJoint, trapezoid
 from urmpipe_models.dynamics import driven_arm as dynamics
 from urmpipe_models.dynamics.driven_arm import ArmState, Motor, Spring, find_equilibrium, spectral_radius
@@ -32,7 +30,6 @@ from urmpipe_models.dynamics.links import Wrench, chain_to_links, wrench_power
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError, UnitError
 from urmpipe_models.kinematics.forward import forward, jacobian
-from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
 
 PERIOD = 5e-3
@@ -43,12 +40,6 @@ STILL = [0.0] * 6
 def urm6() -> Chain:
     """urm6 with masses that are made up, a drive on each joint."""
     return with_drives(with_masses(load_robot("urm6")))
-
-
-def one_joint(drive: DrivenJoint | PassiveJoint, body: Inertial, **fields: Any) -> Chain:
-    """Return an arm of one joint q about a level axis, which lifts."""
-    joint = Joint("q", axis=(0.0, -1.0, 0.0))
-    return Chain("one", (joint,), tip=translation(*body.centre), inertials=(body,), drives=(drive,), **fields)
 
 
 class OneSystem:
@@ -67,10 +58,8 @@ class OneSystem:
         self.x = np.array([*chain.start, *STILL[:3], *motors, *STILL[:4]])
 
     def state(self, x: FloatArray) -> ArmState:
-        motors = [
-            Motor(one.drive, *values, voltage, one.spring)
-            for one, values, voltage in zip(self.drives, x[6:12].reshape(3, 2).T, self.voltages, strict=True)
-        ]
+        rows = zip(self.drives, x[6:12].reshape(3, 2).T, self.voltages, strict=True)
+        motors = [Motor(one.drive, row[0], row[1], row[2], voltage, one.spring) for one, row, voltage in rows]
         return ArmState(list(x[:3]), list(x[3:6]), [*motors, self.spring])
 
     def accelerations(self, state: ArmState) -> list[Any]:
@@ -100,19 +89,6 @@ class OneSystem:
         return float(dynamics.arm_energy(self.chain, self.state(self.x)))
 
 
-def test_it_starts_in_equilibrium_with_shafts_twisted_and_currents_and_voltages_set() -> None:
-    chain = urm6()
-    model = SteppedUnit("driven_arm", robot=chain)
-    torques = np.array(inverse_dynamics(chain, chain.start, STILL, STILL), dtype=float)
-    assert np.abs(torques).max() > 2.0  # gravity pulls
-    twist = model.read("theta1") - model.read("phi")
-    np.testing.assert_allclose(twist, torques / 2500.0, rtol=0.0, atol=1e-15)
-    np.testing.assert_allclose(model.read("i_a"), torques / 5.0, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(model.read("u"), 0.5 * torques / 5.0, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(model.read("Mk"), torques, rtol=1e-11, atol=1e-12)
-    np.testing.assert_allclose(model.read("phidd"), 0.0, rtol=0.0, atol=1e-10)
-
-
 @pytest.mark.slow
 @needs_native
 def test_an_arm_at_rest_stays_for_two_seconds() -> None:
@@ -127,18 +103,6 @@ def test_an_arm_at_rest_stays_for_two_seconds() -> None:
         expected = [q for kind in ("revolute", "prismatic") for q, joint in starts if joint.kind == kind]
         assert len(columns) == len(expected)
         assert np.abs(found[:, columns] - expected).max() <= 1e-9
-
-
-@pytest.mark.slow
-def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
-    m, r, k = 2.0, 0.5, 800.0
-    body = Inertial("q", m, (r, 0.0, 0.0))
-    chain = one_joint(PassiveJoint("q", k, 0.0), body, gravity=(0.0, 0.0, 0.0))
-    model = SteppedUnit("driven_arm", {"phi": 1e-6}, robot=chain)
-    rate = np.sqrt(k / (m * r**2))
-    model.steps(20, PERIOD)
-    # RK4 in 0.5 ms at 40 rad/s: (0.02)^5 / 120 a step, 200 steps
-    assert model.read("phi")[0] == pytest.approx(1e-6 * np.cos(rate * 0.1), abs=1e-14)
 
 
 @pytest.mark.slow
@@ -383,22 +347,6 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
     assert abs(given - (stored - before) - heat) <= 1e-6 * abs(given)
 
 
-LENGTH = 0.3
-UPPER = 0.5
-
-
-def wristed() -> Chain:
-    """Two level links: the shoulder with a drive, the wrist held by 2500 N.m/rad."""
-    lifting = (0.0, -1.0, 0.0)
-    return Chain(
-        "wristed",
-        (Joint("shoulder", axis=lifting), Joint("wrist", origin=translation(UPPER, 0.0, 0.0), axis=lifting)),
-        tip=translation(LENGTH, 0.0, 0.0),
-        inertials=(Inertial("shoulder", 3.0, (0.2, 0.0, 0.0)), Inertial("wrist", 1.0, (0.1, 0.0, 0.0))),
-        drives=(driven("shoulder"), PassiveJoint("wrist", 2500.0, 5.0)),
-    )
-
-
 @pytest.mark.slow
 def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive_moves() -> None:
     chain, force = wristed(), 1e-2
@@ -406,10 +354,10 @@ def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive
     assert before[1].q == 0.0
     tip = forward(chain, [one.q for one in under])[-1].translation
     # the shift is 3.6e-7 m: the second order is 1e-6 of it, and settling to 1e-12 rad as much
-    assert tip[2] == pytest.approx(force * LENGTH**2 / 2500.0, rel=5e-6)
+    assert tip[2] == pytest.approx(force * 0.3**2 / 2500.0, rel=5e-6)
     assert under[0].q == 0.0
     assert under[1].rest == before[1].rest  # the same spring
-    lifted = force * (UPPER + LENGTH)  # N.m that the shoulder need not give
+    lifted = force * (0.5 + 0.3)  # N.m that the shoulder need not give
     # of currents of some 2 A, rounded
     assert before[0].current - under[0].current == pytest.approx(lifted / 5.0, rel=1e-6)
     values = dict(start_values(chain, (0.0, 0.0, 30.0)))
@@ -418,32 +366,6 @@ def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive
     assert start[1] > 3e-3
     moving.steps(10, PERIOD)
     np.testing.assert_allclose(moving.read("phi", "last"), start, rtol=0.0, atol=1e-8)
-
-
-def test_a_spring_weaker_than_the_weight_it_hangs_by_bears_a_small_force() -> None:
-    """3 kg hang 0.5 m below: 14.7 N.m/rad by the weight beside 9 of the spring."""
-    body = Inertial("q", 3.0, (0.5, 0.0, 0.0))
-    chain = one_joint(PassiveJoint("q", 9.0, 1.0), body, start=(-math.pi / 2,))
-    (under,) = find_equilibrium(chain, Wrench((0.1, 0.0, 0.0)))
-    # along x, which raises the tip: F l over both rigidities; the next order is that angle squared
-    assert math.pi / 2 + under.q == pytest.approx(0.05 / (9.0 + 3.0 * 9.81 * 0.5), rel=1e-5)
-
-
-def test_a_force_that_is_too_large_for_the_springs_is_refused() -> None:
-    weak = replace(wristed(), drives=(driven("shoulder"), PassiveJoint("wrist", 50.0, 1.0)))
-    assert find_equilibrium(weak, Wrench((0.0, 0.0, 10.0)))[1].q == pytest.approx(0.06, abs=1e-3)
-    assert refusal(RobotError, find_equilibrium, weak, Wrench((0.0, 0.0, 1e3))) == (
-        "robot wristed: force: found more than the springs of its held joints bear, allowed: less"
-    )
-    volts = refusal(RobotError, find_equilibrium, wristed(), Wrench((0.0, 0.0, -1e3)))
-    needed = 0.5 / 5.0 * (1e3 * UPPER)  # V of the force at the wrist alone
-    match = re.fullmatch(
-        r"robot wristed: drives.shoulder: needs ([\d.]+) V to hold the arm at its start,"
-        r" allowed: u_max, 48 V",
-        volts,
-    )
-    assert match
-    assert needed < float(match[1]) < 2.0 * needed
 
 
 def radius_of_the_unit(chain: Chain, round_: float) -> float:

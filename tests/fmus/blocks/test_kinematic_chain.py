@@ -60,12 +60,6 @@ def test_points_and_sensors_are_those_of_the_kinematics_over_a_log(name: str) ->
         assert np.array_equal(found[f"singular{number}"] == 1.0, motion.singular)
 
 
-def test_the_points_of_a_urm_arm_are_those_of_a_log_to_the_last_bit() -> None:
-    robot, q = load_robot("urm6"), np.random.default_rng(4).uniform(-9.0, 9.0, (200, 6))
-    found = run(kinematic_chain(robot), np.linspace(0.0, 1.0, 200, dtype=np.float64), {"phi": q})
-    assert np.array_equal(found["p7"], points_over_log(robot, q)[:, -1])
-
-
 def test_lengths_and_tilts_are_tuned_while_it_runs() -> None:
     unit, rng = SteppedUnit("kinematic_chain", robot=load_robot("urm4")), np.random.default_rng(5)
     unit.do_step(0.0, 0.005)
