@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -43,13 +43,6 @@ def rod(name: str, bodies: tuple[str, str], p: Vec, q: Vec, more: str = "0") -> 
     return ConstraintElement(name, "gg", bodies, Expression(f"{length!r} + {more}"), (p, q))
 
 
-def network(name: str, bodies: Iterable[str], joints: list[Joint], drive: str | None) -> Network:
-    """Return a network without elements; a function of the control s drives its first joint if asked."""
-    first = joints[0] if drive is None else driven(joints[0], drive)
-    controls = () if drive is None else (Control("s"),)
-    return Network(name, tuple(map(Body, bodies)), (first, *joints[1:]), controls=controls)
-
-
 def ring(kinds: str, axes: FloatArray, points: FloatArray, drives: str | None = None) -> Network:
     """Return a loop of joints r, p, c, h, g along axes [-] through points in [m]; drives turn the first."""
     named: dict[str, JointKind] = {kind[0]: kind for kind in KINDS}
@@ -58,7 +51,8 @@ def ring(kinds: str, axes: FloatArray, points: FloatArray, drives: str | None = 
         tied(f"j{k}", named[kind], (names[k], names[(k + 1) % len(kinds)]), vec(axes[k]), vec(points[k]), 0.1)
         for k, kind in enumerate(kinds)
     ]
-    return network(kinds, names[1:], joints, drives)
+    free = Network(kinds, tuple(map(Body, names[1:])), tuple(joints))
+    return with_drives(free, j0=drives) if drives else free
 
 
 def circles(p: FloatArray, r: float, q: FloatArray, s: float, sign: float = 1.0) -> FloatArray:
@@ -132,7 +126,7 @@ def nine_revolutes(drive: str | None = None) -> Network:
 
 def coupled_loops(drive: str | None = None) -> Network:
     """Return two planar four-bars: the rocker of the first is the crank of the second."""
-    joints = [
+    joints = (
         tied("A", "revolute", ("ground", "crank"), Z, (0.0, 0.0, 0.0)),
         tied("B", "revolute", ("crank", "coupler"), Z, (0.2, 0.35, 0.0)),
         tied("C", "revolute", ("rocker", "coupler"), Z, (1.1, 0.7, 0.0)),
@@ -140,8 +134,9 @@ def coupled_loops(drive: str | None = None) -> Network:
         tied("E", "revolute", ("rocker", "rod"), Z, (1.4, 0.6, 0.0)),
         tied("F", "revolute", ("rod", "output"), Z, (2.1, 0.8, 0.0)),
         tied("G", "revolute", ("output", "ground"), Z, (2.0, 0.0, 0.0)),
-    ]
-    return network("coupled", ("crank", "coupler", "rocker", "rod", "output"), joints, drive)
+    )
+    free = Network("coupled", tuple(map(Body, ("crank", "coupler", "rocker", "rod", "output"))), joints)
+    return with_drives(free, A=drive) if drive else free
 
 
 def slider_crank(crank: float, drive: str | None = None, a: float = 0.3, b: float = 0.8) -> Network:
