@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,10 +19,11 @@ from random_networks import (
     random_pose,
     random_values,
 )
+from test_higher_pairs import shaft
 from test_joint_motion import user_motion
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import evaluate_closure
-from urmpipe_models.networks.file import Network
+from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.parts import Body, Control, Expression, Joint
 
@@ -112,10 +114,31 @@ def test_clusters_of_bodies_of_their_own(seed: int) -> None:
         assert_right(mechanism, mechanism.start + step * rng.normal(size=len(mechanism.variables)))
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+# gears, a rack and a cam of joints that are driven, in a loop or on a tree
+PAIRS: dict[str, Any] = {
+    "bodies": {name: {} for name in ("a", "b", "c", "d")},
+    "controls": {"t": {"start": 0.3}, "u": {"value": "t ** 2"}},
+    "joints": {
+        "A": shaft(("ground", "a"), value="sin(t) + u"),
+        "B": {"kind": "cylindrical", "bodies": ["a", "b"], "value": ["", "0.1 * t"]},
+        "C": {"kind": "helical", "bodies": ["b", "c"], "pitch": 0.05},
+        "D": {"kind": "cylindrical", "bodies": ["ground", "c"], "a": [0.1, 0.2, 0]},  # closes a loop
+        "E": {"kind": "prismatic", "bodies": ["c", "d"], "n": [0.6, 0, 0.8]},
+    },
+    "elements": {
+        "AB": {"kind": "gear", "joints": ["A", "B"], "teeth": [3, -7], "offset": "u"},
+        "BC": {"kind": "gear", "joints": ["C", "B"], "teeth": [2, 1]},
+        "BD": {"kind": "rack", "joints": ["B", "D"], "radius": -0.2, "offset": "0.1 + t"},
+        "AE": {"kind": "cam", "joints": ["A", "E"], "profile": [[0, 0], [1, 0.3], [2, -0.1], [4, 0.2]]},
+        "rod": {"kind": "gg", "bodies": ["ground", "d"], "a": [0.1, 0, 0], "d": 0.3},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*MECHANISMS, "pairs"])
 def test_known_mechanisms_and_many_configurations_at_once(name: str) -> None:
     """A block of configurations gives what each gives alone."""
-    mechanism = build_mechanism(MECHANISMS[name](drive="s"))
+    mechanism = build_mechanism(load_network(PAIRS) if name == "pairs" else MECHANISMS[name](drive="s"))
     rng = np.random.default_rng(0)
     x = mechanism.start[:, np.newaxis] + 0.3 * rng.normal(size=(len(mechanism.variables), 7))
     together = evaluate_closure(mechanism, x)

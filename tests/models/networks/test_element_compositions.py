@@ -30,7 +30,6 @@ from urmpipe_models.networks.mobility import analyse_mobility
 from urmpipe_models.networks.parts import (
     Body,
     ConstraintElement,
-    Control,
     ElementKind,
     Expression,
     Joint,
@@ -154,20 +153,3 @@ def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
     built = compose(network.elements[0], poses, rng)
     composed = build_mechanism(Network("joints", (Body("b"), Body("sleeve"), Body("cross")), built.joints))
     assert_same_space(twist_space(mechanism, x, "b"), twist_space(composed, composed.start, "b"), SAME)
-
-
-def test_the_driven_length_of_an_element_is_followed() -> None:
-    """A rod's platform on a slide: its end follows sqrt(l^2 - h^2), by its derivative, too."""
-    rng = np.random.default_rng(2)
-    at = axis_frame(np.array(X), np.zeros(3), rng)
-    slide = joint_between(
-        "P", "prismatic", ("ground", "b"), dict.fromkeys(("ground", "b"), np.eye(4)), rng, at, (0.0,)
-    )
-    rod = ConstraintElement(
-        "R", "gg", ("b", "ground"), Expression("2 * s"), ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0))
-    )
-    mechanism = build_mechanism(Network("rod", (Body("b"),), (slide,), (rod,), (Control("s", 0.25),)))
-    x = np.array([0.25, 0.4])  # 0.5^2 = 0.4^2 + 0.3^2
-    closure = evaluate_closure(mechanism, x[:, np.newaxis])
-    assert abs(closure.residual[0, 0]) < 1e-15
-    assert_close(closure.jacobian[0, :, 0], np.array([-2.0, 0.8]), 1e-15)

@@ -11,11 +11,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from asserting import there
-from random_networks import difference
 from urmpipe import load_network, network_check, network_drive, network_solve
-from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import assemble
-from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.joint_motion import transmission
 from urmpipe_models.networks.mechanism import build_mechanism
@@ -146,42 +143,6 @@ def test_joints_of_denavit_hartenberg_elements_and_of_arms_are_coupled() -> None
     assert values["K"][0] == pytest.approx(0.1 + 0.05 * values["J"][0], abs=ROUNDING)
     wrists = [values[f"arm.wrist_{k}_joint"][0] for k in (1, 2)]
     assert wrists[1] == pytest.approx(0.5 * wrists[0], abs=ROUNDING)
-
-
-# --- derivatives, mobility and redundancy
-
-MANY: dict[str, Any] = {
-    "bodies": {name: {} for name in ("a", "b", "c", "d")},
-    "controls": {"t": {"start": 0.3}, "u": {"value": "t ** 2"}},
-    "joints": {
-        "A": shaft(("ground", "a"), value="sin(t) + u"),
-        "B": {"kind": "cylindrical", "bodies": ["a", "b"], "value": ["", "0.1 * t"]},
-        "C": {"kind": "helical", "bodies": ["b", "c"], "pitch": 0.05},
-        "D": {"kind": "cylindrical", "bodies": ["ground", "c"], "a": [0.1, 0.2, 0]},  # closes a loop
-        "E": {"kind": "prismatic", "bodies": ["c", "d"], "n": [0.6, 0, 0.8]},
-    },
-    "elements": {
-        "AB": {"kind": "gear", "joints": ["A", "B"], "teeth": [3, -7], "offset": "u"},
-        "BC": {"kind": "gear", "joints": ["C", "B"], "teeth": [2, 1]},
-        "BD": {"kind": "rack", "joints": ["B", "D"], "radius": -0.2, "offset": "0.1 + t"},
-        "AE": {"kind": "cam", "joints": ["A", "E"], "profile": [[0, 0], [1, 0.3], [2, -0.1], [4, 0.2]]},
-        "rod": {"kind": "gg", "bodies": ["ground", "d"], "a": [0.1, 0, 0], "d": 0.3},
-    },
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_jacobian_is_that_of_differences(seed: int) -> None:
-    mechanism = build_mechanism(load_network(MANY))
-    x = mechanism.start + np.random.default_rng(seed).normal(size=len(mechanism.start))
-
-    def pairs(at: FloatArray) -> FloatArray:
-        return evaluate_closure(mechanism, at).residual[6:]
-
-    expected = difference(pairs, x)
-    found = evaluate_closure(mechanism, x[:, np.newaxis]).jacobian[6:, :, 0]
-    # differences of step 1e-3 round to 1e-12; a knot of the spline within the step would cost 1e-7
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8 * np.abs(expected).max())
 
 
 def test_what_a_gear_is_off_by_is_an_angle() -> None:
