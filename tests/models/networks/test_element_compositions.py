@@ -27,14 +27,7 @@ from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.joint_motion import measure_element
 from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import analyse_mobility
-from urmpipe_models.networks.parts import (
-    Body,
-    ConstraintElement,
-    ElementKind,
-    Expression,
-    Joint,
-    JointKind,
-)
+from urmpipe_models.networks.parts import Body, ConstraintElement, ElementKind, Expression, Joint, JointKind
 
 CLOSES = 1e-12  # residuals in [m] and [rad]: products of some ten matrices with entries up to 10
 SAME = 1e-6  # projections onto twist spaces: differences of 1e-12 times the networks' conditions, below 1e5
