@@ -18,17 +18,8 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.errors import (
-    Finding,
-    Hint,
-    Voice,
-    escape_control_characters,
-    escape_html,
-    escape_json,
-    escape_line,
-    escape_xml,
-    format_suggestion,
-)
+from urmpipe_models import errors
+from urmpipe_models.errors import Finding, Hint, Voice
 from urmpipe_pipeline.joint_log import LogWarning
 
 any_text = st.text(st.characters(exclude_categories=()))
@@ -44,7 +35,7 @@ def test_any_name_in_a_hint_is_read_back_by_the_reader_of_the_voice(name: str) -
     if name.isprintable():
         assert shlex.split(hint.format("command line")) == ["--unit", f"{name}=deg"]
     for voice in get_args(Voice):  # printing leaves them as they are
-        assert escape_line(hint.format(voice)) == hint.format(voice)
+        assert errors.escape_line(hint.format(voice)) == hint.format(voice)
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
@@ -69,20 +60,20 @@ def test_a_message_is_a_key_of_a_set_and_a_dict_of_its_fields(message: Finding |
 
 @given(any_text)
 def test_any_text_becomes_one_printable_line(text: str) -> None:
-    assert escape_line(text).isprintable()
-    assert escape_line(text) == text or not text.isprintable()
+    assert errors.escape_line(text).isprintable()
+    assert errors.escape_line(text) == text or not text.isprintable()
 
 
 @given(any_text)
 def test_invisible_characters_are_escapes_in_every_format(text: str) -> None:
     """JSON has the same text; XML the same text but for what it cannot contain."""
-    assert "\n" not in escape_control_characters(text)
-    assert escape_control_characters(text, kept="\n").count("\n") == text.count("\n")
-    written = escape_json(json.dumps(text, ensure_ascii=False))
+    assert "\n" not in errors.escape_control_characters(text)
+    assert errors.escape_control_characters(text, kept="\n").count("\n") == text.count("\n")
+    written = errors.escape_json(json.dumps(text, ensure_ascii=False))
     assert json.loads(written) == text
-    assert escape_html(text).isprintable()
-    xml = f"<a>{escape_xml(html.escape(text))}</a>"
-    for one in (escape_control_characters(text), written, xml):
+    assert errors.escape_html(text).isprintable()
+    xml = f"<a>{errors.escape_xml(html.escape(text))}</a>"
+    for one in (errors.escape_control_characters(text), written, xml):
         assert not re.search("[\x00-\x08\x0b\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]", one)
     invalid = "[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]"
     lines = re.sub(invalid, lambda letter: ascii(letter[0])[1:-1], text)
@@ -103,4 +94,4 @@ def test_a_name_with_a_letter_missing_is_answered_with_it(names: list[str], data
     written = meant[:at] + meant[at + 1 :]
     assume(written not in names)
     could_be = [one for one in names if any(written == one[:i] + one[i + 1 :] for i in range(len(one)))]
-    assert format_suggestion(written.upper(), names) == f" (did you mean {max(could_be)}?)"
+    assert errors.format_suggestion(written.upper(), names) == f" (did you mean {max(could_be)}?)"

@@ -14,13 +14,8 @@ from hypothesis.strategies import SearchStrategy
 from scipy.spatial.transform import Rotation
 
 from direct_geometric_model import geometric_model
-from urmpipe_models.arm.denavit_hartenberg import (
-    DHRow,
-    GeometricModelRow,
-    dh_chain,
-    geometric_chain,
-    modified_dh_chain,
-)
+from urmpipe_models.arm import denavit_hartenberg as builders
+from urmpipe_models.arm.denavit_hartenberg import DHRow, GeometricModelRow
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.math3d import Transform, from_offset
@@ -55,7 +50,7 @@ def homogeneous(frame: Transform) -> FloatArray:
 
 
 MATRICES = pytest.mark.parametrize(
-    ("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)], ids=["standard", "modified"]
+    ("build", "matrix"), [(builders.dh_chain, standard), (builders.modified_dh_chain, modified)]
 )
 
 
@@ -138,7 +133,7 @@ def test_it_is_matrix_products_and_the_chain(rows: list[GeometricModelRow], data
     np.testing.assert_allclose(model.rotations, rotations, rtol=0.0, atol=ROUNDING)
     np.testing.assert_allclose(model.steps, steps, rtol=0.0, atol=ROUNDING)
     np.testing.assert_allclose(model.positions, np.cumsum(steps, axis=0), rtol=0.0, atol=ROUNDING)
-    poses = forward(geometric_chain("arm", rows, tip=tip), q)
+    poses = forward(builders.geometric_chain("arm", rows, tip=tip), q)
     np.testing.assert_allclose(model.rotations[-1], poses[-1].rotation, rtol=0.0, atol=ROUNDING)
     np.testing.assert_allclose(model.positions[-1], poses[-1].translation, rtol=0.0, atol=ROUNDING)
     seen = model.seen(tip)

@@ -13,7 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.arm.chain import Box, Capsule, Chain, Cylinder, Joint, JointKind, Mesh, Sphere, Visual
+from urmpipe_models.arm.chain import Box, Capsule, Chain, Cylinder, Joint, Mesh, Sphere, Visual
 from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
@@ -34,7 +34,6 @@ def ends_of(visual: Visual) -> FloatArray:
 
 
 def on(chain: Chain, joint: str | None) -> tuple[Visual, ...]:
-    """Return the solids on a joint or on the base."""
     return tuple(one for one in build_placeholder_solids(chain) if one.joint == joint)
 
 
@@ -44,14 +43,8 @@ def pieces(solids: Sequence[Visual]) -> list[FloatArray]:
 
 
 def scaled(chain: Chain, factor: float) -> Chain:
-    """Return an arm as many times as large."""
-
-    def larger(frame: Transform) -> Transform:
-        x, y, z = frame.translation
-        return Transform(frame.rotation, (x * factor, y * factor, z * factor))
-
-    joints = tuple(replace(one, origin=larger(one.origin)) for one in chain.joints)
-    return replace(chain, joints=joints, tip=larger(chain.tip), tool=larger(chain.tool))
+    lengths = {one.name: factor * one.value for one in chain.parameters if one.kind == "along"}
+    return chain.with_parameters(lengths)
 
 
 def coloured(chain: Chain) -> dict[str, Visual]:
@@ -166,9 +159,6 @@ def test_joints_at_one_place_do_not_hide_each_other() -> None:
     assert list(coloured(twice)) == ["a", "c"]
 
 
-SLIDING: JointKind = "prismatic"
-
-
 @pytest.mark.parametrize(
     ("lower", "upper", "rail"),
     [
@@ -182,7 +172,7 @@ SLIDING: JointKind = "prismatic"
 def test_a_sliding_joint_is_a_box_on_a_rail_as_long_as_its_limits(
     lower: float, upper: float, rail: tuple[float, float]
 ) -> None:
-    slide = Joint("slide", SLIDING, translation(0.0, 0.0, 0.4), (1.0, 0.0, 0.0), lower, upper)
+    slide = Joint("slide", "prismatic", translation(0.0, 0.0, 0.4), (1.0, 0.0, 0.0), lower, upper)
     chain = Chain("arm", (Joint("turn"), slide), tip=translation(0.0, 0.0, 0.3))
     (on_link,) = (one for one in on(chain, "turn") if isinstance(one.shape, Box))
     np.testing.assert_allclose(ends_of(on_link), [(end, 0.0, 0.4) for end in rail], atol=1e-12)
@@ -193,7 +183,9 @@ def test_a_sliding_joint_is_a_box_on_a_rail_as_long_as_its_limits(
 
 def test_a_gantry_of_rails_alone_is_as_thick_as_they_are_long() -> None:
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)
-    joints = tuple(Joint(f"q{k}", SLIDING, axis=axis, lower=0.0, upper=0.8) for k, axis in enumerate(axes))
+    joints = tuple(
+        Joint(f"q{k}", "prismatic", axis=axis, lower=0.0, upper=0.8) for k, axis in enumerate(axes)
+    )
     shapes = [one.shape for one in build_placeholder_solids(Chain("gantry", joints))]
     assert all(0.01 < min(shape.size) < 0.1 for shape in shapes if isinstance(shape, Box))
 
