@@ -213,7 +213,7 @@ def test_a_bad_row_stops_no_other() -> None:
     assert nearest.iterations[1] == 0
 
 
-@pytest.mark.parametrize("robot", ["urm6", "panda"])
+@pytest.mark.parametrize("robot", ["urm6", "urm8", "panda", "ur5e"])
 def test_rows_are_solved_to_the_same_bits_alone_and_in_any_company(
     robot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -157,14 +157,19 @@ def test_a_joint_stays_on_its_limit_and_leaves_it_again() -> None:
         assert J[k, :, 0] @ y > -1e-8  # ... and the third one would go on outwards
 
 
-def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> None:
-    reach = 2.5 + 1.2 * np.sin(math.pi * np.linspace(0.0, 1.0, 301))
-    path = follow(ARM, np.array([[0.6, -1.0, 0.1]]), in_plane(reach))
-    out = reach > 3.0
+def test_what_is_out_of_reach_or_not_finite_has_a_reason_and_the_path_goes_on_after_it() -> None:
+    start, reach = np.array([[0.6, -1.0, 0.1]]), 2.5 + 1.2 * np.sin(math.pi * np.linspace(0.0, 1.0, 401))
+    whole = follow(ARM, start, in_plane(reach))
+    reach[10] = math.nan
+    path = follow(ARM, start, in_plane(reach))
+    out = ~(reach <= 3.0)
     assert (path.reached == ~out).all()
     assert (path.reasons != "").tolist() == (path.branch == "").tolist() == out.tolist()
+    assert path.reasons[10] == "the position is nan, 0, 0 m, allowed: finite numbers"
     assert_poses_met(ARM, in_plane(reach), path.q, NANOMETRE)
     assert path.jumps == ()
+    # rad: least motion of two steps and of one, 0.01 m each, differ in second order
+    np.testing.assert_allclose(path.q[~out], whole.q[~out], rtol=0.0, atol=1e-4)
 
 
 def test_another_bend_after_a_gap_is_a_jump() -> None:
@@ -188,18 +193,6 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     np.testing.assert_allclose(path.shortfall, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
 
 
-def test_a_sample_that_is_not_finite_stops_no_other() -> None:
-    x = np.linspace(2.0, 2.2, 21)
-    start = np.array([[0.6, -1.0, 0.1]])
-    whole = follow(ARM, start, in_plane(x))
-    x[10] = math.nan
-    path = follow(ARM, start, in_plane(x))
-    assert path.reasons[10] == "the position is nan, 0, 0 m, allowed: finite numbers"
-    assert path.reached.sum() == 20
-    # rad: least motion of two steps and of one, 0.01 m each, differ in second order
-    np.testing.assert_allclose(np.delete(path.q, 10, 0), np.delete(whole.q, 10, 0), rtol=0.0, atol=1e-4)
-
-
 def test_one_sample_and_equal_samples_are_paths_too() -> None:
     arm, start = load_robot("urm6"), np.array([[0.3, 2.0, 0.4, 2.5, 0.2, 1.0]])
     single = forward_targets(arm, start + 0.05)
@@ -209,6 +202,12 @@ def test_one_sample_and_equal_samples_are_paths_too() -> None:
     assert_met(path, twice)
     # rad: there is nothing to move for
     np.testing.assert_allclose(path.q[0], path.q[1], rtol=0.0, atol=1e-9)
+    # from a nearly singular start no large correction is trusted
+    start, target = np.array([[0.1, 0.02, 0.0]]), in_plane(np.zeros(1), 1.2)
+    path = follow(ARM, start, target)
+    assert_met(path, target)
+    # rad: 2.07 by steps of 0.1; the whole first correction ends 8.03 away, after a turn in vain
+    assert np.linalg.norm(path.q - start) < 2.5
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "arm6", "urm6"])
@@ -252,15 +251,6 @@ def test_far_apart_samples_are_followed_one_by_one_from_the_sample_before_turns_
             assert path.q[-1, 0] - path.q[0, 0] > 9.0
             # rad: the base turns by about 1.5 a step
             assert np.abs(np.diff(path.q[-3:], axis=0)).max() < 2.0
-
-
-def test_from_a_nearly_singular_start_no_large_correction_is_trusted() -> None:
-    start = np.array([[0.1, 0.02, 0.0]])
-    target = in_plane(np.zeros(1), 1.2)
-    path = follow(ARM, start, target)
-    assert_met(path, target)
-    # rad: 2.07 by steps of 0.1; the whole first correction ends 8.03 away, after a turn in vain
-    assert np.linalg.norm(path.q - start) < 2.5
 
 
 def test_after_a_rescue_no_joint_stays_on_the_limit_of_before() -> None:

