@@ -11,23 +11,18 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from asserting import refusal
-from random_networks import matrix, motion
-from test_rates import KINDS
+from known_mechanisms import four_bar_tables
+from random_networks import FIRST, SECOND, matrix, motion
 from test_shipped import Answer, Rssr, Tables, bennett, rccc, rssr, slider_crank, tables_of
 from test_shipped import four_bar as four_bar_answers
-from urmpipe import NetworkError, load_network, network_drive
+from urmpipe import load_network, network_drive
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.networks.driving import find_driven_variables
 from urmpipe_models.networks.file import network_names
-from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_pipeline.networks.network_motion import NetworkMotion
 
 PI, TURN, Z = math.pi, 2 * math.pi, [0, 0, 1]
 
-ANSWER = (
-    1e-9  # m and rad: Newton ends at gaps of 1e-13, which mechanisms far from singular magnify by about 10
-)
+ANSWER = 1e-9  # m and rad: gaps of 1e-13, which mechanisms far from singular magnify by about 10
 
 
 def apart(found: FloatArray, expected: FloatArray) -> FloatArray:
@@ -43,19 +38,14 @@ def column(moved: NetworkMotion, name: str) -> FloatArray:
 def planar(
     a: float, b: float, c: float, d: float, crank: float = 0.9, sign: int = 1, **more: dict[str, Any]
 ) -> Tables:
-    """Return a four-bar as shipped, of other lengths in [m], at an assembly; `more` are keys by joint."""
+    """Return a four-bar of lengths in [m] at an assembly; `more` are keys by joint."""
     theta4 = four_bar_at(a, b, c, d, crank, sign)
-    coupler = math.atan2(
-        c * math.sin(theta4) - a * math.sin(crank), d + c * math.cos(theta4) - a * math.cos(crank)
-    )
-    tables = tables_of("four-bar")
-    tables["controls"]["crank"]["start"] = crank
-    joints = tables["joints"]
-    joints["A"] |= {"a": [[a, 0, 0], [0, 0, 0]], "start": coupler - crank}
-    joints["B"] |= {"a": [[b, 0, 0], [c, 0, 0]], "start": theta4 - coupler}
-    joints["theta4"] |= {"a": [[d, 0, 0], [0, 0, 0]], "start": theta4}
+    pin = (d + c * math.cos(theta4) - a * math.cos(crank), c * math.sin(theta4) - a * math.sin(crank))
+    coupler = math.atan2(pin[1], pin[0])
+    angles = {"crank": crank, "A": coupler - crank, "B": theta4 - coupler, "theta4": theta4}
+    tables = four_bar_tables((a, b, c, d), angles)
     for name, keys in more.items():
-        joints[name] |= keys
+        tables["joints"][name] |= keys
     return tables
 
 
@@ -74,9 +64,8 @@ def bricard(t: float) -> Answer:
 
     D = 2 sin(alpha) cos(t/2) where tan(alpha)^2 = 3. Its sign changes at t = pi, where both branches cross.
     """
-    c, s = 0.5, math.sqrt(0.75)
-    A, B, C = s**2 + (1 + c**2) * math.cos(t), -2 * c * math.sin(t), -(c**2) - s**2 * math.cos(t)
-    f = math.atan2(B, A) + math.atan2(2 * s * math.cos(t / 2), C)
+    A, B, C = 0.75 + 1.25 * math.cos(t), -math.sin(t), -0.25 - 0.75 * math.cos(t)
+    f = math.atan2(B, A) + math.atan2(math.sqrt(3.0) * math.cos(t / 2), C)
     return {"t2": (f,), "t3": (t,), "t4": (f,), "t5": (t,), "t6": (f,)}
 
 
@@ -186,21 +175,18 @@ def test_a_crank_rocker_turns_without_end(turns: int) -> None:
 @pytest.mark.parametrize("end", [3.0, -3.0])
 def test_a_four_bar_that_cannot_turn_stops_at_its_limit(end: float, sign: int) -> None:
     """Its coupler and rocker are in line where (b + c)^2 = a^2 + d^2 - 2 a d cos(crank)."""
-    moved = network_drive(planar(0.5, 0.5, 0.5, 1.2, 0.5, sign), {"crank": (0.5, end)}, steps=50)
+    links = (0.5, 0.5, 0.5, 1.2)
+    moved = network_drive(planar(*links, 0.5, sign), {"crank": (0.5, end)}, steps=50)
     limit = math.copysign(math.acos((0.5**2 + 1.2**2 - 1.0) / (2 * 0.5 * 1.2)), end)
-    assert moved.verdict == "fail"
-    assert [one.kind for one in moved.events] == ["turns back"]
+    assert (moved.verdict, [one.kind for one in moved.events]) == ("fail", ["turns back"])
     # the extreme of s along the arc is found to 1e-13 of its tangent; s itself is flat there
     assert moved.events[0].values["crank"] == pytest.approx(limit, abs=1e-9)
     assert 0 < (limit - column(moved, "theta2")[-1]) / ((end - 0.5) / 50) < 1
-    near = network_drive(
-        planar(0.5, 0.5, 0.5, 1.2, 0.5, sign), {"crank": (0.5, limit * (1 - 1e-9))}, steps=50
-    )
+    before = limit * (1 - 1e-9)
+    near = network_drive(planar(*links, 0.5, sign), {"crank": (0.5, before)}, steps=50)
     assert near.verdict == "pass"
-    apart_at_end = four_bar_at(0.5, 0.5, 0.5, 1.2, limit * (1 - 1e-9), sign) - column(near, "theta4")[-1]
-    assert math.remainder(apart_at_end, TURN) == pytest.approx(
-        0.0, abs=1e-6
-    )  # d theta4 / d crank is 1e4 here
+    error = four_bar_at(*links, before, sign) - column(near, "theta4")[-1]
+    assert math.remainder(error, TURN) == pytest.approx(0.0, abs=1e-6)  # d theta4 / d crank is 1e4 here
 
 
 @pytest.mark.slow
@@ -230,44 +216,25 @@ def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
 
 
 @pytest.mark.parametrize(
-    ("limits", "end", "limit"), [({"lower": 0.0, "upper": 2.0}, 6, 2.0), ({"lower": 1.45}, -1, 1.45)]
-)
-def test_a_joint_stops_the_motion_at_its_limit(limits: dict[str, float], end: float, limit: float) -> None:
-    moved = network_drive(planar(0.4, 0.9, 0.7, 1.0, theta4=limits), {"crank": (0.9, end)}, steps=100)
+    ("joint", "limits", "end", "limit"),
+    [
+        ("theta4", {"lower": 0.0, "upper": 2.0}, 6, 2.0), ("theta4", {"lower": 1.45}, -1, 1.45),
+        ("theta2", {"upper": 1.2}, 2, 1.2),  # which the control drives
+    ],
+)  # fmt: skip
+def test_a_joint_stops_the_motion_at_its_limit(
+    joint: str, limits: dict[str, float], end: float, limit: float
+) -> None:
+    moved = network_drive(planar(0.4, 0.9, 0.7, 1.0, **{joint: limits}), {"crank": (0.9, end)}, steps=100)
     assert (moved.verdict, [one.kind for one in moved.events]) == ("fail", ["limit"])
-    last = np.array([moved.events[0].row, math.floor(moved.events[0].row)])
-    assert len(moved) == last[1] + 1
-    crank = 0.9 + last * (end - 0.9) / 100
-    assert four_bar_at(0.4, 0.9, 0.7, 1.0, crank[0]) == pytest.approx(limit, abs=ANSWER)
-    assert moved.events[0].values["crank"] == pytest.approx(crank[0], abs=ANSWER)
-
-
-def test_a_control_is_not_driven_beyond_its_range() -> None:
-    tables = planar(0.4, 0.9, 0.7, 1.0)
-    tables["controls"]["crank"] |= {"lower": 0.0, "upper": 2.0}
-    tables["joints"]["theta4"] |= {"lower": 0.0, "upper": 1.9}
-    line = refusal(NetworkError, network_drive, tables, {"crank": (1, 3)})
-    assert line == "drives: found crank = 3, allowed: 0 to 2"
-    line = refusal(NetworkError, network_drive, tables, {"theta4": (1.48, "110deg")})
-    assert line == "drives: found theta4 = 1.91986, allowed: 0 to 1.9"
-
-
-def test_every_drive_that_cannot_be_is_refused_at_once() -> None:
-    mechanism = build_mechanism(load_network(KINDS))
-    wrong = {
-        "u": "u is a function of other controls", "F": "F is a user joint without variables",
-        "E": "E has 3 variables, allowed: E[1], E[2], E[3]", "E[4]": "allowed: a number from 1 to 3",
-        "C[2]": "C[2] is a function of controls, allowed: the controls", "Z": "drive",
-    }  # fmt: skip
-    with pytest.raises(NetworkError) as caught:
-        find_driven_variables(mechanism, list(wrong))
-    for finding, text in zip(caught.value.findings, wrong.values(), strict=True):
-        assert text in finding.sentence()
-    line = refusal(NetworkError, find_driven_variables, mechanism, ["E[2]", "B", "E[2]"])
-    assert line == "drives: E[2] is driven twice, allowed: once"
-    driven = find_driven_variables(mechanism, ["s", "B", "C[1]", "E[2]"])
-    assert [mechanism.labels[k] for k in driven.places] == ["s", "B", "C", "E[2]"]
-    assert driven.units == ("", "m", "rad", "rad")
+    (event,) = moved.events
+    assert len(moved) == math.floor(event.row) + 1
+    crank = 0.9 + event.row * (end - 0.9) / 100
+    assert event.values["crank"] == pytest.approx(crank, abs=1e-12)
+    at_limit = crank if joint == "theta2" else four_bar_at(0.4, 0.9, 0.7, 1.0, crank)
+    assert at_limit == pytest.approx(limit, abs=1e-12 if joint == "theta2" else ANSWER)
+    low, high = limits.get("lower", -PI), limits.get("upper", PI)
+    assert ((low <= column(moved, joint)) & (column(moved, joint) <= high)).all()
 
 
 def test_a_joint_drives_by_its_name_in_place_of_the_control() -> None:
@@ -283,12 +250,12 @@ def test_a_joint_drives_by_its_name_in_place_of_the_control() -> None:
 @pytest.mark.parametrize("name", [name for name in network_names() if load_network(name).controls])
 def test_any_number_of_steps_gives_the_same_motion(name: str) -> None:
     network = load_network(name)
-    drives: dict[str, Any] = {}
+    drives = {}
     for k, one in enumerate(network.controls):
-        unit = network.control_unit(one.name)
-        size = 60.0 if unit and float(unit[1]) < 0.1 else 0.8  # degrees
+        unit, factor = network.control_unit(one.name) or ("", 1.0)
+        size = 0.03 * (k + 1) if unit == "m" else 60.0 if float(factor) < 0.1 else 0.8  # degrees
         if one.value is None:
-            drives[one.name] = (one.start, one.start + (0.03 * (k + 1) if unit and unit[0] == "m" else size))
+            drives[one.name] = (one.start, one.start + size)
     few, many = (network_drive(network, drives, steps=steps) for steps in (100, 1000))
     assert few.verdict == many.verdict == "pass"
     gaps = np.abs(few.joint_motion[0] - many.joint_motion[0][::10])
@@ -321,20 +288,18 @@ def test_a_driven_platform_goes_where_its_legs_lead() -> None:
 def five_bar(left: float, right: float) -> tuple[Tables, FloatArray]:
     """Return cranks of 0.4 m at 0.6 m and rods of 0.55 m at an assembly, and its angles P, C, Q in [rad]."""
     found = five_bar_at(np.array([left]), np.array([right]))[:, 0]
-    starts = dict(zip("PCQ", found, strict=True))
-    hinges = {"L": ("ground", "a"), "P": ("a", "b"), "C": ("b", "c"), "Q": ("d", "c"), "R": ("ground", "d")}
+    starts: Tables = {name: {"start": angle} for name, angle in zip("PCQ", found.tolist(), strict=True)}
+    hinges: Tables = {
+        "L": ("ground", "a", 0.0, 0.0), "P": ("a", "b", 0.4, 0.0), "C": ("b", "c", 0.55, 0.55),
+        "Q": ("d", "c", 0.4, 0.0), "R": ("ground", "d", 0.6, 0.0),
+    }  # fmt: skip
+    keys = starts | {"L": {"driven": "left"}, "R": {"driven": "right"}}
     joints: Tables = {
-        name: {"kind": "revolute", "bodies": list(bodies), "n": Z, "start": starts.get(name, 0.0)}
-        for name, bodies in hinges.items()
+        name: {"kind": "revolute", "bodies": [a, b], "n": Z, "a": [[x, 0, 0], [y, 0, 0]], **keys[name]}
+        for name, (a, b, x, y) in hinges.items()
     }
-    joints["P"]["a"] = joints["Q"]["a"] = [[0.4, 0, 0], [0, 0, 0]]
-    joints["C"]["a"], joints["R"]["a"] = [[0.55, 0, 0], [0.55, 0, 0]], [[0.6, 0, 0], [0, 0, 0]]
-    for name, control in (("L", "left"), ("R", "right")):
-        del joints[name]["start"]
-        joints[name]["driven"] = control
     controls = {"left": {"start": left}, "right": {"start": right}}
-    bodies: Tables = {name: {} for name in "abcd"}
-    return {"angle_unit": "rad", "bodies": bodies, "joints": joints, "controls": controls}, found
+    return {"bodies": {name: {} for name in "abcd"}, "joints": joints, "controls": controls}, found
 
 
 def five_bar_at(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -356,7 +321,7 @@ def five_bar_at(left: FloatArray, right: FloatArray) -> FloatArray:
 def test_a_log_around_singular_poses_stays_on_its_branch(center: tuple[float, float], radius: float) -> None:
     turn = np.linspace(0, TURN, 401)
     left, right = center[0] + radius * np.cos(turn), center[1] + radius * np.sin(turn)
-    tables, found = five_bar(left[0], right[0])
+    tables, found = five_bar(float(left[0]), float(right[0]))
     log = pd.DataFrame({"t": 0.005 * np.arange(401), "left [rad]": left, "right [rad]": right})
     moved = network_drive(tables, log=log)
     assert (len(moved), moved.events) == (401, ())
@@ -374,8 +339,6 @@ def test_a_log_around_singular_poses_stays_on_its_branch(center: tuple[float, fl
 
 # ---------------------------------------------------------------------------------------- rates
 
-FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
-SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
 PERIOD = 0.004  # s
 
 
@@ -462,14 +425,6 @@ def test_the_drives_reach_their_end_if_the_duration_is_no_multiple_of_the_period
     moved = network_drive("four-bar", {"crank": (0, "100deg")}, duration=1.0, tsp=0.3)
     np.testing.assert_allclose(np.degrees(column(moved, "theta2")), [0, 30, 60, 90, 100], atol=1e-12)
     assert moved.joint_motion[1][-1, 0] == 0.0  # after the end it stands still
-
-
-def test_a_joint_that_a_control_drives_ends_the_motion_at_its_limit() -> None:
-    moved = network_drive(planar(0.4, 0.9, 0.7, 1.0, theta2={"upper": 1.2}), {"crank": (0.9, 2.0)})
-    (event,) = moved.events
-    assert event.kind == "limit"
-    assert event.values["crank"] == pytest.approx(1.2, abs=1e-12)
-    assert column(moved, "theta2").max() <= 1.2
 
 
 def test_start_values_choose_the_branch_by_the_joints_that_are_named() -> None:
