@@ -23,7 +23,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.math3d import Transform
+from urmpipe_models.math3d import Transform, rotation_y
 from urmpipe_models.networks.assembly import AssemblyResult, assemble
 from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network, load_network
@@ -114,8 +114,7 @@ def test_an_rssr_has_as_many_modes_as_its_circle_meets_the_sphere(seed: int) -> 
     found = every(network, {"s": turn})
     frames = [matrix(one.frames[0]) for one in network.joints]
     first, second, third, out = (frame[:3, 3] for frame in frames)
-    about = Rotation.from_rotvec(turn * frames[0][:3, 1])
-    ball = first + about.apply(second - first)
+    ball = first + Rotation.from_rotvec(turn * frames[0][:3, 1]).apply(second - first)
     length = float(np.linalg.norm(third - second))
 
     def open_by(angle: float) -> float:
@@ -148,32 +147,29 @@ class Plane(NamedTuple):
     legs: tuple[float, float, float]
 
 
-def plane(legs: tuple[float, float, float]) -> Plane:
-    anchors = np.array([(0.0, 0.0), (2.4, 0.3), (0.9, 2.1)])
-    return Plane(anchors, np.array([(0.0, 0.0), (1.5, 0.1), (0.4, 1.3)]), legs)
-
-
-def merlet() -> Plane:
-    """Return a platform with six modes, in decimetres.
-
-    Source: Merlet 1996, Direct kinematics of planar parallel manipulators: sides 17.04, 16.54 and 20.84.
-    """
-    third = km.circles(np.zeros(2), 20.84, np.array([17.04, 0.0]), 16.54)
-    anchors = 0.1 * np.array([(0.0, 0.0), (15.91, 0.0), (0.0, 10.0)])
-    return Plane(anchors, 0.1 * np.array([(0.0, 0.0), (17.04, 0.0), third]), (1.498, 1.538, 1.2))
+OTHER = Plane(
+    np.array([(0.0, 0.0), (2.4, 0.3), (0.9, 2.1)]),
+    np.array([(0.0, 0.0), (1.5, 0.1), (0.4, 1.3)]),
+    (1.0, 1.1, 0.9),
+)
+# six modes, in decimetres. Source: Merlet 1996, Direct kinematics of planar parallel manipulators
+MERLET = Plane(
+    0.1 * np.array([(0.0, 0.0), (15.91, 0.0), (0.0, 10.0)]),
+    0.1 * np.array([(0.0, 0.0), (17.04, 0.0), km.circles(np.zeros(2), 20.84, np.array([17.04, 0.0]), 16.54)]),
+    (1.498, 1.538, 1.2),
+)
 
 
 def platform_3rpr(of: Plane) -> Network:
-    """Return a plane platform on three legs whose lengths controls hold."""
-    joints = []
+    """Return a plane platform on three legs whose lengths are controls."""
+    joints, slide, centre = [], transform(np.eye(4)), upright(np.zeros(2))
     for k in range(3):
         a, b = upright(of.anchors[k]), upright(of.points[k])
-        slide = transform(np.eye(4))
         along = Joint(f"P{k}", "prismatic", (f"cylinder{k}", f"piston{k}"), (slide, slide))
         joints += [
-            Joint(f"A{k}", "revolute", ("ground", f"cylinder{k}"), (a, upright(np.zeros(2))), (0.3,)),
+            Joint(f"A{k}", "revolute", ("ground", f"cylinder{k}"), (a, centre), (0.3,)),
             km.driven(along, f"l{k}"),
-            Joint(f"B{k}", "revolute", (f"piston{k}", "platform"), (upright(np.zeros(2)), b), (0.1 * k,)),
+            Joint(f"B{k}", "revolute", (f"piston{k}", "platform"), (centre, b), (0.1 * k,)),
         ]
     names = ["platform", *(f"{part}{k}" for part in ("cylinder", "piston") for k in range(3))]
     controls = tuple(Control(f"l{k}", of.legs[k]) for k in range(3))
@@ -205,7 +201,7 @@ def orientations(of: Plane) -> list[float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("of", "count"), [(merlet(), 6), (plane((1.0, 1.1, 0.9)), None), (plane((1.6, 1.2, 1.4)), None)]
+    ("of", "count"), [(MERLET, 6), (OTHER, None), (OTHER._replace(legs=(1.6, 1.2, 1.4)), None)]
 )
 def test_a_plane_platform_has_as_many_modes_as_its_coupler_curve_meets_a_circle(
     of: Plane, count: int | None
@@ -243,12 +239,12 @@ def test_an_arm_with_a_spherical_wrist_has_the_eight_modes_of_its_closed_form(se
 
 
 def test_sarrus_has_both_sides_of_each_leg() -> None:
-    """Held at its foot a leg leaves its upper hinge two heights, and the other leg both elbows at each."""
+    """Driven at its foot a leg leaves its upper hinge two heights, and the other leg both elbows at each."""
     found = every(km.sarrus("s"), {"s": 0.05})
     assert len(found.assemblies) == 4
     poses = np.array([one.poses[3] for one in found.assemblies])
     np.testing.assert_allclose(poses[:, :3, :3], np.tile(np.eye(3), (4, 1, 1)), rtol=0.0, atol=ANGLE)
-    heights = sorted(poses[:, 2, 3].tolist())
+    heights = np.sort(poses[:, 2, 3])
     np.testing.assert_allclose(heights[::2], heights[1::2], rtol=0.0, atol=ANGLE)
     np.testing.assert_allclose(poses[:, :2, 3], 0.0, rtol=0.0, atol=ANGLE)
 
@@ -310,12 +306,12 @@ def test_the_assembly_is_the_nearer_one_of_both_of_a_four_bar(
 def test_rough_starts_close(name: str, seed: int) -> None:
     """Every variable is off by 0.3 m or rad, more or less."""
     network, rng = km.MECHANISMS[name](drive="s"), np.random.default_rng(seed)
-    joints = tuple(
-        replace(one, start=tuple((0.3 * rng.normal(size=len(one.units))).tolist())) for one in network.joints
-    )
-    bodies = tuple(
-        Body(one.name, tuple((0.3 * rng.normal(size=len(one.start))).tolist())) for one in network.bodies
-    )
+
+    def rough(size: int) -> tuple[float, ...]:
+        return tuple((0.3 * rng.normal(size=size)).tolist())
+
+    joints = tuple(replace(one, start=rough(len(one.units))) for one in network.joints)
+    bodies = tuple(replace(one, start=rough(len(one.start))) for one in network.bodies)
     (found,) = assemble(build_mechanism(replace(network, joints=joints, bodies=bodies))).assemblies
     assert found.residual < CLOSED
     assert found.values["s"] == (0.0,)  # controls keep their values
@@ -379,9 +375,8 @@ def test_an_angle_that_does_not_close_is_open_at_every_size(size: float) -> None
     """Three slides across each other close any gap in [m]; 1e-5 rad stay."""
     network = km.ring("ppp", np.eye(3), size * np.array([(0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (3.0, 0.0, 0.0)]))
     last = network.joints[2]
-    second = matrix(last.frames[1])
-    second[:3, :3] = second[:3, :3] @ Rotation.from_rotvec([0.0, 1e-5, 0.0]).as_matrix()
-    joints = (*network.joints[:2], replace(last, frames=(last.frames[0], transform(second))))
+    second = last.frames[1] @ rotation_y(1e-5)
+    joints = (*network.joints[:2], replace(last, frames=(last.frames[0], second)))
     found = assemble(build_mechanism(replace(network, joints=joints)), restarts=50)
     assert found.assemblies == ()
     assert found.gaps[0].radians == pytest.approx(1e-5, rel=1e-4)

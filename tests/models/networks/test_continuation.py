@@ -225,7 +225,9 @@ def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
 def test_a_joint_stops_the_motion_at_its_limit(
     joint: str, limits: dict[str, float], end: float, limit: float
 ) -> None:
-    moved = network_drive(planar(0.4, 0.9, 0.7, 1.0, **{joint: limits}), {"crank": (0.9, end)}, steps=100)
+    moved = network_drive(
+        planar(0.4, 0.9, 0.7, 1.0, 0.9, 1, **{joint: limits}), {"crank": (0.9, end)}, steps=100
+    )
     assert (moved.verdict, [one.kind for one in moved.events]) == ("fail", ["limit"])
     (event,) = moved.events
     assert len(moved) == math.floor(event.row) + 1
@@ -400,9 +402,11 @@ def test_rates_and_forces_at_rows_where_branches_meet_are_those_of_the_motion() 
     tables = planar(0.4, 1.0, 0.4, 1.0)
     moved = network_drive(tables, {"crank": (0.0, TURN)}, torques={"theta4": -10.0})
     assert [event.row for event in moved.events] == pytest.approx([0, 100, 200], abs=1e-6)
-    rate, acceleration = moved.joint_motion[1], moved.joint_motion[2]
-    np.testing.assert_allclose(np.abs(rate), TURN, atol=1e-7)  # polynomials of 7th degree, rows 4 mm apart
-    np.testing.assert_allclose(acceleration, 0.0, atol=1e-4)  # 39 rad/s2 would be the crank's centripetal one
+    _, rates, accelerations = moved.joint_motion
+    np.testing.assert_allclose(np.abs(rates), TURN, atol=1e-7)  # polynomials of 7th degree, rows 4 mm apart
+    np.testing.assert_allclose(
+        accelerations, 0.0, atol=1e-4
+    )  # 39 rad/s2 would be the crank's centripetal one
     assert moved.forces is not None
     np.testing.assert_allclose(moved.forces.drives[:, 0], 10.0, atol=1e-6)
     for ratio in moved.transmission:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import pytest
 
-from random_networks import DOOR, FIRST, SECOND
+from random_networks import DOOR, FIRST, SECOND, difference, one_by_one
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks import rates
 from urmpipe_models.networks.assembly import assemble
@@ -92,13 +93,11 @@ def test_the_jacobian_is_that_of_finite_differences_where_the_network_is_closed(
     mechanism = build_mechanism(network)
     x = assemble(mechanism, restarts=0).x[:, 0]
     assert np.abs(residual(mechanism, x)).max() < 1e-13  # rounding
-    step = 1e-6  # error of the quotient: step^2 and 1e-16 / step
-    for k, column in zip(mechanism.free, rates.closure_jacobian(mechanism, x.tolist()), strict=True):
-        ahead, behind = x.copy(), x.copy()
-        ahead[k] += step * mechanism.column_scales[k]
-        behind[k] -= step * mechanism.column_scales[k]
-        difference = (residual(mechanism, ahead) - residual(mechanism, behind)) / (2.0 * step)
-        np.testing.assert_allclose(np.array(column, dtype=np.float64), difference, atol=1e-8)
+    found = np.array(rates.closure_jacobian(mechanism, x.tolist()), dtype=np.float64).T
+    # error of the quotient: step^6 and 1e-16 / step
+    by_difference = difference(one_by_one(lambda at: residual(mechanism, at)), x, 1e-5)[:, mechanism.free]
+    expected = by_difference * mechanism.column_scales[mechanism.free]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
@@ -143,53 +142,32 @@ def test_steps_that_close_a_network_are_the_same_of_symbols_and_numbers(name: st
 
     def step(x: Any) -> list[Any]:
         ahead = [x[k] + 0.01 for k in mechanism.controls]
-        predicted = rates.predict_variables(
-            mechanism, x, rates.variable_changes(mechanism, before.tolist(), x), ahead
+        changes = rates.variable_changes(mechanism, before.tolist(), x)
+        predicted = rates.predict_variables(mechanism, x, changes, ahead)
+        columns, closed = (
+            rates.closure_jacobian(mechanism, predicted),
+            rates.close_network(mechanism, predicted, 3),
         )
-        entries = [one for column in rates.closure_jacobian(mechanism, predicted) for one in column]
-        return [
-            rates.largest_residual(mechanism, predicted),
-            *entries,
-            *rates.close_network(mechanism, predicted, 3),
-        ]
+        return [rates.largest_residual(mechanism, predicted), *chain.from_iterable(columns), *closed]
 
     numbers = np.array([float(one) for one in step(x.tolist())])
     # of sums of products of numbers near 1 rounding remains, which three Newton steps take along
     np.testing.assert_allclose(traced(step, len(x))(x), numbers, atol=1e-11)
-    assert (
-        abs(rates.largest_residual(mechanism, numbers[-len(x) :].tolist())) < 1e-9
-    )  # as far as steps of h^2 lead
+    left = rates.largest_residual(mechanism, numbers[-len(x) :].tolist())
+    assert abs(left) < 1e-9  # as far as steps of h^2 lead
 
 
 # --- values with two derivatives: each rule against differences of the function itself, through NumPy
 
 STEP = 0.01
 
-RULES: dict[str, Callable[[Any, Any], Any]] = {
-    "add": lambda u, v: 3.0 + u + v,
-    "subtract": lambda u, v: 1.5 - u - v,
-    "negative": lambda u, v: -u,
-    "multiply": lambda u, v: u * v * 2.0,
-    "divide": lambda u, v: u / v,
-    "reciprocal": lambda u, v: 2.0 / u,
-    "square": lambda u, v: np.square(u),
-    "power": lambda u, v: u**3 - v**-2 + u**0.5,
-    "power of a negative base": lambda u, v: (-u) ** 3,
-    "variable power": lambda u, v: u**v + 2.0**v,
-    "sin": lambda u, v: np.sin(u),
-    "cos": lambda u, v: np.cos(u * v),
-    "tan": lambda u, v: np.tan(0.5 * u),
-    "exp": lambda u, v: np.exp(u - v),
-    "log": lambda u, v: np.log(u),
-    "sqrt": lambda u, v: np.sqrt(u + v),
-    "arctan2": lambda u, v: np.arctan2(u - 1.0, -v),
-    "floor": lambda u, v: u * np.floor(v + 7.5),
-    "remainder": lambda u, v: np.remainder(u + 10.0, 6.0),
-    "absolute": lambda u, v: np.abs(u - 5.0) + np.abs(v),
-    "maximum": lambda u, v: np.maximum(u * u, v - 9.0) + np.maximum(u, 0.1),
-    "minimum": lambda u, v: np.minimum(u - 9.0, v * v) + np.minimum(0.1, v),
-    "where": lambda u, v: np.where(u > v, u * v, v / u) + np.where(u < 0.0, 1.0, v),
-}
+RULES = """
+    3.0 + u + v;  1.5 - u - v;  -u;  u * v * 2.0;  u / v;  2.0 / u;  np.square(u);  u**3 - v**-2 + u**0.5
+    (-u) ** 3;  u**v + 2.0**v;  np.sin(u);  np.cos(u * v);  np.tan(0.5 * u);  np.exp(u - v);  np.log(u)
+    np.sqrt(u + v);  np.arctan2(u - 1.0, -v);  u * np.floor(v + 7.5);  np.remainder(u + 10.0, 6.0)
+    np.maximum(u * u, v - 9.0) + np.maximum(u, 0.1);  np.minimum(u - 9.0, v * v) + np.minimum(0.1, v)
+    np.where(u > v, u * v, v / u) + np.where(u < 0.0, 1.0, v);  np.abs(u - 5.0) + np.abs(v)
+"""
 
 
 def u_at(t: Any) -> Any:
@@ -200,23 +178,22 @@ def v_at(t: Any) -> Any:
     return 2.0 + 0.2 * t - 0.5 * t**2
 
 
-@pytest.mark.parametrize("name", RULES)
-def test_rules_are_derivatives(name: str) -> None:
+@pytest.mark.parametrize("formula", RULES.strip().replace("\n", ";").split(";"))
+def test_rules_are_derivatives(formula: str) -> None:
     """Of the columns u(t) and v(t) at three times, and of floats."""
+    rule = eval(f"lambda u, v: {formula}", {"np": np})
     t, steps = np.array([0.0, 0.3, -0.2]), STEP * np.arange(-4, 5)
     u = Taylor(u_at(t), 0.4 + 0.6 * t, np.full(3, 0.6))
     v = Taylor(v_at(t), 0.2 - t, np.full(3, -1.0))
-    found, rule = RULES[name](u, v), RULES[name]
+    found = rule(u, v)
     values = np.array([rule(u_at(t + step), v_at(t + step)) for step in steps])
     # eighth order: h^8 = 1e-16; rounding of 1e-15 / h and 1e-14 / h^2
     np.testing.assert_allclose(found.value, rule(u_at(t), v_at(t)), rtol=0, atol=1e-15)
     np.testing.assert_allclose(found.first, FIRST @ values / STEP, rtol=0, atol=1e-11)
     np.testing.assert_allclose(found.second, SECOND @ values / STEP**2, rtol=0, atol=1e-9)
     scalar = rule(Taylor(u_at(0.3), 0.58, 0.6), Taylor(v_at(0.3), -0.1, -1.0))
-    numbers = [float(one) for one in (scalar.value, scalar.first, scalar.second)]
-    np.testing.assert_allclose(
-        numbers, [one[1] for one in (found.value, found.first, found.second)], rtol=1e-14
-    )
+    for part in ("value", "first", "second"):
+        assert float(getattr(scalar, part)) == pytest.approx(getattr(found, part)[1], rel=1e-14, abs=0.0)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3])
