@@ -141,9 +141,8 @@ def spherical(t1: complex, t4: complex, alpha: FloatArray) -> complex:
     ],
 )
 def test_both_branches_have_the_printed_answers(name: str, joint: str, answers: tuple[float, float]) -> None:
-    _, assembled = every_assembly(tables_of(name), {})
-    expected: list[Answer] = [{joint: (value,)} for value in answers]
-    assert_same_answers(build_mechanism(load_network(name)), assembled, expected, ANSWER)
+    mechanism, assembled = every_assembly(tables_of(name), {})
+    assert_same_answers(mechanism, assembled, [{joint: (value,)} for value in answers], ANSWER)
 
 
 def test_bennett_obeys_its_relation_and_does_not_close_with_a_longer_link() -> None:
@@ -161,10 +160,8 @@ def test_bennett_obeys_its_relation_and_does_not_close_with_a_longer_link() -> N
 
 def test_a_turn_of_the_screw_lifts_by_the_pitch() -> None:
     mechanism = build_mechanism(load_network("screw-jack"))
-    heights = [
-        assemble(mechanism, {"turn": turn}).assemblies[0].values["rise"][0]
-        for turn in (1.5, 1.5 + 2 * math.pi, 1.5 + 10 * math.pi)
-    ]
+    turns = [{"turn": 1.5 + 2 * math.pi * count} for count in (0, 1, 5)]
+    heights = [assemble(mechanism, turn).assemblies[0].values["rise"][0] for turn in turns]
     np.testing.assert_allclose(np.diff(heights), [0.005, 0.02], rtol=0, atol=1e-12)  # descent's last gap
 
 
@@ -368,7 +365,7 @@ def pose_of(mechanism: Mechanism, assembly: Assembly, body: str) -> FloatArray:
 def assert_same_answers(
     mechanism: Mechanism, assembled: AssemblyResult, answers: list[Answer], tolerance: float
 ) -> None:
-    """Hold the assemblies against the answers, each of which must be found once; angles up to whole turns."""
+    """Compare the assemblies with the answers, each of which must be found once; angles up to whole turns."""
     units = {one.name: one.units for one in mechanism.network.joints}
     owners = list(answers[0])
     turns = np.array([unit == "rad" for owner in owners for unit in units[owner]])
