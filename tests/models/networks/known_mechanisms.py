@@ -150,12 +150,12 @@ def rod_platform(drive: str | None = None, rods: int = 6) -> Network:
     """Return a platform on rods between random points; the first is driven if asked."""
     rng = np.random.default_rng(5)
     ends = rng.uniform(-1.0, 1.0, (rods, 2, 3)) + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.5]])
-    held = [
+    elements = [
         rod(f"r{k}", ("ground", "platform"), vec(p), vec(q), drive if drive and k == 0 else "0")
         for k, (p, q) in enumerate(ends)
     ]
     controls = (Control("s"),) if drive is not None else ()
-    return Network("platform", (Body("platform", (0.0,) * 6),), (), tuple(held), controls)
+    return Network("platform", (Body("platform", (0.0,) * 6),), (), tuple(elements), controls)
 
 
 MECHANISMS: dict[str, Callable[..., Network]] = {

@@ -102,8 +102,8 @@ def test_an_element_equals_its_joints_on_a_hundred_networks(kind: ElementKind, o
         x, y = of_element.start, of_joints.start
         for mechanism, at in ((of_element, x), (of_joints, y)):
             assert np.abs(evaluate_closure(mechanism, at[:, np.newaxis]).residual).max(initial=0.0) < CLOSES
-        held: FloatArray = np.array(of_joints.poses(y.tolist())["platform"].rotation)
-        assert_close(held, np.array(of_element.poses(x.tolist())["platform"].rotation), CLOSES)
+        rotation: FloatArray = np.array(of_joints.poses(y.tolist())["platform"].rotation)
+        assert_close(rotation, np.array(of_element.poses(x.tolist())["platform"].rotation), CLOSES)
         one, other = analyse_mobility(of_element, x), analyse_mobility(of_joints, y)
         assert one.mobility == 5 - others
         assert other.idle == built.idle

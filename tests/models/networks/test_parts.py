@@ -1,4 +1,4 @@
-"""Expressions: their values and derivatives beside those of Python and NumPy."""
+"""Expressions: their values and derivatives compared with those of Python and NumPy."""
 
 from __future__ import annotations
 
