@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from peers import need_builds_for
-from shipped_units import shipped_unit
+from systems import shipped_unit
 from urmpipe_fmus.build.description import Backend
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.native import this_platform

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from shipped_units import sample_times
-from systems import Scalar, System, Trace, empty_trace
+from systems import Scalar, System, Trace, empty_trace, sample_times
 
 TYPES = {"Real": "real", "Integer": "integer", "Boolean": "bool"}  # in the names of Ecos's functions
 
 
 def typed(owner: object, method: str, scalar: Scalar) -> Callable[..., Any]:
-    """Return the method for the type of a scalar: `real_initial_value` of `{}_initial_value`."""
+    """Return the method for the type of a scalar: `last_real_values` of `last_{}_values`."""
     found: Callable[..., Any] = getattr(owner, method.format(scalar.variable.type.lower()))
     return found
 
@@ -35,8 +34,6 @@ def run_libcosim(system: System, step: float, steps: int) -> Trace:
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     assert execution.add_observer(observer)
     assert execution.add_manipulator(manipulator)
-    for scalar, value in system.starts():
-        assert typed(execution, "{}_initial_value", scalar)(index[scalar.block], scalar.reference, value)
     for source, target in system.connected():
         ends = (index[source.block], source.reference, index[target.block], target.reference)
         assert typed(execution, "connect_{}_variables", source)(*ends) == 0
@@ -70,9 +67,8 @@ def run_ecos(system: System, step: float, steps: int) -> Trace:
         for source, target in system.connected():
             kind = "int" if source.variable.type == "Integer" else TYPES[source.variable.type]
             getattr(structure, f"make_{kind}_connection")(source.path, target.path)
-        assert structure.add_parameter_set("start", {scalar.path: value for scalar, value in system.starts()})
         with EcosSimulation(structure=structure, step_size=step) as simulation:
-            assert simulation.init(parameter_set="start"), EcosLib.get_last_error()
+            assert simulation.init(), EcosLib.get_last_error()
             read(simulation, 0)
             for k in range(steps):
                 for scalar, value in system.inputs(k):
@@ -103,7 +99,6 @@ def run_fmpy(system: System, step: float, steps: int) -> Trace:
         output_interval=step,
         input=rows if inputs else None,
         output=shown,
-        start_values=dict(block.start),
         fmi_type="CoSimulation",
     )
     assert len(found) == len(t)

@@ -15,8 +15,7 @@ import pytest
 from loaded_fmu import Loaded
 from masters import run_fmpy
 from peers import fmutool, need_builds_for, python
-from shipped_units import CROSS_BUILT, STEP, columns, drawn_inputs, sample_times, shipped_unit
-from systems import alone
+from systems import CROSS_BUILT, STEP, alone, columns, drawn_inputs, sample_times, shipped_unit
 from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.description import Backend
@@ -106,36 +105,29 @@ def test_an_fmu_compiled_again_from_its_own_sources_gives_the_same_numbers(
 CYCLES = """
 import gc, os, sys
 from pathlib import Path
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
+from loaded_fmu import Loaded
 
-folder = extract(sys.argv[1])
-model = read_model_description(folder)
-shown = [one for one in model.modelVariables if one.causality == "output"]
-real = [one.valueReference for one in shown if one.type == "Real"]
 # One library for all cycles: FMPy itself keeps 300 bytes of each that it has opened, of whatever FMU.
-slave = FMU2Slave(guid=model.guid, unzipDirectory=folder, instanceName="it",
-                  modelIdentifier=model.coSimulation.modelIdentifier)
+loaded = Loaded(Path(sys.argv[1]), start=None)
+fmu, variables = loaded.fmu, loaded.described.modelVariables
+real = [one.valueReference for one in variables if (one.causality, one.type) == ("output", "Real")]
 
 def resident():
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 def cycle():
-    slave.instantiate()
-    slave.setupExperiment(startTime=0.0)
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
+    fmu.instantiate()
+    loaded.initialize(0.0)
     for k in range(3):
-        slave.doStep(currentCommunicationPoint=k * 0.005, communicationStepSize=0.005)
-        slave.getReal(real)
-    state = slave.getFMUstate()
-    again = slave.deSerializeFMUstate(slave.serializeFMUstate(state))
-    slave.setFMUstate(again)
-    slave.freeFMUstate(again)
-    slave.freeFMUstate(state)
-    slave.terminate()
-    slave.fmi2FreeInstance(slave.component)
+        fmu.doStep(currentCommunicationPoint=k * 0.005, communicationStepSize=0.005)
+        fmu.getReal(real)
+    state = fmu.getFMUstate()
+    again = fmu.deSerializeFMUstate(fmu.serializeFMUstate(state))
+    fmu.setFMUstate(again)
+    fmu.freeFMUstate(again)
+    fmu.freeFMUstate(state)
+    loaded.free()
 
 for _ in range(2000):  # the heap of a large unit takes some hundred to find its form
     cycle()

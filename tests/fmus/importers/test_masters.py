@@ -11,8 +11,19 @@ import pytest
 
 from masters import MASTERS
 from peers import need, need_builds_for
-from shipped_units import STEP, columns, drawn_inputs, sample_times, shipped_unit
-from systems import Block, Scalar, System, Trace, alone, empty_trace
+from systems import (
+    STEP,
+    Block,
+    Scalar,
+    System,
+    Trace,
+    alone,
+    columns,
+    drawn_inputs,
+    empty_trace,
+    sample_times,
+    shipped_unit,
+)
 from urmpipe_fmus.block import BlockModel, Table
 from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.build.fmu import cached_fmu

@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipped_units import CROSS_BUILT, STEP, columns, drawn_inputs, sample_times, shipped_unit
-from systems import PYTHON
+from systems import CROSS_BUILT, PYTHON, STEP, columns, drawn_inputs, sample_times, shipped_unit
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
