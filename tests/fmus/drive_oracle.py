@@ -14,7 +14,7 @@ K, DAMPING, RATIO, C, R, L, I1, J = 2500.0, 5.0, 100.0, 0.05, 0.5, 1e-3, 0.5, 1.
 
 
 def drive_matrix() -> FloatArray:
-    """Return A of x' = A x with x = theta1, omega1, i_a, theta2, omega2, u, and u held."""
+    """Return A of x' = A x with x = theta1, omega1, i_a, theta2, omega2, u, and u constant."""
     theta1, omega1, current, theta2, omega2, u = np.eye(6)
     torque = K * (theta1 - theta2) + DAMPING * (omega1 - omega2)
     motor = (RATIO * C * current - torque) / I1
@@ -28,7 +28,7 @@ def integrate(A: FloatArray, x: FloatArray, duration: float) -> FloatArray:
 
 
 def motor_after(values: Mapping[str, float], duration: float) -> FloatArray:
-    """Return theta1, omega1, i_a after a time with the inputs u, theta2, omega2 held."""
+    """Return theta1, omega1, i_a after a time with the inputs u, theta2, omega2 constant."""
     A = drive_matrix()
     A[3:] = 0.0
     names = ("theta1", "omega1", "i_a", "theta2", "omega2", "u")

@@ -1,4 +1,4 @@
-"""Arms for tests: with joints of all kinds, with one joint, and with a held wrist."""
+"""Arms for tests: with joints of all kinds, with one joint, and with a passive wrist."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def sliding_arm() -> Chain:
 
 
 def sprung_arm() -> Chain:
-    """Return it with masses and drives: springs beside the drives, two periods, and a wrist that is held."""
+    """Return it with masses and drives: springs on driven joints, two periods, and a passive wrist."""
     calm = Gains(3.75, 0.375, 0.005)
     turn = replace(driven("turn"), gains=calm, spring=CounterbalanceSpring(1000.0, 0.315))
     slide = replace(driven("slide"), gains=calm, spring=CounterbalanceSpring(2000.0, 0.195), period=7.5e-3)
@@ -45,7 +45,7 @@ def one_joint(drive: DrivenJoint | PassiveJoint, body: Inertial, **fields: Any) 
 
 
 def wristed(stiffness: float = 2500.0) -> Chain:
-    """Return two level links of 0.5 m and 0.3 m: the shoulder with a drive, the wrist held by a spring."""
+    """Return two level links of 0.5 m and 0.3 m: the shoulder with a drive, the wrist on a spring."""
     lifting = (0.0, -1.0, 0.0)
     return Chain(
         "wristed",

@@ -76,7 +76,7 @@ def test_a_controller_without_acceleration_tracks_too() -> None:
 
 @pytest.mark.slow
 @needs_native
-def test_a_held_load_is_turned_by_its_torque_over_the_rigidity() -> None:
+def test_the_twist_of_a_controlled_load_at_rest_is_its_torque_over_the_rigidity() -> None:
     recorded = changed_drive(1e-3, 1.5, load={"tau_ext": -50.0}, set_point={"target": 0.0})
     twist = recorded.column("drive", "theta1")[-1] - recorded.column("load", "theta")[-1]
     assert twist == pytest.approx(50.0 / K, rel=1e-6)  # at rest but for what e^-20 leaves

@@ -51,8 +51,8 @@ class OneSystem:
 
     def __init__(self, chain: Chain, drives: list[DrivenJoint], spring: PassiveJoint, wrench: Wrench) -> None:
         self.chain, self.drives, self.wrench, self.links = chain, drives, wrench, chain_to_links(chain)
-        first, second, held = find_equilibrium(chain)
-        self.spring = Spring(spring.stiffness, spring.damping, held.rest)
+        first, second, passive = find_equilibrium(chain)
+        self.spring = Spring(spring.stiffness, spring.damping, passive.rest)
         self.voltages = [first.voltage, second.voltage]
         motors = [first.rest, second.rest, 0.0, 0.0, first.current, second.current]
         self.x = np.array([*chain.start, *STILL[:3], *motors, *STILL[:4]])
@@ -112,8 +112,8 @@ def test_an_arm_at_rest_stays_for_two_seconds() -> None:
         (5e-5, 2500.0, 0.1, 0.5, 0.0, np.sqrt(2500.0 / 5e-5)),  # shaft against link
         (0.1, 2500.0, 5.0, 5e-4, 0.0, 5.0 / 5e-4),  # shaft against rotor
         (0.1, 2500.0, 0.1, 5e-5, 0.0, 5.0 / np.sqrt(1e-3 * 5e-5)),  # motor: C i_p over the root of L I1
-        (1e-5, 2500.0, 0.0, None, 0.0, np.sqrt(2500.0 / 1e-5)),  # a held joint without damping
-        (0.1, 2500.0, 5.0, 0.5, 1e7, np.sqrt(1e7 / 0.1)),  # a spring beside the drive against link
+        (1e-5, 2500.0, 0.0, None, 0.0, np.sqrt(2500.0 / 1e-5)),  # a passive joint without damping
+        (0.1, 2500.0, 5.0, 0.5, 1e7, np.sqrt(1e7 / 0.1)),  # the spring of a driven joint against link
     ],
 )
 def test_the_internal_step_is_one_at_which_a_stiff_joint_is_stable(
@@ -243,7 +243,7 @@ def test_the_blocks_near_the_unit_with_the_first_order_of_the_communication_step
         found = np.column_stack([recorded.column("arm", f"phi[{k}]") for k in range(1, 7)])
         errors.append(float(np.abs(found[::parts] - expected).max()))
     assert np.abs(expected - expected[0]).max() > 0.3  # rad: it moves
-    # values held over a step are off by its length: the first order, in the limit of small steps
+    # inputs constant over a step are off by its length: the first order, in the limit of small steps
     assert -np.diff(np.log2(errors)) == pytest.approx(1.0, abs=0.1), errors
     assert errors[2] < 1e-3  # rad, with the system's own step
 
@@ -268,7 +268,7 @@ def without_springs(chain: Chain) -> Chain:
 
 
 @pytest.mark.slow
-def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_stays_at_rest() -> None:
+def test_a_spring_of_a_driven_joint_relieves_the_drive_of_its_torque_and_the_arm_stays_at_rest() -> None:
     chain = sprung_arm()
     relieved, plain = find_equilibrium(chain), find_equilibrium(without_springs(chain))
     for one, own, other, q in zip(chain.drives, relieved, plain, chain.start, strict=True):
@@ -292,15 +292,15 @@ def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_sta
 
 def test_the_torque_of_a_spring_is_what_its_energy_changes_by() -> None:
     chain = sprung_arm()
-    held: list[dynamics.Actuator] = [Motor(DRIVE, 0.1, 0.2, 0.3, 0.4), Spring(9.0, 1.0, 0.2)]
+    others: list[dynamics.Actuator] = [Motor(DRIVE, 0.1, 0.2, 0.3, 0.4), Spring(9.0, 1.0, 0.2)]
     without = Motor(DRIVE, 0.1, 0.2, 0.3, 0.4)
     sprung = without._replace(spring=CounterbalanceSpring(300.0, 0.7))
 
     def energy(q: float, first: Motor) -> float:
-        return float(dynamics.arm_energy(chain, ArmState([q, 0.1, 0.3], STILL[:3], [first, *held])))
+        return float(dynamics.arm_energy(chain, ArmState([q, 0.1, 0.3], STILL[:3], [first, *others])))
 
     for q in (-0.4, 0.7, 1.1):
-        state = ArmState([q, 0.1, 0.3], STILL[:3], [sprung, *held])
+        state = ArmState([q, 0.1, 0.3], STILL[:3], [sprung, *others])
         added = np.subtract(dynamics.joint_torques(state), dynamics.shaft_torques(state))
         # of a square the difference is exact to rounding: 1e2 J * 1e-15 / 1e-3
         above, below = (energy(x, sprung) - energy(x, without) for x in (q + 1e-3, q - 1e-3))
@@ -333,7 +333,7 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
     # RK4 in 0.25 ms: (h / 2 ms)^4 of the armature's time, of values that change by some 1
     found = model.read("phi", "s", "theta1", "theta1_s")[[0, 2, 1, 3, 4]]
     np.testing.assert_allclose(found, whole.x[[0, 1, 2, 6, 7]], rtol=0.0, atol=1e-7)
-    assert np.abs(whole.x[:3] - chain.start).min() > 0.01  # each joint moves, the held one in its spring
+    assert np.abs(whole.x[:3] - chain.start).min() > 0.01  # each joint moves, the passive one in its spring
     work, lost, pushed, damped = whole.x[-4:]
     change = whole.stored() - before
     stretched = [
@@ -348,7 +348,7 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
 
 
 @pytest.mark.slow
-def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive_moves() -> None:
+def test_a_passive_wrist_yields_to_a_force_by_the_square_of_its_length_and_no_drive_moves() -> None:
     chain, force = wristed(), 1e-2
     before, under = find_equilibrium(chain), find_equilibrium(chain, Wrench((0.0, 0.0, force)))
     assert before[1].q == 0.0
@@ -372,7 +372,7 @@ def radius_of_the_unit(chain: Chain, round_: float) -> float:
     """Return the spectral radius of a round of samples by differences of the unit, to the shortest period."""
     instance = SteppedUnit("driven_arm", {"internal_step": 1e-4}, robot=chain)
     names = [one.name for one in (*instance.model.states, *instance.model.memories)]
-    kept = [name for name in names if not name.startswith(("energy", "sample"))]  # states and held voltages
+    kept = [name for name in names if not name.startswith(("energy", "sample"))]  # states and voltages
     rest = instance.read(*kept)
     references = [instance.reference(name) for name in instance.scalars(*kept)]
     moved = 1e-6 * np.hstack((np.eye(len(rest)), -np.eye(len(rest))))

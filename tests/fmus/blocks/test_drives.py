@@ -108,15 +108,15 @@ def test_the_energy_balance_closes_with_the_fourth_power_of_the_internal_step() 
     assert orders(open_by)[1:] == pytest.approx(4.0, abs=0.2), open_by
 
 
-def test_over_a_log_the_inputs_are_held_from_sample_to_sample() -> None:
+def test_over_a_log_the_inputs_are_constant_from_sample_to_sample() -> None:
     rng = np.random.default_rng(3)
     limits = {"u": 24.0, "theta2": 0.1, "omega2": 1.0}
     inputs = {name: rng.uniform(-limit, limit, 5) for name, limit in limits.items()}
     found = run(make_block("dc_drive"), np.linspace(0.0, 4.0 * STEP, 5), inputs, {"internal_step": 5e-5})
     state = np.zeros(3)
     for k in range(4):
-        held = {name: float(column[k]) for name, column in inputs.items()}
-        state = motor_after(held | dict(zip(MOTOR, state, strict=True)), STEP)
+        values = {name: float(column[k]) for name, column in inputs.items()}
+        state = motor_after(values | dict(zip(MOTOR, state, strict=True)), STEP)
         # RK4 in steps of 50 us, four times over
         np.testing.assert_allclose([found[name][k + 1] for name in MOTOR], state, rtol=1e-8)
 
