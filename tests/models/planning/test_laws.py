@@ -169,11 +169,10 @@ def test_ruckig_missing_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_path_with_its_stops_is_run_in_stretches() -> None:
     """Each stretch as if there were no other."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
-    rows, first = (
-        PathRows(points, [0, 0.2, 0, 0], corner=True),
-        PathRows(points[:3], [0, 0.2, 0], corner=True),
+    whole_path, stretch = (
+        trapezoid_law(rows_to_path(PathRows(points[:n], [0, 0.2, 0, 0][:n], corner=True)), 0.5, 2.0)
+        for n in (4, 3)
     )
-    whole_path, stretch = (trapezoid_law(rows_to_path(one), 0.5, 2.0) for one in (rows, first))
     assert_allclose(whole_path.phases[:3], stretch.phases, atol=1e-12)
     assert whole_path.duration == pytest.approx(stretch.duration + 1.0 / 0.5 + 0.5 / 2.0, abs=1e-12)
 
