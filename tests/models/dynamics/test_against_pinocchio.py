@@ -113,9 +113,8 @@ def test_inverse_dynamics_and_its_terms_are_those_of_pinocchio(states: States) -
 
 
 def test_the_mass_matrix_is_that_of_pinocchio_symmetric_and_positive(states: States) -> None:
-    M = np.array([rows_of(row) for row in equations.mass_matrix(states.chain, states.columns[0])]).transpose(
-        1, 0, 2
-    )
+    rows = equations.mass_matrix(states.chain, states.columns[0])
+    M = np.transpose([rows_of(row) for row in rows], (1, 0, 2))
     assert_array_equal(M, M.transpose(0, 2, 1))
     assert np.linalg.eigvalsh(M).min() > 0.0
     upper = [np.triu(pinocchio.crba(states.model, states.data, q)) for q in states.q]

@@ -34,10 +34,6 @@ def poses(chain: Chain, count: int, seed: int) -> FloatArray:
     return np.random.default_rng(seed).uniform(-math.pi, math.pi, (count, len(chain.moving)))
 
 
-def smallest(*q: list[float], orientation: bool = True) -> list[float]:
-    return list(map(float, singularity_over_log(ARM6, np.array(q), orientation=orientation).smallest))
-
-
 def test_the_factors_of_arm6_are_its_determinant() -> None:
     joints = {joint.name: joint.origin.translation for joint in ARM6.joints}
     lengths = (-joints["aux2"][0], joints["theta3"][0], joints["theta4"][0], joints["aux5"][2])
@@ -73,48 +69,43 @@ def wrist_on_axis_1(t3: float) -> float:
     return math.atan2(across, along) + math.acos(a1 / math.hypot(along, across))
 
 
-def test_the_wrist_on_axis_1_suffices_axis_6_need_not_be_aligned_with_it() -> None:
-    t2 = wrist_on_axis_1(ELBOW)
-    q = [[0.4, t2, ELBOW, 0.3, 0.9, 0.6], [0.4, t2, ELBOW, 1.2, -0.4, 0.6]]
-    axis_6 = jacobian_over_log(ARM6, np.array(q))[:, 3:, 5]
-    assert np.abs(axis_6[:, 2]).max() < 0.95  # it leans against axis 1
-    assert max(smallest(*q)) < SINGULAR
-    assert smallest([0.4, t2 + 0.1, ELBOW, 0.3, 0.9, 0.6]) > [REGULAR]
+ON_AXIS_1 = wrist_on_axis_1(ELBOW)
+COLLINEAR = math.acos((0.03 - 0.02) / 0.12)  # a2 cos t2 + a4 = a1: axis 4 lies on axis 1
+STRETCHED = math.atan2(0.02, 0.13)  # a4 cos t3 = d5 sin t3: the wrist on the line of the upper arm
+HALF = math.pi / 2
+FAMILIES = {  # theta2 to theta5 of singular poses, and of regular ones next to them
+    "wrist on axis 1": (
+        [(ON_AXIS_1, ELBOW, 0.3, 0.9), (ON_AXIS_1, ELBOW, 1.2, -0.4)],
+        [(ON_AXIS_1 + 0.1, ELBOW, 0.3, 0.9)],
+    ),
+    "axis 4 on axis 1, not parallel to it": (
+        [(COLLINEAR, -COLLINEAR - HALF, 0.3, 0.9)],
+        [(0.6, -0.6 - HALF, 0.3, 0.9)],
+    ),
+    "axes 4 and 6 aligned": ([(0.6, ELBOW, 0.3, 0.0), (0.6, ELBOW, 0.3, math.pi)], [(0.6, ELBOW, 0.3, 0.9)]),
+    "stretched": ([(0.6, STRETCHED, 0.3, 0.9)], [(0.6, STRETCHED + 0.2, 0.3, 0.9)]),
+    "withdrawn": ([(0.6, STRETCHED + math.pi, 0.3, 0.9)], [(0.6, STRETCHED + math.pi + 0.2, 0.3, 0.9)]),
+}
 
 
-def test_axes_1_and_4_collinear_are_singular_and_merely_parallel_are_regular() -> None:
-    collinear = math.acos((0.03 - 0.02) / 0.12)  # a2 cos t2 + a4 = a1: axis 4 lies on axis 1
-    q = [[0.4, t2, -t2 - math.pi / 2, 0.3, 0.9, 0.6] for t2 in (collinear, 0.6)]
-    axes = jacobian_over_log(ARM6, np.array(q))[:, 3:]
-    assert_allclose(axes[:, :, 3], axes[:, :, 0], rtol=0.0, atol=1e-15)  # both point up
-    singular, regular = smallest(*q)
-    assert singular < SINGULAR
-    assert regular > REGULAR
-
-
-def test_axes_4_and_6_aligned_lose_a_turn_but_no_way() -> None:
-    q = [[0.4, 0.6, ELBOW, 0.3, t5, 0.6] for t5 in (0.0, math.pi)]
-    assert max(smallest(*q)) < SINGULAR
-    assert min(smallest(*q, orientation=False)) > REGULAR
-
-
-@pytest.mark.parametrize("turn", [0.0, math.pi])
-def test_stretched_and_withdrawn_arms_are_singular(turn: float) -> None:
-    t3 = math.atan2(0.02, 0.13) + turn  # a4 cos t3 = d5 sin t3: the wrist on the line of the upper arm
-    singular, regular = smallest(*([0.4, 0.6, t3 + more, 0.3, 0.9, 0.6] for more in (0.0, 0.2)))
-    assert singular < SINGULAR
-    assert regular > REGULAR
-
-
-def test_every_family_makes_the_determinant_zero() -> None:
-    t2_t3_t5 = [(wrist_on_axis_1(ELBOW), ELBOW, 0.9), (0.6, ELBOW, 0.0), (0.6, math.atan2(0.02, 0.13), 0.9)]
-    q = [[0.4, t2, t3, 0.3, t5, 0.6] for t2, t3, t5 in [*t2_t3_t5, (0.6, ELBOW, 0.9)]]
-    values = singularity_over_log(ARM6, np.array(q))
-    determinant = there(values.determinant)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_families_of_singular_poses(family: str) -> None:
+    singular, regular = (np.array([[0.4, *angles, 0.6] for angles in part]) for part in FAMILIES[family])
+    values = singularity_over_log(ARM6, singular)
+    assert values.smallest.max() < SINGULAR
     # rounding of products of three lengths of 0.3 m
-    assert_allclose(determinant[:3], 0.0, atol=2e-17)
-    assert_allclose(values.manipulability[:3], 0.0, atol=2e-17)
-    assert abs(determinant[3]) > 1e-5
+    assert_allclose(there(values.determinant), 0.0, atol=2e-17)
+    assert_allclose(values.manipulability, 0.0, atol=2e-17)
+    values = singularity_over_log(ARM6, regular)
+    assert values.smallest.min() > REGULAR
+    assert np.abs(there(values.determinant)).min() > 1e-5
+    axes = jacobian_over_log(ARM6, np.vstack((singular, regular)))[:, 3:]
+    if family == "wrist on axis 1":
+        assert np.abs(axes[:, 2, 5]).max() < 0.95  # axis 6 need not be aligned with it, and leans against it
+    elif family == "axis 4 on axis 1, not parallel to it":
+        assert_allclose(axes[:, :, 3], axes[:, :, 0], rtol=0.0, atol=1e-15)  # both point up
+    elif family == "axes 4 and 6 aligned":  # they lose a turn, but no way
+        assert singularity_over_log(ARM6, singular, orientation=False).smallest.min() > REGULAR
 
 
 @pytest.mark.parametrize("name", robot_names())
