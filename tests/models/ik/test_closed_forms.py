@@ -136,13 +136,15 @@ def test_names_base_tool_and_zeros_change_no_branch(kind: str, seed: int) -> Non
     other = described_anew(chain, base, tool, zeros)
     assert form_of(chain).branches == form_of(other).branches
     q = random_joints(rng, chain, 20)
-    one, two = (form_of(arm).solve(forward_targets(arm, at)) for arm, at in ((chain, q), (other, q - zeros)))
+    first, second = (
+        form_of(arm).solve(forward_targets(arm, at)) for arm, at in ((chain, q), (other, q - zeros))
+    )
     # away from where two solutions meet: there a rounding may part or unite them, or move the given digits
-    clear = (one.reached.sum(axis=1) == two.reached.sum(axis=1)) & ~is_crowded(one.q)
+    clear = (first.reached.sum(axis=1) == second.reached.sum(axis=1)) & ~is_crowded(first.q)
     assert clear.sum() >= 10
-    away = by_shorter_way(one.q[clear] - zeros - two.q[clear])
-    np.testing.assert_array_equal(one.reached[clear], two.reached[clear])
-    np.testing.assert_allclose(away[one.reached[clear]], 0.0, atol=1e-7)
+    away = by_shorter_way(first.q[clear] - zeros - second.q[clear])
+    np.testing.assert_array_equal(first.reached[clear], second.reached[clear])
+    np.testing.assert_allclose(away[first.reached[clear]], 0.0, atol=1e-7)
 
 
 @pytest.mark.parametrize("special", ["axes 2 and 3 parallel", "like a PUMA", "anthropomorphic"])
@@ -154,10 +156,10 @@ def test_an_elbow_joint_that_counts_the_other_way_changes_no_branch(special: str
     joints[2] = Joint("other way", "revolute", joints[2].origin, (-x, -y, -z))
     other = Chain("other way", tuple(joints), tip=chain.tip, base=chain.base, tool=chain.tool)
     targets = forward_targets(chain, random_joints(rng, chain, 50))
-    one, two = (form_of(arm).solve(targets) for arm in (chain, other))
-    np.testing.assert_array_equal(one.reached, two.reached)
-    away = by_shorter_way(one.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0] - two.q)
-    np.testing.assert_allclose(away[one.reached], 0.0, rtol=0, atol=1e-7)
+    first, second = (form_of(arm).solve(targets) for arm in (chain, other))
+    np.testing.assert_array_equal(first.reached, second.reached)
+    away = by_shorter_way(first.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0] - second.q)
+    np.testing.assert_allclose(away[first.reached], 0.0, rtol=0, atol=1e-7)
 
 
 # the postures of a plain arm are numbered, as it may change from one to another

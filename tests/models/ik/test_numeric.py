@@ -317,7 +317,7 @@ def test_least_motion_counts_from_home_wherever_the_search_begins_and_no_whole_t
 
 
 def test_a_radian_counts_as_a_metre() -> None:
-    """Slides along x and y beside a turn of an arm of 0.5 m: at least motion home - q is J^T lambda.
+    """Slides along x and y, and a turn of an arm of 0.5 m: at least motion home - q is J^T lambda.
 
     The turn moves the tool by 0.5 m a radian square to the arm, a slide by 1 m a metre.
     """

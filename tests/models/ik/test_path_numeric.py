@@ -311,14 +311,14 @@ def test_a_sweep_solves_the_linearised_path_exactly() -> None:
     q = np.array([0.3, 2.0, 0.4, 2.5, 0.2, 1.0]) + 0.01 * np.arange(30)[:, None]
     targets = Targets(forward_targets(arm, q).position)
     guess = q + 0.002 * np.random.default_rng(1).normal(size=q.shape)
-    held = np.full(6, np.nan)
-    held[2] = guess[0, 2]
-    guess[:, 2] = held[2]
-    swept = newton_sweep(build_task(arm, targets), guess, q[0], held, np.full(30, DAMPING))
-    free = np.isnan(held)
+    fixed = np.full(6, np.nan)
+    fixed[2] = guess[0, 2]
+    guess[:, 2] = fixed[2]
+    swept = newton_sweep(build_task(arm, targets), guess, q[0], fixed, np.full(30, DAMPING))
+    free = np.isnan(fixed)
     J = jacobian_over_log(arm, guess)[:, :3] * free
     error = targets.position - forward_targets(arm, guess).position
-    last = np.where(free, q[0], held)
+    last = np.where(free, q[0], fixed)
     for k in range(30):
         A = np.eye(6) + J[k].T @ J[k] / DAMPING
         b = last - guess[k] + J[k].T @ error[k] / DAMPING

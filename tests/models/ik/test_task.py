@@ -60,7 +60,7 @@ def test_a_singular_system_has_a_finite_damped_solution() -> None:
     assert (factor(A, least).inverse <= 1.0001 / least).all()
     assert (factor(A, least).inverse > 0.0).all()
     step = transposed_product(rows, factor(A, 1e-13 * trace).solve(product(rows, np.ones((1, 2000)))))
-    np.testing.assert_allclose(step, 1.0, atol=1e-2)  # rounding 1e-16 beside a damping of 1e-13
+    np.testing.assert_allclose(step, 1.0, atol=1e-2)  # rounding 1e-16 with a damping of 1e-13
 
 
 def test_products_are_those_of_matrices() -> None:
