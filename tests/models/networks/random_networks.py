@@ -87,6 +87,12 @@ def motion(kind: JointKind, q: Sequence[float] | FloatArray, pitch: float = 0.0)
     return np.asarray(expm(generator(w, (0.0, s, 0.0))))
 
 
+def joint_matrix(joint: Joint, q: Sequence[float] | FloatArray) -> FloatArray:
+    """Return R = A_1 T(q) A_2^-1, the pose of the second body in the first."""
+    first, second = map(matrix, joint.frames)
+    return np.asarray(first @ motion(joint.kind, q, joint.pitch) @ np.linalg.inv(second))
+
+
 def random_values(kind: JointKind, rng: np.random.Generator) -> tuple[float, ...]:
     """Return variables in [rad] and [m] away from half a turn."""
     return tuple(float(one) for one in rng.uniform(-1.2, 1.2, len(JOINT_UNITS[kind])))

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from known_mechanisms import four_bar_tables
-from random_networks import FIRST, SECOND, matrix, motion
+from random_networks import FIRST, SECOND, assert_close, joint_matrix
 from test_shipped import Answer, Rssr, Tables, bennett, rccc, rssr, slider_crank, tables_of
 from test_shipped import four_bar as four_bar_answers
 from urmpipe import load_network, network_drive
@@ -121,10 +121,8 @@ def test_loops_close_by_a_product_of_matrix_exponentials(name: str) -> None:
         for joint in network.joints:
             places = [k for k, one in enumerate(moved.mechanism.variables) if one.owner == joint.name]
             q = x[places] if places else x[moved.mechanism.controls]
-            first, second = (matrix(frame) for frame in joint.frames)
-            step = first @ motion(joint.kind, q, joint.pitch) @ np.linalg.inv(second)
             a, b = (poses[body] for body in joint.bodies)
-            np.testing.assert_allclose(a @ step, b, rtol=0, atol=1e-12)
+            assert_close(a @ joint_matrix(joint, q), b, 1e-12)
 
 
 # ---------------------------------------------------------------------------------------- branches
@@ -206,7 +204,7 @@ def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
     assert [one.values["crank"] for one in moved.events] == pytest.approx(flat, abs=1e-9)
     crank = np.linspace(*ends, 201)
     for name, expected in {"theta2": crank, "theta4": crank, "A": -crank, "B": crank}.items():
-        np.testing.assert_allclose(column(moved, name), expected, rtol=0, atol=ANSWER)
+        assert_close(column(moved, name), expected, ANSWER)
     for one in moved.events:  # the other motion there: of the antiparallelogram
         assert set(one.direction) == {"A", "B", "theta4"}
         assert one.t == pytest.approx((one.values["crank"] - ends[0]) / (ends[1] - ends[0]), abs=1e-9)
@@ -225,9 +223,8 @@ def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
 def test_a_joint_stops_the_motion_at_its_limit(
     joint: str, limits: dict[str, float], end: float, limit: float
 ) -> None:
-    moved = network_drive(
-        planar(0.4, 0.9, 0.7, 1.0, 0.9, 1, **{joint: limits}), {"crank": (0.9, end)}, steps=100
-    )
+    tables = planar(0.4, 0.9, 0.7, 1.0, 0.9, 1, **{joint: limits})
+    moved = network_drive(tables, {"crank": (0.9, end)}, steps=100)
     assert (moved.verdict, [one.kind for one in moved.events]) == ("fail", ["limit"])
     (event,) = moved.events
     assert len(moved) == math.floor(event.row) + 1
@@ -242,10 +239,9 @@ def test_a_joint_stops_the_motion_at_its_limit(
 def test_a_joint_drives_by_its_name_in_place_of_the_control() -> None:
     by_joint = network_drive("four-bar", {"theta4": ("85deg", "120deg")}, steps=50)
     assert column(by_joint, "theta4") == pytest.approx(np.radians(np.linspace(85, 120, 51)), abs=1e-14)
-    crank = column(by_joint, "theta2")
-    log = pd.DataFrame({"t": by_joint.t, "crank [rad]": crank})
+    log = pd.DataFrame({"t": by_joint.t, "crank [rad]": column(by_joint, "theta2")})
     by_crank = network_drive("four-bar", log=log)
-    np.testing.assert_allclose(by_crank.joint_motion[0], by_joint.joint_motion[0], rtol=0, atol=ANSWER)
+    assert_close(by_crank.joint_motion[0], by_joint.joint_motion[0], ANSWER)
 
 
 @pytest.mark.slow
@@ -260,8 +256,7 @@ def test_any_number_of_steps_gives_the_same_motion(name: str) -> None:
             drives[one.name] = (one.start, one.start + size)
     few, many = (network_drive(network, drives, steps=steps) for steps in (100, 1000))
     assert few.verdict == many.verdict == "pass"
-    gaps = np.abs(few.joint_motion[0] - many.joint_motion[0][::10])
-    assert gaps.max() < ANSWER
+    assert_close(few.joint_motion[0], many.joint_motion[0][::10], ANSWER)
 
 
 # ---------------------------------------------------------------------------------------- logs
@@ -281,8 +276,8 @@ def test_a_driven_platform_goes_where_its_legs_lead() -> None:
     moved = network_drive("stewart-gough-driven", log=table, joints=list(legs), point=("platform", (0, 0, 0)))
     assert (len(moved), moved.verdict) == (5000, "pass")
     pose = moved.poses()[:, moved.network.body_names.index("platform")]
-    np.testing.assert_allclose(pose[:, :3, :3], R, rtol=0, atol=ANSWER)
-    np.testing.assert_allclose(pose[:, :3, 3], p, rtol=0, atol=ANSWER)
+    assert_close(pose[:, :3, :3], R, ANSWER)
+    assert_close(pose[:, :3, 3], p, ANSWER)
     assert moved.point_motion is not None
     np.testing.assert_array_equal(moved.point_motion[0], pose[:, :3, 3])
 
@@ -330,7 +325,7 @@ def test_a_log_around_singular_poses_stays_on_its_branch(center: tuple[float, fl
     by_names = np.array([column(moved, name) for name in "PCQ"])
     assert np.abs(apart(by_names[:, 0], found)).max() < ANSWER
     expected = five_bar_at(left, right)
-    np.testing.assert_allclose(by_names - by_names[:, :1], expected - expected[:, :1], rtol=0, atol=ANSWER)
+    assert_close(by_names - by_names[:, :1], expected - expected[:, :1], ANSWER)
     here = {name: float(column(moved, name)[0]) for name in "PCQ"}
     for row in range(0, 400, 25):  # one after another, each from the last configuration
         drives = {"left": left[[row, row + 25]].tolist(), "right": right[[row, row + 25]].tolist()}
@@ -350,7 +345,7 @@ def assert_rates(parts: tuple[FloatArray, ...], rows: FloatArray) -> None:
         n = len(parts[0]) - 8
         difference = sum(one * parts[0][k : n + k] for k, one in enumerate(weights)) / PERIOD**power
         # rounding of 12 rad over h^2: 5e-9; of sixth order S2 of rssr would be off by 1e-7
-        np.testing.assert_allclose(rates[4:-4][rows[4:-4]], difference[rows[4:-4]], rtol=0, atol=1e-8)
+        assert_close(rates[4:-4][rows[4:-4]], difference[rows[4:-4]], 1e-8)
 
 
 @pytest.mark.slow
@@ -365,9 +360,8 @@ def assert_rates(parts: tuple[FloatArray, ...], rows: FloatArray) -> None:
 def test_rates_are_derivatives(name: str, ends: tuple[float, float], law: Any) -> None:
     network = load_network(name)
     point = (network.body_names[2], (0.1, 0.2, 0.3))
-    moved = network_drive(
-        network, {network.controls[0].name: ends}, duration=9, law=law, tsp=PERIOD, point=point
-    )
+    drives = {network.controls[0].name: ends}
+    moved = network_drive(network, drives, duration=9, law=law, tsp=PERIOD, point=point)
     jumps = np.flatnonzero(np.abs(np.diff(moved.joint_motion[0], axis=0)).max(axis=1) > 1.0)  # q to -q at pi
     kinks = [750, 1500] if law == "trapezoid" else []  # its acceleration jumps at thirds
     apart_by = np.abs(np.arange(2251)[:, np.newaxis] - [*jumps, *kinks, -9]).min(axis=1)
@@ -384,7 +378,7 @@ def test_transmission_and_dead_points_of_a_four_bar() -> None:
     moved = network_drive("four-bar", {"crank": (0, TURN)}, steps=2000)
     ratio = -0.4 * np.sin(column(moved, "A")) / (0.7 * np.sin(column(moved, "B")))
     rates = moved.joint_motion[1][:, moved.joints.index("theta4")] / moved.xd[:, 0]
-    np.testing.assert_allclose(rates, ratio, rtol=0, atol=1e-12)  # sin(B) > 0.5
+    assert_close(rates, ratio, 1e-12)  # sin(B) > 0.5
     (own,) = (one for one in moved.transmission if one.variable == "theta4")
     assert (own.drive, own.unit) == ("crank", "rad/rad")
     assert (own.smallest, own.largest) == pytest.approx((ratio.min(), ratio.max()), abs=1e-12)
@@ -404,9 +398,7 @@ def test_rates_and_forces_at_rows_where_branches_meet_are_those_of_the_motion() 
     assert [event.row for event in moved.events] == pytest.approx([0, 100, 200], abs=1e-6)
     _, rates, accelerations = moved.joint_motion
     np.testing.assert_allclose(np.abs(rates), TURN, atol=1e-7)  # polynomials of 7th degree, rows 4 mm apart
-    np.testing.assert_allclose(
-        accelerations, 0.0, atol=1e-4
-    )  # 39 rad/s2 would be the crank's centripetal one
+    assert_close(accelerations, 0.0, 1e-4)  # 39 rad/s2 would be the crank's centripetal one
     assert moved.forces is not None
     np.testing.assert_allclose(moved.forces.drives[:, 0], 10.0, atol=1e-6)
     for ratio in moved.transmission:
@@ -443,8 +435,8 @@ def test_start_values_choose_the_branch_by_the_joints_that_are_named() -> None:
 
 def test_the_log_of_a_motion_drives_its_network_again() -> None:
     first = network_drive("four-bar", {"crank": (0.5, 1.0)}, steps=20)
-    frame = first.as_run().log.to_frame()
-    np.testing.assert_allclose(network_drive("four-bar", log=frame).x, first.x, atol=ANSWER)
+    again = network_drive("four-bar", log=first.as_run().log.to_frame())
+    assert_close(again.x, first.x, ANSWER)
 
 
 def test_a_control_holds_its_value_beside_a_log() -> None:

@@ -10,7 +10,16 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 import random_networks as rn
-from random_networks import KINDS, assert_close, matrix, motion, random_pose, random_values, transform
+from random_networks import (
+    KINDS,
+    assert_close,
+    joint_matrix,
+    matrix,
+    motion,
+    random_pose,
+    random_values,
+    transform,
+)
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks import joint_motion as jm
 from urmpipe_models.networks.closure import evaluate_closure
@@ -85,24 +94,18 @@ def test_the_printed_matrix_is_no_rotation() -> None:
     assert max(abs(np.linalg.det(rotation(q, 2)) - 1.0) for q in vectors) > 0.025
 
 
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 5.0])
-def test_turning_is_the_derivative_of_the_rotation(angle: float) -> None:
-    for q in vectors(angle).T:
-        rates = rn.difference(lambda at: rotations(at).transpose(1, 2, 0), q, 1e-2)
-        w = rates.transpose(2, 0, 1) @ np.array(jm.exp3((q[0], q[1], q[2])).rotation).T
-        expected = np.array([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
-        found: FloatArray = np.array(jm.left_jacobian((q[0], q[1], q[2]))).T
-        # differences of step 1e-2: truncation 1e-12 / 140, rounding 1e-14
-        assert_close(found, expected, 2e-12)
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-12, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 6.0])
-def test_left_jacobian_inverse_is_the_inverse(angle: float) -> None:
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 5.0, 6.0])
+def test_the_left_jacobian_is_the_derivative_of_the_rotation_and_has_its_inverse(angle: float) -> None:
     q = vectors(angle)
-    turning: FloatArray = np.array(jm.left_jacobian((q[0], q[1], q[2]))).transpose(2, 1, 0)
+    jacobians: FloatArray = np.array(jm.left_jacobian((q[0], q[1], q[2]))).transpose(2, 1, 0)
+    for at, rotation, jacobian in zip(q.T, rotations(q), jacobians, strict=True):
+        rates = rn.difference(lambda x: rotations(x).transpose(1, 2, 0), at, 1e-2)
+        w = rates.transpose(2, 0, 1) @ rotation.T
+        # differences of step 1e-2: truncation 1e-12 / 140, rounding 1e-14
+        assert_close(jacobian, np.array([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]]), 2e-12)
     back = jm.left_jacobian_inverse(q).transpose(2, 0, 1)
     # near 2 pi the inverse grows like 1 / (2 pi - angle), here 1 / 0.28
-    assert_close(back @ turning, np.tile(np.eye(3), (20, 1, 1)), 1e-12)
+    assert_close(back @ jacobians, np.tile(np.eye(3), (20, 1, 1)), 1e-12)
 
 
 @pytest.mark.parametrize("angle", [*ANGLES, 3.0 * np.pi - 1e-6, 3.0 * np.pi + 1e-6, 100.0])
@@ -237,12 +240,6 @@ def test_what_a_joint_allows_and_forbids_is_all_that_there_is(kind: JointKind) -
 # --- poses of whole networks, by matrices alone
 
 
-def joint_matrix(joint: Joint) -> FloatArray:
-    """Return R = A_1 T A_2^-1 at the start."""
-    first, second = map(matrix, joint.frames)
-    return first @ motion(joint.kind, joint.start, joint.pitch) @ np.linalg.inv(second)
-
-
 def poses_by_matrices(network: Network, names: set[str]) -> rn.Poses:
     """Return the pose of each body along some joints, visited until nothing new is found."""
     poses: rn.Poses = {network.ground: np.eye(4)}
@@ -250,9 +247,9 @@ def poses_by_matrices(network: Network, names: set[str]) -> rn.Poses:
         for joint in (joint for joint in network.joints if joint.name in names):
             a, b = joint.bodies
             if a in poses and b not in poses:
-                poses[b] = poses[a] @ joint_matrix(joint)
+                poses[b] = poses[a] @ joint_matrix(joint, joint.start)
             elif b in poses and a not in poses:
-                poses[a] = poses[b] @ np.linalg.inv(joint_matrix(joint))
+                poses[a] = poses[b] @ np.linalg.inv(joint_matrix(joint, joint.start))
     return poses
 
 
@@ -264,21 +261,20 @@ def test_poses_and_gaps_of_random_networks_are_those_of_matrices(seed: int) -> N
     closed = rn.random_network(rng, bodies=5, extra=3)
     mechanism = build_mechanism(closed)
     assert np.abs(evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).residual).max() < ROUNDING
-    starts = [random_values(joint.kind, rng) for joint in closed.joints]  # others: its loops are open
-    joints = [replace(joint, start=start) for joint, start in zip(closed.joints, starts, strict=True)]
-    network = replace(closed, joints=tuple(joints))
+    # other starts: its loops are open
+    joints = tuple(replace(joint, start=random_values(joint.kind, rng)) for joint in closed.joints)
+    network = replace(closed, joints=joints)
     mechanism = build_mechanism(network)
     tree = {network.joints[one.joint].name for one in mechanism.graph.branches}
     expected = poses_by_matrices(network, tree)
-    found = mechanism.poses(mechanism.start.tolist())
     for name, pose in expected.items():
-        assert_close(matrix(found[name]), pose, ROUNDING)
+        assert_close(rn.pose_of(mechanism, mechanism.start, name), pose, ROUNDING)
     residual = evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).residual[:, 0]
     for k, cut in enumerate(mechanism.graph.cuts):
         joint = network.joints[cut]
         a, b = joint.bodies
         second = matrix(joint.frames[1])
-        E = np.linalg.inv(expected[a] @ joint_matrix(joint) @ second) @ expected[b] @ second
+        E = np.linalg.inv(expected[a] @ joint_matrix(joint, joint.start) @ second) @ expected[b] @ second
         gap = residual[6 * k : 6 * k + 6]
         assert_close(gap[:3], E[:3, 3], ROUNDING)
         # a rotation vector near pi is good to the root of rounding
