@@ -139,15 +139,10 @@ def element_between(
     p, q = rng.uniform(-1.0, 1.0, (2, 3))
     n, other = unit(rng.normal(size=3)), unit(rng.normal(size=3))
     first, second = poses[bodies[0]], poses[bodies[1]]
-    length = distance_of(kind, p, n, q, other, first[:3, 3])
-    return ConstraintElement(
-        name,
-        kind,
-        bodies,
-        Expression(repr(length)),
-        (vec(into(first, p)), vec(into(second, q))),
-        (vec(first[:3, :3].T @ n), vec(second[:3, :3].T @ other)),
-    )
+    length = Expression(repr(distance_of(kind, p, n, q, other, first[:3, 3])))
+    points = (vec(into(first, p)), vec(into(second, q)))
+    normals = (vec(first[:3, :3].T @ n), vec(second[:3, :3].T @ other))
+    return ConstraintElement(name, kind, bodies, length, points, normals)
 
 
 def into(pose: FloatArray, point: FloatArray) -> FloatArray:
