@@ -431,6 +431,7 @@ def test_a_user_joint_alone_is_where_its_control_puts_it() -> None:
     joint = Joint("U", "user", ("b", "ground"), motion=formulas)  # the ground seen from the body
     network = Network("user", (Body("b"),), (joint,), controls=(Control("s"),))
     found = assemble(build_mechanism(network), {"s": 0.7})
+    assert found.continuum == 0
     expected = motion("global", (0.7, 0.0, 0.0))
     expected[:3, 3] = 0.7, 0.1, 0.2
     np.testing.assert_allclose(found.assemblies[0].poses[1], np.linalg.inv(expected), rtol=0.0, atol=1e-15)

@@ -179,10 +179,9 @@ def test_joints_move_as_matrix_exponentials_whose_derivatives_are_their_twists(
             return at @ motion(joint.kind, q, joint.pitch)
 
         rates = rn.difference(rn.one_by_one(pose), q, 1e-2)
-        expected = [rate @ np.linalg.inv(pose(q)) for rate in np.moveaxis(rates, -1, 0)]
-        found = [rn.generator(twist[:3], twist[3:]) for twist in twists_of(joint, q, at).T]
+        expected = [rn.twist_of(rate @ np.linalg.inv(pose(q))) for rate in np.moveaxis(rates, -1, 0)]
         # differences of step 1e-2: 1e-12 / 140 of truncation, 1e-14 of rounding
-        assert_close(np.array(found), np.array(expected), 3e-12)
+        assert_close(twists_of(joint, q, at).T, np.array(expected), 3e-12)
 
 
 def user_motion() -> tuple[Expression, ...]:
@@ -212,9 +211,7 @@ def test_a_user_joint_moves_as_its_formulas_say() -> None:
         for k in range(2):
             twist = screws @ np.array([float(one.gradient.get(k, 0.0)) for one in values])
             # truncation of step 1e-2 with seventh derivatives up to 1.5^7 = 17
-            assert_close(
-                rn.generator(twist[:3], twist[3:]), rates[:, :, k] @ np.linalg.inv(expected(x)), 1e-11
-            )
+            assert_close(twist, rn.twist_of(rates[:, :, k] @ np.linalg.inv(expected(x))), 1e-11)
 
 
 @pytest.mark.parametrize("kind", KINDS)
