@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi
 import numpy as np
 import pytest
 
+from made_masses import DRIVE, with_drives, with_masses
+from sliding_arm import sliding_arm
 from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
 from urmpipe_models.arm.denavit_hartenberg import (
     DHRow,
@@ -27,9 +30,11 @@ from urmpipe_models.drives import (
     load_acceleration,
     motor_torque,
     sample_index,
+    sampled_voltage,
     shaft_acceleration,
     shaft_torque,
 )
+from urmpipe_models.dynamics import driven_arm, equations, links
 from urmpipe_models.kinematics.forward import Motion, forward, jacobian, point_motions, tip_position
 from urmpipe_models.kinematics.identification import Twist, sensitivities
 from urmpipe_models.math3d import (
@@ -45,6 +50,11 @@ from urmpipe_models.math3d import (
 from urmpipe_models.robots.catalogue import load_robot
 
 TRACED = 1e-14  # values of about 1; CasADi may use another sine and simplify, each some 1e-16
+SAME = 1e-12  # of the largest value, of sums of many such
+
+
+def wrench_of(values: Sequence[Any]) -> links.Wrench:
+    return links.Wrench(tuple(values[:3]), tuple(values[3:]))
 
 
 @pytest.fixture(autouse=True)
@@ -53,22 +63,33 @@ def numpy_functions_of_symbols() -> None:
 
 
 def assert_traces(
-    function: Callable[..., list[Any]], samples: Iterable[Sequence[Sequence[float]]], size: float = 1.0
+    function: Callable[..., Any], samples: Iterable[Sequence[Sequence[float]]], size: float | None = 1.0
 ) -> None:
-    """Compare a function traced with symbols with the function itself, for samples of its arguments."""
+    """Compare a function traced with symbols with the function itself, for samples of its arguments.
+
+    The values are about `size`; without one, the tolerance is `SAME` of the largest of them.
+    """
     samples = [*samples]
     symbols = [casadi.SX.sym(f"x{k}", len(argument)) for k, argument in enumerate(samples[0])]
-    results = function(*(symbol.elements() for symbol in symbols))
+    results = flat(function(*(symbol.elements() for symbol in symbols)))
     traced = casadi.Function("traced", symbols, [casadi.vertcat(*results)])
     for sample in samples:
-        expected = np.array(function(*sample), dtype=float)
+        expected = np.array(flat(function(*sample)), dtype=float)
+        tolerance = size * TRACED if size else SAME * (1.0 + np.abs(expected).max())
         got = np.ravel(np.array(traced(*sample)))
-        np.testing.assert_allclose(got, expected, rtol=0.0, atol=size * TRACED)
+        np.testing.assert_allclose(got, expected, rtol=0.0, atol=tolerance)
+
+
+def states(*sizes: int) -> list[list[Any]]:
+    """Return 20 random samples of arguments of some sizes."""
+    rng = np.random.default_rng(0)
+    return [[rng.normal(size=size) for size in sizes] for _ in range(20)]
 
 
 def flat(results: Any) -> list[Any]:
-    """Return nested tuples of elements as one list."""
-    return [leaf for part in results for leaf in flat(part)] if isinstance(results, tuple) else [results]
+    """Return nested tuples and lists of elements as one list."""
+    nested = isinstance(results, (tuple, list))
+    return [leaf for part in results for leaf in flat(part)] if nested else [results]
 
 
 def entries(motion: Motion) -> list[Any]:
@@ -210,3 +231,64 @@ def test_drive_and_controller_trace_with_all_their_parameters(function: Callable
 def test_set_points_trace_before_within_and_after_a_move(kind: float) -> None:
     samples = [[[kind, time, 0.5, 3.0, 1.5, 1.0, 4.0]] for time in np.linspace(0.0, 3.0, 31).tolist()]
     assert_traces(lambda x: [*evaluate_setpoint(*x)], samples, size=4.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arm", [load_robot("urm6"), load_robot("ur5e"), sliding_arm()])
+def test_equations_of_motion_trace(arm: Chain) -> None:
+    chain, n = with_masses(arm), len(arm.coordinates)
+    for function in (equations.inverse_dynamics, equations.torque_terms, equations.forward_dynamics):
+        assert_traces(
+            lambda q, v, a, w, f=function: f(chain, q, v, a, wrench_of(w)), states(n, n, n, 6), None
+        )
+    for of_q in (equations.mass_matrix, equations.mass_matrix_scales, links.centres_of_mass):
+        assert_traces(lambda q, f=of_q: f(chain, q), states(n), None)
+    assert_traces(
+        lambda q, v: [links.kinetic_energy(chain, q, v), links.potential_energy(chain, q)], states(n, n), None
+    )
+    assert_traces(lambda q, v, w: links.wrench_power(chain, q, v, wrench_of(w)), states(n, n, 6), None)
+    motions = links.mass_motions
+    assert_traces(
+        lambda q, v: [(m.centre, m.velocity, m.omega) for m in motions(chain, q, v)], states(n, n), None
+    )
+
+
+def test_masses_centres_inertias_and_gravity_trace_as_parameters() -> None:
+    chain = with_masses(load_robot("urm6"))
+    count = len(chain.inertials)
+
+    def of_bodies(q: Any, spread: Any, centres: Any, gravity: Any) -> list[Any]:
+        """Return values of bodies of any masses above 1 kg, whose inertias are those of boxes."""
+        masses = [1.0 + spread[k] * spread[k] for k in range(count)]
+        changed = [
+            replace(body, mass=m, centre=tuple(centres[3 * k : 3 * k + 3]), inertia=(m, m, m, 0.1, 0.1, 0.1))
+            for k, (body, m) in enumerate(zip(chain.inertials, masses, strict=True))
+        ]
+        arm = replace(chain, inertials=tuple(changed), gravity=tuple(gravity))
+        values = [equations.inverse_dynamics(arm, q, q, q), equations.mass_matrix(arm, q)]
+        return [*values, links.kinetic_energy(arm, q, q)]
+
+    assert_traces(of_bodies, states(6, count, 3 * count, 3), None)
+
+
+def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
+    chain = with_drives(with_masses(load_robot("urm6")))
+
+    def of_drives(q: Any, qd: Any, motors: Any, x: Any) -> list[Any]:
+        constants = [1.5 + value * value for value in x]
+        drive = Drive(*(c * constant for c, constant in zip(constants, DRIVE, strict=True)))
+        actuators = [driven_arm.Motor(drive, *motors[4 * k : 4 * k + 4]) for k in range(5)]
+        spring = driven_arm.Spring(constants[0] * 100.0, constants[1], 0.3)
+        state, wrench = driven_arm.ArmState(q, qd, [*actuators, spring]), links.Wrench((1.0, 2.0, 3.0))
+        rates = [list(values) for values in driven_arm.motor_derivatives(state).values()]
+        flows = [*driven_arm.power_flow(chain, state, wrench), driven_arm.arm_energy(chain, state)]
+        return [driven_arm.joint_accelerations(chain, state, wrench), rates, flows]
+
+    assert_traces(of_drives, states(6, 6, 20, 7), None)
+
+
+def test_a_sampled_voltage_traces() -> None:
+    samples = (-200.0, 0.0, 200.0)
+    assert_traces(
+        lambda x: [sampled_voltage(x[0], 5e-3, sample, x[1], x[2]) for sample in samples], states(3), None
+    )
