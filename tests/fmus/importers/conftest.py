@@ -1,4 +1,4 @@
-"""What the tests of this folder share: every shipped unit as an FMU."""
+"""Units for two systems, built once a session."""
 
 from __future__ import annotations
 
@@ -9,28 +9,12 @@ import pytest
 
 from peers import need_builds_for
 from systems import shipped_unit
-from urmpipe_fmus.build.description import Backend
-from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
-from urmpipe_fmus.native import this_platform
-
-Fmu = Callable[..., Path]
-
-
-@pytest.fixture(scope="session")
-def fmu_of() -> Fmu:
-    """Return a function that gives a shipped unit's FMU by name and backend, built once a session."""
-
-    def build(name: str, backend: Backend = "native") -> Path:
-        if backend == "native":
-            need_builds_for(this_platform())
-        return cached_fmu(shipped_unit(name), backend)
-
-    return build
+from urmpipe_fmus.build.fmu import build_fmu
 
 
 @pytest.fixture(scope="session")
 def cross_built(session_folder: Path) -> Callable[[str], Path]:
-    """Return a function that gives a unit for linux64 and win64 by name, built by zig once a session."""
+    """Return a function that gives a unit for linux64 and win64 by name, built by zig."""
     platforms = ["linux64", "win64"]
     need_builds_for(*platforms)
 

@@ -14,13 +14,11 @@ import pytest
 
 from loaded_fmu import Loaded
 from masters import run_fmpy
-from peers import fmutool, need_builds_for, python
+from peers import fmu_of, fmutool, python
 from systems import CROSS_BUILT, STEP, alone, columns, drawn_inputs, sample_times, shipped_unit
 from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.description import Backend
-from urmpipe_fmus.build.fmu import build_fmu
-from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.run import run
 
 # Both backends describe a unit by the same template, and package Python alike for every unit.
@@ -32,7 +30,7 @@ CHECKED: list[tuple[str, Backend]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", block_names())
-def test_fmpy_validate_finds_nothing(name: str, fmu_of: Callable[..., Path]) -> None:
+def test_fmpy_validate_finds_nothing(name: str) -> None:
     from fmpy.validation import validate_fmu
 
     assert validate_fmu(str(fmu_of(name))) == []  # of Python FMUs: packaging/test_build.py
@@ -40,9 +38,7 @@ def test_fmpy_validate_finds_nothing(name: str, fmu_of: Callable[..., Path]) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "backend"), CHECKED)
-def test_the_fmu_manipulation_toolbox_finds_nothing(
-    name: str, backend: Backend, fmu_of: Callable[..., Path]
-) -> None:
+def test_the_fmu_manipulation_toolbox_finds_nothing(name: str, backend: Backend) -> None:
     output = fmutool("-input", str(fmu_of(name, backend)), "-check").stdout
     assert "This FMU seems to be compliant with FMI-2.0." in output
     assert "No semantic error against the FMI-2 standard." in output
@@ -56,9 +52,7 @@ UNPACKED = [(folder, "native") for folder in FOLDERS] + [(folder, "python") for 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("folder", "backend"), UNPACKED)
-def test_a_log_is_found_in_any_folder(
-    folder: str, backend: str, fmu_of: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_log_is_found_in_any_folder(folder: str, backend: Backend, tmp_path: Path) -> None:
     place = tmp_path / folder
     place.mkdir()
     fmu = Loaded(fmu_of("log_source", backend), folder=place)
@@ -78,7 +72,7 @@ def test_a_log_is_found_in_any_folder(
     ("compiler", "name"), [("fmutool", "repolarizer"), ("fmutool", "dc_drive"), ("fmpy", "log_source")]
 )
 def test_an_fmu_compiled_again_from_its_own_sources_gives_the_same_numbers(
-    compiler: str, name: str, fmu_of: Callable[..., Path], tmp_path: Path
+    compiler: str, name: str, tmp_path: Path
 ) -> None:
     original, unit = fmu_of(name), shipped_unit(name)
     again = tmp_path / f"{name}.fmu"
@@ -140,7 +134,7 @@ print(resident() - before)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["repolarizer", "log_source", "dc_drive"])  # memories, a table, states
-def test_thousands_of_instances_leave_resident_memory_flat(name: str, fmu_of: Callable[..., Path]) -> None:
+def test_thousands_of_instances_leave_resident_memory_flat(name: str) -> None:
     output = python("-c", CYCLES, str(fmu_of(name))).stdout
     assert output.strip().lstrip("-").isdecimal(), output
     # 13 bytes a cycle: any instance or saved state is larger. What the heap had free before can hide a block
@@ -173,7 +167,7 @@ def checked_binary(fmu: Path, folder: Path) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", block_names())
 def test_a_binary_needs_only_the_c_library_and_shows_only_the_functions_of_fmi(
-    name: str, fmu_of: Callable[..., Path], tmp_path: Path
+    name: str, tmp_path: Path
 ) -> None:
     checked_binary(fmu_of(name), tmp_path)
 
@@ -232,14 +226,11 @@ unit = BlockModel(
 def test_two_fmus_with_equal_inner_names_compute_their_own_in_one_process(
     backend: Backend, tmp_path: Path
 ) -> None:
-    if backend == "native":
-        need_builds_for(this_platform())
     paths = []
     for folder, factor in (("one", 2.0), ("two", -7.0)):
         (tmp_path / folder).mkdir()
         source = tmp_path / folder / "same.py"
         source.write_text(USER_UNIT.format(factor=factor), encoding="utf-8")
-        built = build_fmu(load_block_file(source), source.with_suffix(".fmu"), backend=backend)
-        paths.append(str(built.path))
+        paths.append(str(fmu_of(load_block_file(source), backend)))
     output = python("-c", SIDE_BY_SIDE, *paths).stdout
     assert output.strip() == "[[6.0, 6.0], [-35.0, -35.0]]", output

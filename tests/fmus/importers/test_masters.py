@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from masters import MASTERS
-from peers import need, need_builds_for
+from peers import fmu_of, need
 from systems import (
     STEP,
     Block,
@@ -26,9 +25,7 @@ from systems import (
 )
 from urmpipe_fmus.block import BlockModel, Table
 from urmpipe_fmus.blocks import block_names, make_block
-from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
@@ -51,9 +48,7 @@ def inputs_and_run(name: str) -> tuple[BlockModel, int, dict[str, FloatArray], d
 @pytest.mark.slow
 @pytest.mark.parametrize("name", block_names())
 @pytest.mark.parametrize("master", MASTERS)
-def test_a_native_unit_gives_the_numbers_of_its_run_over_a_log(
-    master: str, name: str, fmu_of: Callable[..., Path]
-) -> None:
+def test_a_native_unit_gives_the_numbers_of_its_run_over_a_log(master: str, name: str) -> None:
     need(master)
     unit, steps, inputs, expected = inputs_and_run(name)
     trace = MASTERS[master](alone(fmu_of(name), unit, inputs), STEP, steps)["it"]
@@ -83,15 +78,13 @@ def wrapped_joints() -> tuple[Table, FloatArray]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("master", READS_FRESH)
-def test_log_repolarizer_and_chain_give_the_tool_of_the_log(master: str, fmu_of: Callable[..., Path]) -> None:
+def test_log_repolarizer_and_chain_give_the_tool_of_the_log(master: str) -> None:
     need(master)
     table, q = wrapped_joints()
     source = make_block("log_source", table=table, columns=[("q", "rad", 6)])
-    need_builds_for(this_platform())
-    played = cached_fmu(source, "native")
-    names = ("repolarizer", "kinematic_chain")
-    blocks = {"log": Block(played, source)}
-    blocks |= {name: Block(fmu_of(name), shipped_unit(name)) for name in names}
+    blocks = {"log": Block(fmu_of(source), source)}
+    for name in ("repolarizer", "kinematic_chain"):
+        blocks[name] = Block(fmu_of(name), shipped_unit(name))
     connections = elements(("log", "q"), ("repolarizer", "raw"))
     connections += elements(("repolarizer", "q"), ("kinematic_chain", "phi"))
     trace = MASTERS[master](System(blocks, connections), STEP, SYSTEM_STEPS)
@@ -106,9 +99,7 @@ def test_log_repolarizer_and_chain_give_the_tool_of_the_log(master: str, fmu_of:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("master", READS_FRESH)
-def test_a_drive_and_its_load_give_what_their_instances_in_python_give(
-    master: str, fmu_of: Callable[..., Path]
-) -> None:
+def test_a_drive_and_its_load_give_what_their_instances_in_python_give(master: str) -> None:
     need(master)
     volts = 24.0 * np.sign(np.sin(np.arange(SYSTEM_STEPS) * 0.1) + 0.1)
     blocks = {
