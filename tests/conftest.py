@@ -48,14 +48,6 @@ def session_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.Temp
     return folder
 
 
-@pytest.fixture(scope="session", autouse=True)
-def fmu_cache(session_folder: Path) -> Iterator[None]:
-    """Let the processes of this session and those they start keep built FMUs in one folder."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("URMPIPE_CACHE", str(session_folder / "cache"))
-        yield
-
-
 @pytest.fixture(scope="session")
 def wine(session_folder: Path) -> dict[str, str]:
     """The environment of a wine of the session's own: nothing of the user's is in it, and no window opens."""
@@ -74,7 +66,11 @@ def shared() -> Path:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep what results warn of out of pytest's summary: the tests of warnings ask for them."""
+    """Keep built FMUs in a cache of the session; leave warnings of results out of pytest's summary."""
+    if not hasattr(config, "workerinput"):  # processes of pytest-xdist and those that tests start inherit it
+        cache = tempfile.TemporaryDirectory(prefix="urmpipe-cache-")
+        config.add_cleanup(cache.cleanup)
+        os.environ["URMPIPE_CACHE"] = cache.name
     config.addinivalue_line("filterwarnings", "ignore::urmpipe.UrmpipeWarning")
     if config.getoption("--accept") and getattr(config.option, "numprocesses", None):
         raise pytest.UsageError("--accept: found -n, allowed: one process, which writes the files of cases")

@@ -13,7 +13,7 @@ ELSEWHERE = {
     "urmpipe view ": "needs a display: tests/cli/test_view.py",
     "--block ": "needs a simulation, which is slow: tests/cli/test_compare_simulation.py",
     "--limit ": "looks for the running speed, which is slow: tests/cli/test_accuracy.py",
-    "--platforms": "takes minutes for its first build: tests/fmus/native/test_cross.py",
+    "--platforms": "takes minutes for its first build: tests/fmus/native/test_compile.py",
 }
 """What is run by tests of its own: a part of the line, and why."""
 
