@@ -80,7 +80,7 @@ class CaseFile:
     def names(self) -> dict[str, Any]:
         """Run the Python code of the file, and return what it defines."""
         names: dict[str, Any] = {"__name__": self.path.stem}
-        exec(compile(self.code, self.path.name, "exec"), names)
+        exec(compile(self.code, self.path.name, "exec", dont_inherit=True), names)
         return names
 
     def text(self) -> str:
