@@ -16,7 +16,8 @@ from differences import assert_jacobian, assert_slope
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import RAMP, STEP, TRAPEZOID, evaluate_setpoint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik import loop_equations, trigonometric
+from urmpipe_models.ik import trigonometric
+from urmpipe_models.ik.loop_equations import jacobian_determinant
 from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.ik.task import Task, build_task
 from urmpipe_models.kinematics.forward import Screws, jacobian_over_log, screws_to_chain
@@ -25,13 +26,16 @@ from urmpipe_models.robots.catalogue import load_robot, robot_names
 # --- what an iterative inverse misses its targets by ---------------------------------------------------
 
 
-def columns(chain: Chain, count: int, seed: int) -> FloatArray:
-    """Return random joint values, shape (joints, count)."""
-    return np.random.default_rng(seed).uniform(-2.0, 2.0, (len(chain.coordinates), count))
+def task_of(chain: Chain, count: int, *, pose: bool = True) -> tuple[Task, FloatArray]:
+    """Return random targets of a chain, and other joint values, shape (joints, count)."""
+    rng = np.random.default_rng(1)
+    goals, q = rng.uniform(-2.0, 2.0, (2, len(chain.coordinates), count))
+    targets = forward_targets(chain, goals.T)
+    return build_task(chain, targets if pose else Targets(targets.position)), q
 
 
 def assert_gradients(task: Task, q: FloatArray) -> None:
-    """Hold grad(|e|^2 / 2) = -J^T e of every joint, at any miss."""
+    """Compare grad(|e|^2 / 2) = -J^T e of every joint, at any miss."""
     error = task.error(q)
     slope = -np.einsum("ijn,in->jn", error.jacobian, error.vector)
     # m2: entries of e of up to 10 m, three derivatives of their products; 1 / sin(angle) near half a turn
@@ -43,18 +47,13 @@ def assert_gradients(task: Task, q: FloatArray) -> None:
 def test_the_gradient_of_the_squared_miss_is_minus_j_transposed_e_at_any_target(
     robot: str, pose: bool
 ) -> None:
-    chain = load_robot(robot)
-    targets = forward_targets(chain, columns(chain, 20, 1).T)
-    assert_gradients(build_task(chain, targets if pose else Targets(targets.position)), columns(chain, 20, 2))
+    assert_gradients(*task_of(load_robot(robot), 20, pose=pose))
 
 
 @settings(max_examples=20, deadline=None)
 @given(data=st.data(), pose=st.booleans())
 def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObject, pose: bool) -> None:
-    chain = data.draw(chains)
-    targets = forward_targets(chain, columns(chain, 3, 1).T)
-    task = build_task(chain, targets if pose else Targets(targets.position))
-    q = columns(chain, 3, 2)
+    task, q = task_of(data.draw(chains), 3, pose=pose)
     error = task.error(q)
     if np.sqrt(error.angle2).max() < 3.0 * error.length:  # at half a turn the axis leaps
         assert_gradients(task, q)
@@ -63,8 +62,7 @@ def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObjec
 @pytest.mark.parametrize("robot", ["urm6", "ur5e", "panda", "iiwa14"])
 def test_the_miss_changes_by_the_jacobian_and_its_turn_by_that_of_the_logarithm(robot: str) -> None:
     """-de = A J dq with A of `log_jacobian` for the turn, and A = 1 for the position."""
-    chain = load_robot(robot)
-    task, q = build_task(chain, forward_targets(chain, columns(chain, 40, 1).T)), columns(chain, 40, 2)
+    task, q = task_of(load_robot(robot), 40)
     error = task.error(q)
     regular = np.sqrt(error.angle2) < 3.0 * error.length
     rows = np.flatnonzero(regular)
@@ -106,42 +104,16 @@ def test_slope_and_curvature_of_a_quadric_are_its_derivatives(of: Quadric, deriv
     assert_slope(lambda h: of(k, x + h), derivative(k, x), third=40.0, size=6.0)
 
 
-def random_screws(kinds: tuple[bool, ...], seed: int) -> tuple[Screws, FloatArray, FloatArray, FloatArray]:
-    """Return three joints of some kinds, a wrist, joint values and targets of it, shape (3, 50) each."""
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("kinds", list(product((True, False), repeat=3)), ids=str)
+def test_the_determinant_of_three_joints_is_that_of_the_wrist_s_jacobian(kinds: tuple[bool, ...]) -> None:
+    rng = np.random.default_rng(5)
     direction = rng.normal(size=(3, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     wrist, q = rng.uniform(-1.0, 1.0, 3), rng.uniform(-2.0, 2.0, (3, 50))
     arm = Screws(direction, rng.uniform(-1.0, 1.0, (3, 3)), np.array(kinds), np.eye(3), wrist)
-    return arm, wrist, q, rng.uniform(-2.0, 2.0, (3, 50))
-
-
-KINDS = list(product((True, False), repeat=3))
-
-
-@pytest.mark.parametrize("kinds", KINDS, ids=str)
-def test_the_columns_that_newton_s_rule_polishes_with_are_the_miss_s_derivatives(
-    kinds: tuple[bool, ...],
-) -> None:
-    arm, wrist, q, target = random_screws(kinds, 4)
-    _, found = loop_equations._error_and_columns(arm, wrist, q, target)
-    assert_jacobian(
-        lambda at: loop_equations._error_and_columns(arm, wrist, at, target)[0],
-        -found,
-        q,
-        third=10.0,
-        size=10.0,
-    )
-
-
-@pytest.mark.parametrize("kinds", KINDS, ids=str)
-def test_their_determinant_is_that_of_the_wrist_s_jacobian(kinds: tuple[bool, ...]) -> None:
-    arm, wrist, q, _ = random_screws(kinds, 5)
     J = jacobian_over_log(screws_to_chain(arm, ("a", "b", "c")), q.T)[:, :3]
     # products of three levers of up to 10 m
-    np.testing.assert_allclose(
-        loop_equations.jacobian_determinant(arm, wrist, q), np.linalg.det(J), atol=1e-11
-    )
+    np.testing.assert_allclose(jacobian_determinant(arm, wrist, q), np.linalg.det(J), rtol=0.0, atol=1e-11)
 
 
 # --- set points ----------------------------------------------------------------------------------------

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import casadi
 import numpy as np
 import pytest
 
+from differences import assert_jacobian
 from made_masses import DRIVE, with_drives, with_masses
 from sliding_arm import sliding_arm
 from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
@@ -63,7 +65,7 @@ def numpy_functions_of_symbols() -> None:
 
 
 def assert_traces(
-    function: Callable[..., Any], samples: Iterable[Sequence[Sequence[float]]], size: float | None = 1.0
+    function: Callable[..., Any], samples: Iterable[Sequence[Any]], size: float | None = 1.0
 ) -> None:
     """Compare a function traced with symbols with the function itself, for samples of its arguments.
 
@@ -80,10 +82,10 @@ def assert_traces(
         np.testing.assert_allclose(got, expected, rtol=0.0, atol=tolerance)
 
 
-def states(*sizes: int) -> list[list[Any]]:
-    """Return 20 random samples of arguments of some sizes."""
+def assert_sums_trace(function: Callable[..., Any], *sizes: int) -> None:
+    """Compare at 20 random samples of arguments of some sizes, to `SAME` of the largest value."""
     rng = np.random.default_rng(0)
-    return [[rng.normal(size=size) for size in sizes] for _ in range(20)]
+    assert_traces(function, [[rng.normal(size=size) for size in sizes] for _ in range(20)], None)
 
 
 def flat(results: Any) -> list[Any]:
@@ -93,10 +95,8 @@ def flat(results: Any) -> list[Any]:
 
 
 def entries(motion: Motion) -> list[Any]:
-    pose = motion.pose
-    return flat(
-        (pose.translation, pose.rotation, motion.velocity, motion.acceleration, motion.omega, motion.alpha)
-    )
+    pose, rates = motion.pose, (motion.velocity, motion.acceleration, motion.omega, motion.alpha)
+    return [pose.translation, pose.rotation, rates]
 
 
 @pytest.mark.parametrize("name", ["urm6", "ur5e"])
@@ -104,25 +104,20 @@ def test_kinematics_trace_with_symbolic_joints(name: str) -> None:
     chain = load_robot(name)
     motions = np.random.default_rng(11).uniform(-1.0, 1.0, (20, 3, 6)).tolist()
     joints = [motion[:1] for motion in motions]
-    twists = [
-        Twist(place, kind, (0.0, 0.6, 0.8), from_rpy(0.1, -0.7, 0.4))
-        for place in range(9)
-        for kind in ("along", "about")
-    ]
-    assert_traces(lambda q: flat(forward(chain, q)[-1].translation), joints)
-    assert_traces(lambda q: flat(tip_position(chain, q)), joints)
-    assert_traces(lambda q: flat(jacobian(chain, q)), joints)
-    assert_traces(lambda q: flat(tuple(sensitivities(chain, q, twists))), joints)
+    axis, frame = (0.0, 0.6, 0.8), from_rpy(0.1, -0.7, 0.4)
+    twists = [Twist(place, kind, axis, frame) for place in range(9) for kind in ("along", "about")]
+    assert_traces(lambda q: (forward(chain, q)[-1].translation, tip_position(chain, q)), joints)
+    assert_traces(lambda q: (jacobian(chain, q), *sensitivities(chain, q, twists)), joints)
     # 1 / cos(ry), 1 / sin(x), and speeds of up to 6
-    assert_traces(lambda q: flat(euler_zyx(forward(chain, q)[-1].rotation)), joints, size=20.0)
-    assert_traces(lambda q: flat(euler_zxz(forward(chain, q)[-1].rotation)), joints, size=20.0)
+    for euler_angles in (euler_zyx, euler_zxz):
+        assert_traces(lambda q, of=euler_angles: of(forward(chain, q)[-1].rotation), joints, size=20.0)
     assert_traces(lambda *q: entries(point_motions(chain, *q)[-1]), motions, size=20.0)
 
 
 def test_euler_angles_trace_where_they_are_singular() -> None:
     samples = [[(0.4, 0.0, 0.5)], [(0.4, np.pi, 0.5)], [(-2.0, 0.0, -0.1)], [(0.4, 1.0, 0.5)]]
-    assert_traces(lambda x: flat(euler_zxz(from_zxz(*x).rotation)), samples)
-    assert_traces(lambda x: flat(euler_zxz(rotation_z(x[0]).rotation)), [[[0.3]]])
+    assert_traces(lambda x: euler_zxz(from_zxz(*x).rotation), samples)
+    assert_traces(lambda x: euler_zxz(rotation_z(x[0]).rotation), [[[0.3]]])
     assert euler_zxz(rotation_z(0.3).rotation) == pytest.approx((0.3, 0.0, 0.0, True), rel=TRACED)
 
 
@@ -134,11 +129,8 @@ def test_lengths_and_tilts_trace_as_parameters() -> None:
     def arm(lengths: Sequence[Any], tilts: Sequence[Any]) -> Chain:
         return urm_chain("urm6", lengths, tilts)
 
-    assert_traces(lambda q, *given: flat(forward(arm(*given), q)[-1].translation), samples)
-    assert_traces(lambda q, *given: flat(jacobian(arm(*given), q)), samples)
-    assert_traces(
-        lambda q, *given: entries(point_motions(arm(*given), q, [0.0] * 6, q)[-1]), samples, size=20.0
-    )
+    assert_traces(lambda q, *x: (forward(arm(*x), q)[-1].translation, jacobian(arm(*x), q)), samples)
+    assert_traces(lambda q, *x: entries(point_motions(arm(*x), q, [0.0] * 6, q)[-1]), samples, size=20.0)
 
 
 def test_one_trace_serves_a_float_and_a_column() -> None:
@@ -172,34 +164,31 @@ def arms_of(x: Sequence[Any]) -> list[Chain]:
 def test_arms_of_every_kind_trace_with_all_their_parameters(number: int) -> None:
     joints = len(arms_of([0.1] * 12)[number].coordinates)
     rng = np.random.default_rng(15)
-    samples = [
-        [rng.uniform(0.1, 1.0, 12).tolist(), rng.uniform(-1.0, 1.0, joints).tolist()] for _ in range(10)
-    ]
+    samples = [[rng.uniform(0.1, 1.0, 12), rng.uniform(-1.0, 1.0, joints)] for _ in range(10)]
 
     def function(parameters: Sequence[Any], q: Sequence[Any]) -> list[Any]:
         arm = arms_of(parameters)[number]
-        return [*entries(point_motions(arm, q, q, q)[-1]), *flat(jacobian(arm, q))]
+        return [*entries(point_motions(arm, q, q, q)[-1]), jacobian(arm, q)]
 
     assert_traces(function, samples, size=100.0)
 
 
 @pytest.mark.parametrize("name", ["urm4", "ur5e", "panda", "articulated6r"])
 def test_a_pose_has_derivatives_by_every_parameter(name: str) -> None:
-    arm, step = load_robot(name).placed(from_offset([1.0, 2.0, 3.0]), rotation_x(0.5)), 1e-6
-    names, start = zip(*((parameter.name, parameter.value) for parameter in arm.parameters), strict=True)
+    arm = load_robot(name).placed(from_offset([1.0, 2.0, 3.0]), rotation_x(0.5))
     q = [0.3 * k - 0.7 for k in range(len(arm.coordinates))]
+    start = np.array([[parameter.value] for parameter in arm.parameters])
 
-    def entries(values: Sequence[Any]) -> list[Any]:
+    def entries(values: Iterable[Any]) -> list[Any]:
+        names = (parameter.name for parameter in arm.parameters)
         pose = forward(arm.with_parameters(dict(zip(names, values, strict=True))), q)[-1]
-        return [*pose.translation, *flat(pose.rotation)]
+        return flat([pose.translation, pose.rotation])
 
-    x = casadi.SX.sym("x", len(names))
+    x = casadi.SX.sym("x", len(start))
     pose = casadi.vertcat(*entries(x.elements()))
     slopes = np.array(casadi.Function("slopes", [x], [casadi.jacobian(pose, x)])(start))
-    for k, slope in enumerate(slopes.T):
-        ahead, behind = (entries([*start[:k], start[k] + h, *start[k + 1 :]]) for h in (step, -step))
-        expected = np.subtract(ahead, behind) / (2.0 * step)
-        np.testing.assert_allclose(slope, expected, rtol=0.0, atol=1e-8)  # 5 m round to 1e-15, over 2e-6
+    # up to 5 m; three derivatives by an angle
+    assert_jacobian(lambda at: entries(at[:, 0].tolist()), slopes.T, start, third=5.0, size=5.0)
 
 
 def drive_values(x: Sequence[Any]) -> list[Any]:
@@ -237,20 +226,15 @@ def test_set_points_trace_before_within_and_after_a_move(kind: float) -> None:
 @pytest.mark.parametrize("arm", [load_robot("urm6"), load_robot("ur5e"), sliding_arm()])
 def test_equations_of_motion_trace(arm: Chain) -> None:
     chain, n = with_masses(arm), len(arm.coordinates)
-    for function in (equations.inverse_dynamics, equations.torque_terms, equations.forward_dynamics):
-        assert_traces(
-            lambda q, v, a, w, f=function: f(chain, q, v, a, wrench_of(w)), states(n, n, n, 6), None
-        )
+    motions = partial(links.mass_motions, chain)
+    for of_wrench in (equations.inverse_dynamics, equations.torque_terms, equations.forward_dynamics):
+        assert_sums_trace(lambda q, v, a, w, f=of_wrench: f(chain, q, v, a, wrench_of(w)), n, n, n, 6)
     for of_q in (equations.mass_matrix, equations.mass_matrix_scales, links.centres_of_mass):
-        assert_traces(lambda q, f=of_q: f(chain, q), states(n), None)
-    assert_traces(
-        lambda q, v: [links.kinetic_energy(chain, q, v), links.potential_energy(chain, q)], states(n, n), None
-    )
-    assert_traces(lambda q, v, w: links.wrench_power(chain, q, v, wrench_of(w)), states(n, n, 6), None)
-    motions = links.mass_motions
-    assert_traces(
-        lambda q, v: [(m.centre, m.velocity, m.omega) for m in motions(chain, q, v)], states(n, n), None
-    )
+        assert_sums_trace(partial(of_q, chain), n)
+    assert_sums_trace(partial(links.potential_energy, chain), n)
+    assert_sums_trace(partial(links.kinetic_energy, chain), n, n)
+    assert_sums_trace(lambda q, v, w: links.wrench_power(chain, q, v, wrench_of(w)), n, n, 6)
+    assert_sums_trace(lambda q, v: [(m.centre, m.velocity, m.omega) for m in motions(q, v)], n, n)
 
 
 def test_masses_centres_inertias_and_gravity_trace_as_parameters() -> None:
@@ -268,7 +252,7 @@ def test_masses_centres_inertias_and_gravity_trace_as_parameters() -> None:
         values = [equations.inverse_dynamics(arm, q, q, q), equations.mass_matrix(arm, q)]
         return [*values, links.kinetic_energy(arm, q, q)]
 
-    assert_traces(of_bodies, states(6, count, 3 * count, 3), None)
+    assert_sums_trace(of_bodies, 6, count, 3 * count, 3)
 
 
 def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
@@ -284,11 +268,9 @@ def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
         flows = [*driven_arm.power_flow(chain, state, wrench), driven_arm.arm_energy(chain, state)]
         return [driven_arm.joint_accelerations(chain, state, wrench), rates, flows]
 
-    assert_traces(of_drives, states(6, 6, 20, 7), None)
+    assert_sums_trace(of_drives, 6, 6, 20, 7)
 
 
 def test_a_sampled_voltage_traces() -> None:
     samples = (-200.0, 0.0, 200.0)
-    assert_traces(
-        lambda x: [sampled_voltage(x[0], 5e-3, sample, x[1], x[2]) for sample in samples], states(3), None
-    )
+    assert_sums_trace(lambda x: [sampled_voltage(x[0], 5e-3, sample, x[1], x[2]) for sample in samples], 3)
