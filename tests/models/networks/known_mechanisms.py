@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -75,14 +75,29 @@ def four_bar(
     return ring("rrrr", np.tile(Z, (4, 1)), points, drive)
 
 
-def four_bar_tables(links: tuple[float, float, float, float], at: dict[str, float]) -> dict[str, Any]:
+def tables_of(name: str) -> dict[str, Any]:
+    """Return the tables of a shipped file."""
+    return tomllib.loads((NETWORKS / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def four_bar_tables(links: Sequence[float], at: dict[str, float]) -> dict[str, Any]:
     """Return the shipped four-bar with other links a, b, c, d [m], its crank and joints at angles [rad]."""
     a, b, c, d = links
-    tables = tomllib.loads((NETWORKS / "four-bar.toml").read_text(encoding="utf-8"))
+    tables = tables_of("four-bar")
     tables["controls"]["crank"]["start"] = at["crank"]
     for name, first, second in (("A", a, 0.0), ("B", b, c), ("theta4", d, 0.0)):
         tables["joints"][name] |= {"a": [[first, 0.0, 0.0], [second, 0.0, 0.0]], "start": at[name]}
     return tables
+
+
+def four_bar_angles(links: Sequence[float], crank: Any, sign: int = 1) -> dict[str, Any]:
+    """Return its angles [rad] by the diagonal from O4, and the triangle of that, coupler and rocker."""
+    a, b, c, d = links
+    x, y = a * np.cos(crank) - d, a * np.sin(crank)
+    square = x * x + y * y
+    theta4 = np.arctan2(y, x) - sign * np.arccos((c * c + square - b * b) / (2 * c * np.sqrt(square)))
+    coupler = np.arctan2(c * np.sin(theta4) - y, c * np.cos(theta4) - x)
+    return {"crank": crank, "A": coupler - crank, "B": theta4 - coupler, "theta4": theta4}
 
 
 def bennett(drive: str | None = None, alpha: float = 0.6, beta: float = 1.1, t: float = 0.8) -> Network:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from asserting import there
+from known_mechanisms import tables_of
 from random_networks import matrix
-from test_shipped import tables_of
 from urmpipe import load_network, network_drive
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.forces import Wrench
@@ -67,6 +67,7 @@ def test_drives_and_loads_do_no_work_together(name: str) -> None:
     assert np.abs(np.sum(powers, axis=0) / size).max() < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rccc", "rssr"])
 def test_every_body_is_in_equilibrium(name: str) -> None:
     """Reactions are on second bodies, at the frames of joints, and opposite on first ones."""

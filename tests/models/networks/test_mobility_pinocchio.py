@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import random_networks as rn
-from known_mechanisms import bennett, coupled_loops, four_bar, nine_revolutes, ring, sarrus
+from known_mechanisms import bennett, coupled_loops, four_bar, nine_revolutes, sarrus
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
@@ -136,12 +136,3 @@ def test_random_loops_move_as_in_pinocchio(seed: int) -> None:
     kinds: list[JointKind] = ["revolute", "prismatic", "cylindrical"]
     network = rn.random_network(rng, bodies=5, extra=1 + seed % 3, elements=0, kinds=kinds)
     assert_as_pinocchio(network)
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_slides_and_hinges_in_a_ring_move_as_in_pinocchio(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    kinds = "".join(rng.choice(list("rpc"), 7))
-    axes = np.array([rn.unit(one) for one in rng.normal(size=(7, 3))])
-    network = rn.reframed(ring(kinds, axes, rng.uniform(-1.0, 1.0, (7, 3))), rng)
-    assert assert_as_pinocchio(network) >= 1

@@ -100,6 +100,7 @@ def test_the_jacobian_is_that_of_finite_differences_where_the_network_is_closed(
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
 def test_steps_converge_quadratically_and_columns_give_what_floats_give(network: Any) -> None:
     mechanism, rng = build_mechanism(network), np.random.default_rng(3)

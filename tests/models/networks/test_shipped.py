@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from known_mechanisms import tables_of
 from random_networks import distance_of
-from urmpipe_datasets import NETWORKS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import Assembly, AssemblyResult, assemble
 from urmpipe_models.networks.file import load_network
@@ -167,7 +166,7 @@ def test_a_turn_of_the_screw_lifts_by_the_pitch() -> None:
 
 def test_the_platform_of_sarrus_rises_upright() -> None:
     mechanism = build_mechanism(load_network("sarrus"))
-    for tilt in np.linspace(0.5, 1.4, 10):
+    for tilt in np.linspace(0.5, 1.4, 4):
         pose = pose_of(mechanism, assemble(mechanism, {"tilt": tilt}).assemblies[0], "platform")
         height = 0.3 * np.sin(tilt) + np.sqrt(0.35**2 - (-0.08 - 0.3 * np.cos(tilt)) ** 2)
         np.testing.assert_allclose(pose[:3, :3], np.eye(3), rtol=0, atol=ANSWER)
@@ -243,21 +242,6 @@ def test_the_wheels_of_the_steering_are_where_its_rods_reach(turn: float) -> Non
         answers.append([q - own for q in roots(2 * arm * x, 2 * arm * y, d2 - arm**2 - x**2 - y**2)])
     expected: list[Answer] = [{"left": (a,), "right": (b,)} for a in answers[0] for b in answers[1]]
     assert_same_answers(mechanism, assembled, expected, ANSWER)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_the_legs_of_a_pose_bring_the_driven_platform_there(seed: int) -> None:
-    """The inverse in closed form: leg = |p + R b - a|."""
-    rng, tables = np.random.default_rng(seed), tables_of("stewart-gough-driven")
-    p = np.array(tables["bodies"]["platform"]["start"][:3]) + rng.uniform(-0.05, 0.05, 3)
-    R = Rotation.from_rotvec(rng.uniform(-0.15, 0.15, 3)).as_matrix()
-    points = np.array([one["a"] for one in tables["elements"].values()])
-    lengths = np.linalg.norm(p + points[:, 1] @ R.T - points[:, 0], axis=1)
-    legs = {f"leg{k}": float(length) for k, length in enumerate(lengths, 1)}
-    mechanism = build_mechanism(load_network(tables))
-    pose = pose_of(mechanism, assemble(mechanism, legs).assemblies[0], "platform")
-    np.testing.assert_allclose(pose[:3, :3], R, rtol=0, atol=ANSWER)
-    np.testing.assert_allclose(pose[:3, 3], p, rtol=0, atol=ANSWER)
 
 
 # --- perturbed mechanisms
@@ -341,11 +325,6 @@ def test_four_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str
 
 
 # --- helpers
-
-
-def tables_of(name: str) -> Tables:
-    """Return the tables of a shipped file."""
-    return tomllib.loads((NETWORKS / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def every_assembly(
