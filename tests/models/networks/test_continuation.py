@@ -206,7 +206,7 @@ def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
 def test_a_joint_stops_the_motion_at_its_limit(
     joint: str, limits: dict[str, float], end: float, limit: float
 ) -> None:
-    tables = planar(CRANK_ROCKER, **{joint: limits})
+    tables = planar(CRANK_ROCKER, 0.9, 1, **{joint: limits})
     moved = network_drive(tables, {"crank": (0.9, end)}, steps=100)
     assert (moved.verdict, [one.kind for one in moved.events]) == ("fail", ["limit"])
     (event,) = moved.events

@@ -118,7 +118,6 @@ MECHANISMS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", [None, 0, 1])
 def test_known_mechanisms_move_as_in_pinocchio(name: str, seed: int | None) -> None:
@@ -128,7 +127,6 @@ def test_known_mechanisms_move_as_in_pinocchio(name: str, seed: int | None) -> N
     assert assert_as_pinocchio(network) == mobility
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_loops_move_as_in_pinocchio(seed: int) -> None:
     """Revolute, prismatic and cylindrical joints at random, up to three loops, either direction."""
