@@ -35,9 +35,8 @@ def direction(polar: float, azimuth: float) -> tuple[float, float, float]:
     return x / length, y / length, z / length
 
 
-axes = st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]) | st.builds(
-    direction, angles, angles
-)
+some_axes = st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)])
+axes = some_axes | st.builds(direction, angles, angles)
 limits = st.just((-math.inf, math.inf)) | st.tuples(lengths, lengths).map(sorted)
 rates = st.floats(0.1, 10.0) | st.just(math.inf)
 moving: SearchStrategy[JointKind] = st.sampled_from(["revolute", "revolute", "prismatic", "fixed"])
@@ -45,28 +44,24 @@ one_in_four = st.sampled_from([True, False, False, False])
 counts = st.integers(1, 7)
 
 
-def drawn_joint(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
-    kind = draw(moving)
-    if kind == "fixed" and leaders:
-        return Joint(name, "fixed", draw(frames))
-    kind = "revolute" if kind == "fixed" else kind
-    mimic = None
-    if leaders and bool(draw(one_in_four)):
-        mimic = arms.Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
-    lower, upper = draw(limits)
-    most = draw(rates), draw(rates), draw(rates)
-    return Joint(name, kind, draw(frames), draw(axes), lower, upper, *most, mimic)
-
-
 @st.composite
 def random_chains(draw: DrawFn) -> Chain:
     """A chain of one to seven joints of every kind, mimics and sensor frames among them."""
     chosen, leaders = list[Joint](), list[str]()
     for k in range(draw(counts)):
-        joint = drawn_joint(draw, f"j{k}", leaders)
-        chosen.append(joint)
-        if joint.kind != "fixed" and joint.mimic is None:
-            leaders.append(joint.name)
+        name, kind = f"j{k}", draw(moving)
+        if kind == "fixed" and leaders:
+            chosen.append(Joint(name, "fixed", draw(frames)))
+            continue
+        kind = "revolute" if kind == "fixed" else kind
+        mimic = None
+        if leaders and bool(draw(one_in_four)):
+            mimic = arms.Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
+        else:
+            leaders.append(name)
+        lower, upper = draw(limits)
+        most = draw(rates), draw(rates), draw(rates)
+        chosen.append(Joint(name, kind, draw(frames), draw(axes), lower, upper, *most, mimic))
     start = tuple(draw(lengths) for _ in leaders)
     name, description, source = draw(texts), draw(texts), draw(texts)
     base, tip, tool = draw(frames), draw(frames), draw(frames)
@@ -89,18 +84,17 @@ def inertials(draw: DrawFn, joint: str | None) -> Inertial:
     return Inertial(joint, float(masses.sum()), centre, inertia, draw(texts))
 
 
-@st.composite
-def drives(draw: DrawFn, joint: str) -> driving.JointDrive:
+drive_values = st.builds(driving.Drive, *[above_zero] * 7)
+gains = st.builds(driving.Gains, lengths, lengths, lengths)
+springs = st.just(driving.NO_SPRING) | st.builds(driving.CounterbalanceSpring, above_zero, lengths)
+
+
+def drives(joint: str) -> SearchStrategy[driving.JointDrive]:
     """A passive joint, or one with a drive and a controller."""
-    if draw(st.booleans()):
-        return driving.PassiveJoint(joint, draw(above_zero), draw(above_zero))
-    drive = driving.Drive(*(draw(above_zero) for _ in range(7)))
-    gains = driving.Gains(*(draw(lengths) for _ in range(3)))
-    has_spring = draw(st.booleans())
-    spring = (
-        driving.CounterbalanceSpring(draw(above_zero), draw(lengths)) if has_spring else driving.NO_SPRING
-    )
-    return driving.DrivenJoint(joint, drive, draw(above_zero), gains, draw(above_zero), spring)
+    name = st.just(joint)
+    passive = st.builds(driving.PassiveJoint, name, above_zero, above_zero)
+    driven = st.builds(driving.DrivenJoint, name, drive_values, above_zero, gains, above_zero, springs)
+    return passive | driven
 
 
 @st.composite
@@ -118,16 +112,13 @@ def random_heavy_chains(draw: DrawFn) -> Chain:
 sizes = st.floats(0.0, 2.0)
 factors = st.floats(-2.0, 2.0)
 shares = st.floats(0.0, 1.0)
+paths = st.sampled_from(["file:///nowhere/a%20b.stl", "package://p/b & c.obj"])
 shapes: SearchStrategy[Shape] = st.one_of(
     st.builds(arms.Box, st.tuples(sizes, sizes, sizes)),
     st.builds(arms.Cylinder, sizes, sizes),
     st.builds(arms.Capsule, sizes, sizes),
     st.builds(arms.Sphere, sizes),
-    st.builds(
-        arms.Mesh,
-        st.sampled_from(["file:///nowhere/a%20b.stl", "package://p/b & c.obj"]),
-        st.tuples(factors, factors, factors),
-    ),
+    st.builds(arms.Mesh, paths, st.tuples(factors, factors, factors)),
 )
 colours = st.none() | st.tuples(shares, shares, shares, shares)
 
@@ -142,8 +133,6 @@ def with_visuals(draw: DrawFn, chains: SearchStrategy[Chain]) -> Chain:
 
 
 dh_row = st.builds(DHRow, theta=angles, d=lengths, a=lengths, alpha=angles, kind=kinds)
-random_dh_rows = st.lists(dh_row, min_size=1, max_size=7)
-"""One to seven rows of DH parameters, prismatic joints among them."""
 
 
 @pytest.fixture(scope="session")
@@ -158,7 +147,8 @@ def heavy_chains() -> SearchStrategy[Chain]:
 
 @pytest.fixture(scope="session")
 def dh_rows() -> SearchStrategy[list[DHRow]]:
-    return random_dh_rows
+    """One to seven rows of DH parameters, prismatic joints among them."""
+    return st.lists(dh_row, min_size=1, max_size=7)
 
 
 @pytest.fixture(scope="session")
