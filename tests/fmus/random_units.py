@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from hypothesis import HealthCheck
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
-from numpy.typing import NDArray
 
 from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Recipe, Variable
 from urmpipe_fmus.blocks.user import block_from_source
@@ -111,24 +110,22 @@ def random_unit_sources(draw: DrawFn, remembers: bool = True) -> str:
         "derivatives": _function(grammar, [one for one in given if one["kind"] == "State"], "np.tanh({})"),
         "update": _function(grammar, [one for one in given if one["kind"] == "Memory"], "0.1 * np.tanh({})"),
     }
-    variables = draw(st.permutations([*given, *outputs]))
-    lines = [
-        "import numpy as np",
-        "from urmpipe_fmus.block import Table",
-        "from urmpipe_fmus.block import BlockModel",
-        "from urmpipe_fmus.block import Input, Memory, Output, Parameter, State",
-        "unit = BlockModel(",
-        '    name="random_unit",',
-        f"    description={draw(st.text(st.characters(categories=['L', 'Zs', 'P', 'S']), max_size=10))!r},",
-        "    variables=(",
-        *(f"        {_written(one)}," for one in variables),
-        "    ),",
-        *(f"    {name}=lambda v: {text}," for name, text in functions.items() if text),
-        f"    internal_step={draw(st.sampled_from([1e-3, 3e-3, 0.1]))},",
-        *([] if table is None else [f"    table={table},"]),
-        ")",
-    ]
-    return "\n".join(lines) + "\n"
+    written = "".join(f"    {_written(one)},\n" for one in draw(st.permutations([*given, *outputs])))
+    description = draw(st.text(st.characters(categories=["L", "Zs", "P", "S"]), max_size=10))
+    more = {name: f"lambda v: {text}" for name, text in functions.items() if text}
+    more |= {} if table is None else {"table": table}
+    return f"""import numpy as np
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, State, Table
+variables = (
+{written})
+unit = BlockModel(
+    name="random_unit",
+    description={description!r},
+    variables=variables,
+    internal_step={draw(st.sampled_from([1e-3, 3e-3, 0.1]))},
+    {", ".join(f"{name}={text}" for name, text in more.items())},
+)
+"""
 
 
 def random_units(remembers: bool = True) -> SearchStrategy[BlockModel]:
@@ -138,9 +135,18 @@ def random_units(remembers: bool = True) -> SearchStrategy[BlockModel]:
     )
 
 
+UnitCase: TypeAlias = tuple[BlockModel, dict[str, Any], dict[str, Any]]
+"""A unit, start values of some parameters, inputs, states and memories, and samples of its inputs."""
+
+
+def random_cases(count: int, remembers: bool = True) -> SearchStrategy[UnitCase]:
+    return random_units(remembers).flatmap(
+        lambda model: st.tuples(st.just(model), _starts(model), _columns(model, count))
+    )
+
+
 @st.composite
-def random_starts(draw: DrawFn, model: BlockModel) -> dict[str, Any]:
-    """Start values of some parameters, inputs, states and memories, by variable name."""
+def _starts(draw: DrawFn, model: BlockModel) -> dict[str, Any]:
     return {
         one.name: draw(_values(one, one.width)) if one.size else draw(_values(one, 1))[0]
         for one in model.arguments
@@ -149,13 +155,9 @@ def random_starts(draw: DrawFn, model: BlockModel) -> dict[str, Any]:
 
 
 @st.composite
-def random_columns(draw: DrawFn, model: BlockModel, count: int) -> dict[str, NDArray[np.float64]]:
-    """Values of the inputs over some samples, by variable name."""
-    columns = {}
-    for one in model.inputs:
-        flat = np.array(draw(_values(one, count * one.width)))
-        columns[one.name] = flat if one.size is None else flat.reshape(count, one.size)
-    return columns
+def _columns(draw: DrawFn, model: BlockModel, count: int) -> dict[str, Any]:
+    flat = {one: np.array(draw(_values(one, count * one.width))) for one in model.inputs}
+    return {one.name: flat[one].reshape((count, one.size) if one.size else count) for one in flat}
 
 
 def _values(variable: Variable, count: int) -> SearchStrategy[list[float]]:

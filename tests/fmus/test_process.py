@@ -71,9 +71,9 @@ def ends(pid: int) -> bool:
 @pytest.mark.parametrize(
     ("code", "timeout", "how", "calls"),
     [
-        ("exit(0);", 60.0, "ended the process with the exit code 0", tuple(CALLS)),
+        ("exit(0);", 60.0, "ended the process with the exit code 0", CALLS),
         # which call it is, is noted alike for both
-        (HANGS, 3.0, "did not return within 3 s", ("load", "get", "step", "free")),
+        (HANGS, 3.0, "did not return within 3 s", ["load", "get", "step", "free"]),
     ],
 )
 def test_any_call_may_hang_or_end_the_process(
@@ -86,28 +86,25 @@ def test_any_call_may_hang_or_end_the_process(
         reports = [*pool.map(lambda trouble: checked(trouble, timeout), troubles.values())]
     for call, record, report in zip(troubles, records, reports, strict=True):
         name, rows, check_name = CALLS[call]
-        when = 1 if rows == 11 else 0
-        assert record.failed == f"block bad: {name} at t = {when} s: {how}; it logged nothing"
+        assert record.failed == f"block bad: {name} at t = {rows // 11} s: {how}; it logged nothing"
         assert len(record.t_ns) == rows
         if check_name:
             assert (run_problems(report), report.ran) == ((f"{check_name} {how}",), False)
     assert set(children(os.getpid())) <= before
 
 
+SEGMENTATION = ": Segmentation fault (SIGSEGV)"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "how"),
-    [
-        ("exit(1);", " with the exit code 1"),
-        (OVERFLOWS, ": Segmentation fault (SIGSEGV)"),
-        (TAKES_MEMORY, ": Segmentation fault (SIGSEGV)"),
-    ],
+    [("exit(1);", " with the exit code 1"), (OVERFLOWS, SEGMENTATION), (TAKES_MEMORY, SEGMENTATION)],
 )
 def test_how_a_process_ended_is_reported(code: str, how: str) -> None:
     bad = trouble_in("step", code)
-    failed = f"block bad: fmi2DoStep at t = 0 s: ended the process{how}; it logged nothing"
-    assert simulated(bad).failed == failed
-    report = checked(bad)
+    record, report = simulated(bad), checked(bad)
+    assert record.failed == f"block bad: fmi2DoStep at t = 0 s: ended the process{how}; it logged nothing"
     assert run_problems(report) == (f"fmi2DoStep at 0 s ended the process{how}",)
     assert (report.ran, report.variables[0].before, report.variables[0].after) == (False, 0.0, None)
 
@@ -130,10 +127,7 @@ def test_a_process_that_an_fmu_started_ends_with_it() -> None:
         assert ends(int(there(re.search(r": (\d+)$", text))[1]))
 
 
-PROGRAMS = {
-    "check": "check_fmu(path)",
-    "simulate": "simulate(prepare(system, lambda block: path))",
-}
+CALLS_OF_FMUS = ["check_fmu(path)", "simulate(prepare(system, lambda block: path))"]
 PROGRAM = """
 import sys
 from pathlib import Path
@@ -147,14 +141,14 @@ system = System(name="test", path=Path("test.toml"), step=0.1, duration=1.0, blo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
-@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("call", CALLS_OF_FMUS, ids=["check", "simulate"])
 def test_an_fmu_that_hangs_ends_with_the_process_that_started_it(
-    how: signal.Signals, program: str, tmp_path: Path
+    how: signal.Signals, call: str, tmp_path: Path
 ) -> None:
     started = tmp_path / "started"
     path = fmu(trouble_in("step", f'if (fork()) creat("{started}", 0600); {HANGS}'))
     environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-c", PROGRAM + PROGRAMS[program], str(path)]
+    command = [sys.executable, "-c", PROGRAM + call, str(path)]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL, env=environment) as parent:
         while not started.exists():
             assert parent.poll() is None
@@ -181,7 +175,6 @@ def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
         if (t > 0.85) { write(2, "no more\\n", 8); abort(); }
         """,
     )
-    plan = planned({"f": flood}, step=0.05)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("urmpipe_fmus.cosim.simulation.MAX_OUTPUT_BYTES", 10_000)
     sizes: list[int] = []
@@ -189,7 +182,7 @@ def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
     def look(_: float) -> None:
         sizes.extend(path.stat().st_size for path in tmp_path.glob("urmpipe-*/output.txt"))
 
-    record = simulate(plan, progress=look)
+    record = simulate(planned({"f": flood}, step=0.05), progress=look)
     assert max(sizes) < 9_000_000  # of 18 MB; it is polled between two of them
     assert there(record.failed).endswith("no more")
 

@@ -10,10 +10,9 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from asserting import refusal
-from random_units import PATIENT, random_columns, random_starts, random_units
+from random_units import PATIENT, UnitCase, random_cases
 from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Input, Memory, Output, Parameter, State, Variable
 from urmpipe_fmus.instance import Equations, Instance
 from urmpipe_fmus.run import run
@@ -219,14 +218,8 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
 
 @pytest.mark.slow
 @settings(max_examples=40, **PATIENT)
-@given(
-    random_units().flatmap(
-        lambda model: st.tuples(st.just(model), random_starts(model), random_columns(model, 6))
-    )
-)
-def test_a_restored_instance_goes_on_bit_by_bit(
-    case: tuple[BlockModel, dict[str, Any], dict[str, Any]],
-) -> None:
+@given(random_cases(6))
+def test_a_restored_instance_goes_on_bit_by_bit(case: UnitCase) -> None:
     model, start, columns = case
     instance = Instance(model)
     put_arrays(instance, model.arguments, start)
@@ -331,14 +324,8 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
 
 @pytest.mark.slow
 @settings(max_examples=40, **PATIENT)
-@given(
-    random_units(remembers=False).flatmap(
-        lambda model: st.tuples(st.just(model), random_starts(model), random_columns(model, 5))
-    )
-)
-def test_a_unit_without_memory_gives_at_once_what_it_gives_step_by_step(
-    case: tuple[BlockModel, dict[str, Any], dict[str, Any]],
-) -> None:
+@given(random_cases(5, remembers=False))
+def test_a_unit_without_memory_gives_at_once_what_it_gives_step_by_step(case: UnitCase) -> None:
     model, start, columns = case
     t = np.array([0.0, 0.125, 0.25, 0.375, 0.5])  # t + h is exact
     found, instance = run(model, t, columns, start), Instance(model)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from ctypes import c_double, c_void_p
 from functools import cache, partial
 from pathlib import Path
@@ -12,19 +11,18 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from fmu_run import FmuRun
 from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
-from random_units import PATIENT, random_columns, random_starts, random_units
+from random_units import PATIENT, UnitCase, random_cases
 from sliding_arm import sliding_arm, sprung_arm
+from stepped_unit import SteppedUnit, needs_native
 from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Table, Variable
 from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
@@ -37,16 +35,11 @@ SAME = 1e-12
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 
-needs_native = pytest.mark.skipif(
-    native_unavailable_reason([]) is not None,
-    reason=f"needs what builds native FMUs: {native_unavailable_reason([])}",
-)
+native = pytest.param("native", marks=needs_native)
+both_backends = pytest.mark.parametrize("backend", [native, "python"])
 
-
-TABLE = Table(
-    np.arange(30) * 7_000_000,
-    np.random.default_rng(1).uniform(-3.0, 3.0, (30, 3)),  # rows between the steps
-)
+ROWS = np.random.default_rng(1).uniform(-3.0, 3.0, (30, 3))
+TABLE = Table(np.arange(30) * 7_000_000, ROWS)  # between the steps
 COLUMNS = [["q", "rad", 2], ["d", "m"]]
 ARM = with_drives(with_masses(load_robot("urm6")))
 """The arm of importers/, where a log is run over a native `chain_dynamics` of it, too."""
@@ -83,29 +76,21 @@ def unit_of(what: str) -> BlockModel:
     return make_block(name, **options)
 
 
-def times_of(model: BlockModel) -> FloatArray:
-    """Communication points in [s]; few of an arm with masses, which takes Python some ms an internal step."""
-    count = 3 if model.name in ("chain_dynamics", "driven_arm") else 41
-    return 0.005 * np.arange(count, dtype=np.float64)
-
-
 def near(rng: np.random.Generator, variable: Variable) -> Any:
     """Values about a variable's start, within its range and of its type."""
-    size = np.abs(variable.starts)
+    starts = np.array(variable.starts)
     if variable.type == "Real":
-        found = np.array(variable.starts) + np.where(size > 0.0, 0.1 * size, 0.1) * rng.uniform(
-            -1, 1, size.shape
-        )
+        size = np.abs(starts)
+        found = starts + np.where(size > 0.0, 0.1 * size, 0.1) * rng.uniform(-1, 1, size.shape)
     else:
-        low, high = (
-            (0, 1) if variable.type == "Boolean" else (max(variable.minimum, -3), min(variable.maximum, 3))
-        )
-        found = rng.integers(int(low), int(high), size.shape, endpoint=True).astype(np.float64)
+        low, high = max(variable.minimum, -3), min(variable.maximum, 3)
+        low, high = (0, 1) if variable.type == "Boolean" else (low, high)
+        found = rng.integers(int(low), int(high), starts.shape, endpoint=True).astype(np.float64)
     found = np.clip(found, variable.minimum, variable.maximum)
     return found if variable.size else float(found[0])
 
 
-def random_case(model: BlockModel, seed: int, count: int) -> tuple[dict[str, Any], dict[str, FloatArray]]:
+def random_case(model: BlockModel, seed: int, count: int) -> UnitCase:
     """Parameters, and inputs over some samples: what the unit meets, and steps of more than a turn."""
     rng = np.random.default_rng(seed)
     start = {one.name: near(rng, one) for one in model.parameters if one.name != INTERNAL_STEP}
@@ -115,46 +100,37 @@ def random_case(model: BlockModel, seed: int, count: int) -> tuple[dict[str, Any
         if one.name == "raw":
             flat = np.mod(flat * 2.0 + np.pi, 2.0 * np.pi) - np.pi
         columns[one.name] = flat[:, 0] if one.size is None else flat
-    return start, columns
+    return model, start, columns
 
 
-def shown(model: BlockModel, found: Mapping[str, FloatArray]) -> FloatArray:
-    """What a run gave, a column a scalar."""
-    names = [one.name for one in model.variables if one.causality == "output"]
-    return np.column_stack([found[name] for name in names])
+def output_names(model: BlockModel) -> list[str]:
+    return [one.name for one in model.variables if one.causality == "output"]
+
+
+def given_by_run(case: UnitCase, t: FloatArray) -> FloatArray:
+    model, start, columns = case
+    found = run(model, t, columns, start)
+    return np.column_stack([found[name] for name in output_names(model)])
+
+
+def given_by_steps(case: UnitCase, t: FloatArray) -> FloatArray:
+    model, start, columns = case
+    unit, rows = SteppedUnit(model, start), []
+    for k, time in enumerate(t.tolist()):
+        unit.put(**{name: column[k] for name, column in columns.items()})
+        rows.append(unit.read(*output_names(model)))
+        if k + 1 < len(t):
+            unit.do_step(time, float(t[k + 1]) - time)
+    return np.array(rows)
 
 
 @cache
-def case_and_run(what: str) -> tuple[dict[str, Any], dict[str, FloatArray], FloatArray]:
-    """Return parameters, inputs and what a run gives for them: seconds of Python for an arm with masses."""
-    model, t = unit_of(what), times_of(unit_of(what))
-    start, columns = random_case(model, 0, len(t))
-    return start, columns, shown(model, run(model, t, columns, start))
-
-
-def stepped(
-    model: BlockModel, t: FloatArray, columns: Mapping[str, Any], start: Mapping[str, Any]
-) -> FloatArray:
-    """What an instance shows, set and stepped by hand."""
-    instance = Instance(model, float(t[0]))
-    outputs = [
-        instance.reference(n) for one in model.variables if one.causality == "output" for n in one.names
-    ]
-
-    def put(values: Mapping[str, Any]) -> None:
-        for one in model.arguments:
-            if one.name in values:
-                flat = np.ravel(np.broadcast_to(values[one.name], (one.width,))).tolist()
-                instance.set([instance.reference(name) for name in one.names], flat)
-
-    put(start)
-    rows = []
-    for k, time in enumerate(t.tolist()):
-        put({name: column[k] for name, column in columns.items()})
-        rows.append(instance.get(outputs))
-        if k + 1 < len(t):
-            instance.do_step(time, float(t[k + 1]) - time)
-    return np.array(rows, dtype=np.float64)
+def case_and_run(what: str) -> tuple[UnitCase, FloatArray, FloatArray]:
+    """Return a case of a unit, times, and what a run gives; masses take Python ms an internal step."""
+    model = unit_of(what)
+    t = 0.005 * np.arange(3.0 if model.name in ("chain_dynamics", "driven_arm") else 41.0)
+    case = random_case(model, 0, len(t))
+    return case, t, given_by_run(case, t)
 
 
 def assert_same(got: FloatArray, expected: FloatArray) -> None:
@@ -163,44 +139,41 @@ def assert_same(got: FloatArray, expected: FloatArray) -> None:
     assert (worst <= SAME).all(), f"{worst.max()} at {np.unravel_index(worst.argmax(), worst.shape)}"
 
 
-def assert_fmu_gives(model: BlockModel, path: Path, case: tuple[Any, Any], t: FloatArray) -> None:
-    start, columns = case
-    with FmuRun(path, model, start, float(t[0])) as fmu:
-        assert_same(fmu.over(t, columns), shown(model, run(model, t, columns, start)))
+def assert_fmu_gives(case: UnitCase, path: Path, t: FloatArray) -> None:
+    model, start, columns = case
+    with FmuRun(path, model, start) as fmu:
+        assert_same(fmu.over(t, columns), given_by_run(case, t))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", UNITS)
 def test_a_run_gives_what_steps_give(what: str) -> None:
-    model, t = unit_of(what), times_of(unit_of(what))
-    start, columns, expected = case_and_run(what)
-    assert_same(stepped(model, t, columns, start), expected)
+    case, t, expected = case_and_run(what)
+    assert_same(given_by_steps(case, t), expected)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
+@both_backends
 @pytest.mark.parametrize("what", UNITS)
 def test_an_fmu_gives_what_a_run_gives_and_goes_on_bit_by_bit_from_a_saved_state(
     what: str, backend: Backend
 ) -> None:
-    model, t = unit_of(what), times_of(unit_of(what))
-    start, columns, expected = case_and_run(what)
+    (model, start, columns), t, expected = case_and_run(what)
     half = len(t) // 2
-    before, after = slice(half + 1), slice(half, None)  # the sample in the middle is set and read twice
-
-    def given(part: slice) -> dict[str, FloatArray]:
-        return {name: rows[part] for name, rows in columns.items()}
-
+    before, after = (  # the sample in the middle is set and read twice
+        (t[part], {name: rows[part] for name, rows in columns.items()})
+        for part in (slice(half + 1), slice(half, None))
+    )
     with FmuRun(cached_fmu(model, backend), model, start) as fmu:
-        early = fmu.over(t[before], given(before))
+        early = fmu.over(*before)
         state = fmu.fmu.getFMUstate()
         kept = fmu.fmu.serializeFMUstate(state)
-        late = fmu.over(t[after], given(after))
+        late = fmu.over(*after)
         fmu.fmu.setFMUstate(state)
-        again = fmu.over(t[after], given(after))
-        fmu.over(t[before] + t[-1], given(before))  # somewhere else
+        again = fmu.over(*after)
+        fmu.over(before[0] + t[-1], before[1])  # somewhere else
         fmu.fmu.setFMUstate(fmu.fmu.deSerializeFMUstate(kept))
-        last = fmu.over(t[after], given(after))
+        last = fmu.over(*after)
     assert_same(np.concatenate((early, late[1:])), expected)
     np.testing.assert_array_equal(late[0], early[-1])
     np.testing.assert_array_equal(again, late)
@@ -221,13 +194,12 @@ def test_a_step_begins_where_the_unit_stands(backend: Any, status: int | None) -
         one.do_step(start + step, step)
         own = start + 2.0 * step
         for time in (start, start + step, own + 1.1e-6 * step, own - 1.1e-6 * step):
-            said = (
-                f"unit inertia: found a step from {time:.15g} s, allowed: from where it stands, {own:.15g} s"
-            )
             with pytest.raises((UnitError, FMICallException)) as error:
                 one.do_step(time, step)
             assert getattr(error.value, "status", None) == status
-            assert said == (one.log[-1][2] if status else str(error.value))
+            assert (one.log[-1][2] if status else str(error.value)) == (
+                f"unit inertia: found a step from {time:.15g} s, allowed: from where it stands, {own:.15g} s"
+            )
         one.do_step(own, step)
 
 
@@ -251,9 +223,7 @@ def test_masters_that_add_up_steps_and_those_that_multiply_stay_where_the_unit_s
 @pytest.mark.slow
 @needs_native
 @pytest.mark.parametrize("robot", ["urm6", "ur5e"])
-def test_at_the_calibration_pose_angles_of_half_a_turn_are_one_whatever_their_sign(
-    robot: str,
-) -> None:
+def test_at_the_calibration_pose_half_turns_of_either_sign_are_equal(robot: str) -> None:
     model = make_block("kinematic_chain", robot=load_robot(robot), rates=True)
     expected = np.concatenate([np.ravel(one) for one in run(model, np.zeros(1)).values()])
     with FmuRun(cached_fmu(model, "native"), model, {}) as fmu:
@@ -265,37 +235,32 @@ def test_at_the_calibration_pose_angles_of_half_a_turn_are_one_whatever_their_si
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
+@both_backends
 @pytest.mark.parametrize("example", ["backlash.py", "low_pass.py"])
 def test_a_documented_unit_gives_as_an_fmu_what_a_run_gives(example: str, backend: Backend) -> None:
     model, t = load_block_file(EXAMPLES / example), np.linspace(0.0, 0.2, 41, dtype=np.float64)
-    assert_fmu_gives(model, cached_fmu(model, backend), random_case(model, 5, len(t)), t)
+    assert_fmu_gives(random_case(model, 5, len(t)), cached_fmu(model, backend), t)
 
 
-CASES = random_units().flatmap(
-    lambda model: st.tuples(st.just(model), st.tuples(random_starts(model), random_columns(model, 5)))
-)
 T = np.array([0.0, 0.01, 0.02, 0.05, 0.2])
 
 
 @pytest.mark.slow
 @settings(max_examples=25, **PATIENT)  # most of the time goes into drawing a unit; those of core/ draw more
-@given(CASES)
-def test_a_random_unit_gives_stepped_what_a_run_gives(case: tuple[BlockModel, tuple[Any, Any]]) -> None:
-    model, (start, columns) = case
-    assert_same(stepped(model, T, columns, start), shown(model, run(model, T, columns, start)))
+@given(random_cases(5))
+def test_a_random_unit_gives_stepped_what_a_run_gives(case: UnitCase) -> None:
+    assert_same(given_by_steps(case, T), given_by_run(case, T))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
+@both_backends
 @settings(max_examples=4, **PATIENT)  # of functions one by one: native/test_functions.py
-@given(case=CASES)
+@given(case=random_cases(5))
 def test_a_random_unit_exported_is_valid_and_gives_what_a_run_gives(
-    case: tuple[BlockModel, tuple[Any, Any]], backend: Backend, tmp_path_factory: pytest.TempPathFactory
+    case: UnitCase, backend: Backend, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     from fmpy.validation import validate_fmu
 
-    model, values = case
-    path = build_fmu(model, tmp_path_factory.mktemp("fmu"), backend=backend).path
+    path = build_fmu(case[0], tmp_path_factory.mktemp("fmu"), backend=backend).path
     assert validate_fmu(str(path)) == []
-    assert_fmu_gives(model, path, values, T)
+    assert_fmu_gives(case, path, T)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from asserting import assert_near
 from orientation_columns import orientation_columns
 from urmpipe_models import hand_eye
 from urmpipe_models.elementwise import FloatArray
@@ -100,10 +101,10 @@ def rms(values: FloatArray) -> float:
 
 def assert_found(found: HandEye, truth: Truth, *, turned: bool) -> None:
     assert found.unobservable == ()
-    np.testing.assert_allclose(found.base_rotation, truth.base, atol=ROUNDING)
-    np.testing.assert_allclose(found.base_position, truth.shift, atol=ROUNDING)
-    np.testing.assert_allclose(found.tool_position, truth.offset, atol=ROUNDING)
-    np.testing.assert_allclose(found.tool_rotation, truth.tool if turned else np.eye(3), atol=ROUNDING)
+    assert_near(found.base_rotation, truth.base, ROUNDING)
+    assert_near(found.base_position, truth.shift, ROUNDING)
+    assert_near(found.tool_position, truth.offset, ROUNDING)
+    assert_near(found.tool_rotation, truth.tool if turned else np.eye(3), ROUNDING)
 
 
 @pytest.mark.slow
@@ -121,8 +122,8 @@ def test_any_frames_are_found_from_exact_poses(robot: str, turned: bool) -> None
 def test_any_frames_are_found_from_few_poses_and_small_motions(seed: int, count: int, spread: float) -> None:
     truth = random_truth(seed, count, spread=spread)
     found = solve(truth, turned=True)
-    np.testing.assert_allclose(found.base_rotation, truth.base, atol=1e-9)
-    np.testing.assert_allclose(found.tool_position, truth.offset, atol=1e-9)
+    assert_near(found.base_rotation, truth.base, 1e-9)
+    assert_near(found.tool_position, truth.offset, 1e-9)
 
 
 def test_rows_without_a_value_count_nowhere() -> None:
@@ -171,7 +172,7 @@ def test_orientations_determine_what_positions_on_a_line_leave_open() -> None:
     assert left == pytest.approx(least_squares_sum(truth, measured, turns), rel=1e-9)
     (direction,) = found.unobservable
     assert direction.part == "tool offset"  # along the axis of all turns
-    np.testing.assert_allclose(np.abs(direction.axis), [1.0, 0.0, 0.0], rtol=0.0, atol=1e-9)
+    assert_near(np.abs(direction.axis), [1.0, 0.0, 0.0], 1e-9)
 
 
 RNG = np.random.default_rng(0)
@@ -201,18 +202,18 @@ def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
     position: FloatArray, rotation: FloatArray, alone: list[str], turned: list[str]
 ) -> None:
     truth = placed(position, rotation)
-    for parts, with_turns in ((alone, False), (turned, True)):
+    for expected, with_turns in ((alone, False), (turned, True)):
         found = solve(truth, turned=with_turns)
-        assert [direction.part for direction in found.unobservable] == parts
-        np.testing.assert_allclose(misfit(found, truth, truth.measured), 0.0, atol=1e-9)
+        assert [direction.part for direction in found.unobservable] == expected
+        assert_near(misfit(found, truth, truth.measured), 0.0, 1e-9)
         for direction in found.unobservable:
             assert np.linalg.norm(direction.axis) == pytest.approx(1.0)
             assert direction.seen < 1e-7  # the root of rounding
             assert direction.part != "tool offset" or abs(found.tool_position @ direction.axis) <= 1e-9
         if with_turns:
             made = found.base_rotation @ truth.rotation @ found.tool_rotation
-            np.testing.assert_allclose(made, truth.measured_rotation, atol=1e-9)
-        elif not parts:
+            assert_near(made, truth.measured_rotation, 1e-9)
+        elif not expected:
             assert_found(found, truth, turned=False)
 
 
@@ -226,8 +227,8 @@ def test_a_tool_that_hardly_turns_is_found_with_a_low_sensitivity() -> None:
     small = Rotation.from_rotvec(RNG.normal(0.0, 0.002, (50, 3))).as_matrix()
     truth = placed(POINTS, small @ TURNS[0])
     found = solve(truth, turned=True)
-    np.testing.assert_allclose(found.tool_position, truth.offset, atol=1e-9)
-    assert [direction.part for direction in found.unobservable] == ["tool offset"] * 3
+    assert_near(found.tool_position, truth.offset, 1e-9)
+    assert [direction.part for direction in found.unobservable] == OFFSETS
     for direction in found.unobservable:
         spun = truth.rotation @ direction.axis
         assert direction.seen == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)

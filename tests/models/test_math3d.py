@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation, Slerp
 
+from asserting import assert_near
 from orientation_columns import orientation_columns
 from urmpipe_models.elementwise import Element, FloatArray
 from urmpipe_models.math3d import (
@@ -47,10 +48,6 @@ angles = st.floats(-math.pi, math.pi)
 units = st.floats(-1.0, 1.0)
 
 
-def assert_near(got: Any, expected: Any, atol: float = ROUNDING) -> None:
-    np.testing.assert_allclose(got, expected, rtol=0.0, atol=atol)
-
-
 def homogeneous(frame: Transform) -> FloatArray:
     """Return a pose as a matrix, shape (4, 4)."""
     result = np.eye(4)
@@ -62,8 +59,8 @@ def homogeneous(frame: Transform) -> FloatArray:
 def test_rotation_about_is_scipys_and_orthogonal(angle: float, polar: float, azimuth: float) -> None:
     axis = Rotation.from_euler("ZY", [azimuth, polar]).as_matrix()[:, 2]
     turned = rotation_about(axis.tolist(), angle)
-    assert_near(turned.rotation, Rotation.from_rotvec(angle * axis).as_matrix())
-    assert_near((turned @ turned.inverse()).rotation, np.eye(3))
+    assert_near(turned.rotation, Rotation.from_rotvec(angle * axis).as_matrix(), ROUNDING)
+    assert_near((turned @ turned.inverse()).rotation, np.eye(3), ROUNDING)
 
 
 @pytest.mark.slow
@@ -76,7 +73,7 @@ def test_rotated_is_the_product_with_rotation_about(
 ) -> None:
     frame = from_offset(np.random.default_rng(seed).uniform(-1.0, 1.0, 6).tolist())
     turned = frame.rotated(axis, angle)
-    assert_near(turned.rotation, (frame @ rotation_about(axis, angle)).rotation)
+    assert_near(turned.rotation, (frame @ rotation_about(axis, angle)).rotation, ROUNDING)
     assert turned.translation == frame.translation
 
 
@@ -132,7 +129,7 @@ def test_euler_angles_are_scipys_and_come_back(
     near = st.builds(operator.add, st.sampled_from(convention.singular), st.sampled_from(NEAR_SINGULAR))
     middle = data.draw(angles | st.floats(*convention.regular) | near)
     rotation = convention.build(first, middle, last).rotation
-    assert_near(rotation, Rotation.from_euler(convention.axes, [first, middle, last]).as_matrix())
+    assert_near(rotation, Rotation.from_euler(convention.axes, [first, middle, last]).as_matrix(), ROUNDING)
     *got, singular = map(float, convention.angles(rotation))
     if convention.regular[0] <= middle <= convention.regular[1]:
         # the sine of the angle between is ill-conditioned by 1 / cos(ry) or 1 / sin(x), up to 15
@@ -154,7 +151,7 @@ def test_in_singular_poses_the_last_angle_is_zero_and_the_first_turns_all(
     got_first, got_middle, got_last, singular = map(float, convention.angles(rotation))
     assert (got_last, singular) == (0.0, True)
     assert got_middle == pytest.approx(abs(middle) if convention.axes == "ZXZ" else middle, rel=0, abs=1e-15)
-    assert_near(convention.build(got_first, got_middle, 0.0).rotation, rotation)
+    assert_near(convention.build(got_first, got_middle, 0.0).rotation, rotation, ROUNDING)
 
 
 @conventions
@@ -188,7 +185,7 @@ def test_half_a_turn_is_pi_whatever_the_sign_of_zero(zero: float) -> None:
 @given(angles, angles | st.sampled_from([math.pi / 2, -math.pi / 2]), angles)
 def test_rpy_gives_the_rotation_back_everywhere(rx: float, ry: float, rz: float) -> None:
     rotation = from_rpy(rx, ry, rz).rotation
-    assert_near(from_rpy(*matrix_to_rpy(rotation)).rotation, rotation)
+    assert_near(from_rpy(*matrix_to_rpy(rotation)).rotation, rotation, ROUNDING)
 
 
 @given(st.lists(units, min_size=9, max_size=9))
@@ -198,7 +195,7 @@ def test_offsets_come_back_and_a_point_is_that_of_the_4x4_matrix(values: list[fl
     assert_near(matrix_to_rpy(frame.rotation), values[3:6], 2 * ROUNDING)  # 1 / cos(1) < 2
     shift = from_offset(values[:3])
     assert (shift.translation, matrix_to_rpy(shift.rotation)) == (tuple(values[:3]), (0.0, 0.0, 0.0))
-    assert_near([*frame.point((x, y, z)), 1.0], homogeneous(frame) @ [x, y, z, 1.0])
+    assert_near([*frame.point((x, y, z)), 1.0], homogeneous(frame) @ [x, y, z, 1.0], ROUNDING)
 
 
 SMALL = 1e-14  # of numbers up to 1; or three products of entries up to 4, a dozen roundings each

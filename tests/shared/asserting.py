@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
 import pytest
 
 OTHER_TIME = '; time=COLUMN names the time column; time="none" leaves the time column out'
@@ -29,3 +30,8 @@ def refusal(
     with pytest.raises(kind) as error:
         work(*args, **options)
     return str(error.value)
+
+
+def assert_near(got: Any, expected: Any, atol: float) -> None:
+    """Compare with no relative tolerance."""
+    np.testing.assert_allclose(got, expected, rtol=0.0, atol=atol)
