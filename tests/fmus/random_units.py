@@ -6,8 +6,8 @@ comparison) is asked only of inputs, parameters and constants, which have the sa
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -57,27 +57,18 @@ class Grammar:
     def __init__(self, draw: DrawFn, leaves: list[str], exact: list[str]) -> None:
         self.draw, self.leaves, self.exact = draw, leaves, exact
 
-    def number(self) -> str:
-        return repr(self.draw(numbers))
-
     def smooth(self, depth: int = 3) -> str:
         """A value of a size about 1."""
         if depth == 0 or self.draw(st.integers(0, 3)) == 0:
-            return self.draw(st.sampled_from(self.leaves)) if self.draw(st.integers(0, 4)) else self.number()
-        form = self.draw(st.sampled_from(SMOOTH))
-        made = {"a": lambda: self.smooth(depth - 1), "b": lambda: self.smooth(depth - 1)}
-        return self._filled(form, made | {"c": self.condition, "e": self.exactly})
+            return self._leaf(self.leaves)
+        return self._filled(SMOOTH, depth - 1)
 
     def exactly(self, depth: int = 1) -> str:
         """A value with the same bits wherever it is computed."""
-        if depth == 0 or self.draw(st.booleans()):
-            return self.draw(st.sampled_from(self.exact)) if self.draw(st.integers(0, 4)) else self.number()
-        one = lambda: self.exactly(depth - 1)  # noqa: E731
-        return self._filled(self.draw(st.sampled_from(EXACT)), {"e": one, "f": one})
+        return self._leaf(self.exact) if depth == 0 or self.draw(st.booleans()) else self._filled(EXACT, 0)
 
     def condition(self) -> str:
-        one = self.exactly
-        return self._filled(self.draw(st.sampled_from(CONDITIONS)), {"e": one, "f": one})
+        return self._filled(CONDITIONS, 1)
 
     def of_type(self, kind: str) -> str:
         """A value that a variable of a type may have."""
@@ -85,7 +76,14 @@ class Grammar:
             return self.condition()
         return f"np.floor({self.exactly()})" if kind == "Integer" else self.smooth()
 
-    def _filled(self, form: str, made: dict[str, Callable[[], str]]) -> str:
+    def _leaf(self, names: list[str]) -> str:
+        return self.draw(st.sampled_from(names)) if self.draw(st.integers(0, 4)) else repr(self.draw(numbers))
+
+    def _filled(self, forms: tuple[str, ...], depth: int) -> str:
+        """One of the forms, with expressions at its places."""
+        form = self.draw(st.sampled_from(forms))
+        made = dict.fromkeys("ab", partial(self.smooth, depth)) | {"c": self.condition}
+        made |= dict.fromkeys("ef", partial(self.exactly, min(depth, 1)))
         return form.format(**{name: make() for name, make in made.items() if f"{{{name}}}" in form})
 
 

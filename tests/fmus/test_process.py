@@ -195,14 +195,11 @@ def test_neither_logging_without_end_nor_a_stopped_process_is_waited_for() -> No
     assert run_problems(checked(trouble_in("step", "raise(SIGSTOP);"), timeout=1.0)) == (hung,)
 
 
-def test_a_process_that_waits_for_its_job_ends_without_one() -> None:
+def test_a_process_ends_without_a_job_and_one_that_ended_before_is_reported_by_its_exit_code() -> None:
     with start_worker() as worker:
         assert worker.process.poll() is None
     assert worker.process.poll() is not None
     assert not worker.folder.exists()
-
-
-def test_a_process_that_ended_before_its_job_is_reported_by_its_exit_code() -> None:
     with start_worker() as worker:
         worker.process.kill()
         worker.process.wait()

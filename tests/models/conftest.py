@@ -97,18 +97,6 @@ def drives(joint: str) -> SearchStrategy[driving.JointDrive]:
     return passive | driven
 
 
-@st.composite
-def random_heavy_chains(draw: DrawFn) -> Chain:
-    """A random chain with up to two masses on its base and each of its joints, and some drives."""
-    chain = draw(random_chains())
-    carriers = [None, *(joint.name for joint in chain.joints)]
-    masses = [draw(inertials(one)) for one in carriers for _ in range(draw(st.integers(0, 2)))]
-    driven = [draw(drives(one)) for one in chain.coordinates if draw(st.booleans())]
-    left_out = tuple(draw(st.lists(texts, max_size=2)))
-    gravity = draw(lengths), draw(lengths), draw(lengths)
-    return replace(chain, inertials=tuple(masses), gravity=gravity, left_out=left_out, drives=tuple(driven))
-
-
 sizes = st.floats(0.0, 2.0)
 factors = st.floats(-2.0, 2.0)
 shares = st.floats(0.0, 1.0)
@@ -124,12 +112,23 @@ colours = st.none() | st.tuples(shares, shares, shares, shares)
 
 
 @st.composite
-def with_visuals(draw: DrawFn, chains: SearchStrategy[Chain]) -> Chain:
-    """A chain with up to four shapes on its base and its joints."""
-    chain = draw(chains)
-    carriers = st.sampled_from([None, *(joint.name for joint in chain.joints)])
-    visuals = st.lists(st.builds(Visual, carriers, shapes, frames, colours), max_size=4)
-    return replace(chain, visuals=tuple(draw(visuals)))
+def random_heavy_chains(draw: DrawFn) -> Chain:
+    """A random chain with masses, shapes on its base and its joints, and some drives."""
+    chain = draw(random_chains())
+    carriers = [None, *(joint.name for joint in chain.joints)]
+    masses = [draw(inertials(one)) for one in carriers for _ in range(draw(st.integers(0, 2)))]
+    driven = [draw(drives(one)) for one in chain.coordinates if draw(st.booleans())]
+    visuals = draw(
+        st.lists(st.builds(Visual, st.sampled_from(carriers), shapes, frames, colours), max_size=4)
+    )
+    return replace(
+        chain,
+        inertials=tuple(masses),
+        gravity=(draw(lengths), draw(lengths), draw(lengths)),
+        left_out=tuple(draw(st.lists(texts, max_size=2))),
+        drives=tuple(driven),
+        visuals=tuple(visuals),
+    )
 
 
 dh_row = st.builds(DHRow, theta=angles, d=lengths, a=lengths, alpha=angles, kind=kinds)
@@ -149,8 +148,3 @@ def heavy_chains() -> SearchStrategy[Chain]:
 def dh_rows() -> SearchStrategy[list[DHRow]]:
     """One to seven rows of DH parameters, prismatic joints among them."""
     return st.lists(dh_row, min_size=1, max_size=7)
-
-
-@pytest.fixture(scope="session")
-def visual_chains() -> SearchStrategy[Chain]:
-    return with_visuals(random_heavy_chains())

@@ -21,6 +21,7 @@ from urmpipe_models.ik.loop_equations import jacobian_determinant
 from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.ik.task import Task, build_task
 from urmpipe_models.kinematics.forward import Screws, jacobian_over_log, screws_to_chain
+from urmpipe_models.networks.joint_motion import left_jacobian_inverse
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 
 # --- what an iterative inverse misses its targets by ---------------------------------------------------
@@ -61,30 +62,18 @@ def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObjec
 
 @pytest.mark.parametrize("robot", ["urm6", "ur5e", "panda", "iiwa14"])
 def test_the_miss_changes_by_the_jacobian_and_its_turn_by_that_of_the_logarithm(robot: str) -> None:
-    """-de = A J dq with A of `log_jacobian` for the turn, and A = 1 for the position."""
+    """-de = A J dq, for the turn with A of R(e) = R_target R^T: a turn by w changes e by -A w."""
     task, q = task_of(load_robot(robot), 40)
     error = task.error(q)
     regular = np.sqrt(error.angle2) < 3.0 * error.length
     rows = np.flatnonzero(regular)
     task, q, error = task.rows(rows), q[:, regular], error.rows(rows)
     changes = error.jacobian.copy()
-    changes[3:] = np.einsum("ijn,jkn->ikn", log_jacobian(error.vector[3:] / error.length), changes[3:])
+    changes[3:] = np.einsum(
+        "ijn,jkn->ikn", left_jacobian_inverse(-error.vector[3:] / error.length), changes[3:]
+    )
     # m: three derivatives of an arm of up to 10 m, and 1 / (pi - 3)^3 of the logarithm
     assert_jacobian(lambda at: task.error(at).vector, -changes.transpose(1, 0, 2), q, third=1e4, size=100.0)
-
-
-def log_jacobian(vector: FloatArray) -> FloatArray:
-    """Return A = 1 + E/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) E^2 of rotation vectors, E = [e]x, a = |e|.
-
-    With R(e) = R_target R^T, a tool that turns by w changes e by -A w.
-    """
-    x, y, z = vector
-    none = np.zeros_like(x)
-    E = np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
-    a = np.linalg.norm(vector, axis=0)
-    square = np.einsum("ijn,jkn->ikn", E, E)
-    factor = 1.0 / a**2 - (1.0 + np.cos(a)) / (2.0 * a * np.sin(a))
-    return np.asarray(np.eye(3)[:, :, None] + 0.5 * E + factor * square)
 
 
 # --- closed forms --------------------------------------------------------------------------------------

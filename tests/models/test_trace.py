@@ -121,31 +121,8 @@ def test_euler_angles_trace_where_they_are_singular() -> None:
     assert euler_zxz(rotation_z(0.3).rotation) == pytest.approx((0.3, 0.0, 0.0, True), rel=TRACED)
 
 
-def test_lengths_and_tilts_trace_as_parameters() -> None:
-    rng = np.random.default_rng(12)
-    ranges = ((-1.0, 1.0, 6), (0.1, 0.3, 7), (0.0, 1.5, 6))
-    samples = [[rng.uniform(*limits).tolist() for limits in ranges] for _ in range(20)]
-
-    def arm(lengths: Sequence[Any], tilts: Sequence[Any]) -> Chain:
-        return urm_chain("urm6", lengths, tilts)
-
-    assert_traces(lambda q, *x: (forward(arm(*x), q)[-1].translation, jacobian(arm(*x), q)), samples)
-    assert_traces(lambda q, *x: entries(point_motions(arm(*x), q, [0.0] * 6, q)[-1]), samples, size=20.0)
-
-
-def test_one_trace_serves_a_float_and_a_column() -> None:
-    chain = load_robot("urm4")
-    q = casadi.SX.sym("q", 4)
-    pose = casadi.Function("pose", [q], [casadi.vertcat(*forward(chain, q.elements())[-1].translation)])
-    rows = np.random.default_rng(13).uniform(-4.0, 4.0, (50, 4))
-    columns = forward(chain, list(rows.T))[-1].translation
-    singles = [forward(chain, row)[-1].translation for row in rows.tolist()]
-    np.testing.assert_array_equal(np.column_stack(columns), singles)
-    np.testing.assert_allclose(np.array(pose.map(50)(rows.T)).T, singles, rtol=0.0, atol=TRACED)
-
-
 def arms_of(x: Sequence[Any]) -> list[Chain]:
-    """Return arms of every kind by 12 lengths and angles: rows of DH, articulated, sliding, following."""
+    """Return arms of every kind by 13 lengths and angles: DH, articulated, sliding, following, URM."""
     kinds: tuple[JointKind, ...] = ("revolute", "fixed", "prismatic")
     rows = [
         DHRow(x[k], x[k + 1], x[k + 2], x[k + 3], kind=kind) for k, kind in zip((0, 4, 8), kinds, strict=True)
@@ -157,20 +134,21 @@ def arms_of(x: Sequence[Any]) -> list[Chain]:
         modified_dh_chain("modified", rows),
         articulated_6r(*x[:5]),
         Chain("follows", (Joint("a"), slides, follows), translation(*x[6:9])),
+        urm_chain("urm6", x[:7], x[7:]),
     ]
 
 
-@pytest.mark.parametrize("number", range(4), ids=["dh", "modified", "articulated", "follows"])
+@pytest.mark.parametrize("number", range(5), ids=["dh", "modified", "articulated", "follows", "urm"])
 def test_arms_of_every_kind_trace_with_all_their_parameters(number: int) -> None:
-    joints = len(arms_of([0.1] * 12)[number].coordinates)
+    joints = len(arms_of([0.1] * 13)[number].coordinates)
     rng = np.random.default_rng(15)
-    samples = [[rng.uniform(0.1, 1.0, 12), rng.uniform(-1.0, 1.0, joints)] for _ in range(10)]
+    samples = [[rng.uniform(0.1, 1.0, 13), rng.uniform(-1.0, 1.0, joints)] for _ in range(20)]
 
-    def function(parameters: Sequence[Any], q: Sequence[Any]) -> list[Any]:
-        arm = arms_of(parameters)[number]
-        return [*entries(point_motions(arm, q, q, q)[-1]), jacobian(arm, q)]
+    def arm(x: Sequence[Any]) -> Chain:
+        return arms_of(x)[number]
 
-    assert_traces(function, samples, size=100.0)
+    assert_traces(lambda x, q: (forward(arm(x), q)[-1].translation, jacobian(arm(x), q)), samples)
+    assert_traces(lambda x, q: entries(point_motions(arm(x), q, q, q)[-1]), samples, size=20.0)
 
 
 @pytest.mark.parametrize("name", ["urm4", "ur5e", "panda", "articulated6r"])

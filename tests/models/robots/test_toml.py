@@ -28,9 +28,9 @@ def bits(chain: Chain) -> str:
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_toml_file_and_a_dictionary_are_the_same_chain_bit_by_bit(
-    visual_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
+    heavy_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
 ) -> None:
-    chain = data.draw(visual_chains)
+    chain = data.draw(heavy_chains)
     path = tmp_path / f"{chain.name or 'x'}.toml" if chain.name.isalnum() else tmp_path / "x.toml"
     path.write_text(robot_toml(chain), encoding="utf-8", newline="\n")
     of_json = json.loads(json.dumps(chain_to_dict(chain), allow_nan=False))  # infinities are null

@@ -50,10 +50,10 @@ def assert_same(chain: Chain, back: Chain) -> None:
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_the_file_read_back_is_the_same_chain(
-    visual_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
+    heavy_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
 ) -> None:
     """With its efforts, its masses on each joint in order, and its shapes likewise."""
-    chain = data.draw(visual_chains)
+    chain = data.draw(heavy_chains)
     write_urdf(chain, tmp_path / "chain.urdf")
     back = read_urdf(tmp_path / "chain.urdf")
     assert_same(chain, back)
