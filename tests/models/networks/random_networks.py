@@ -191,29 +191,24 @@ def reframed(network: Network, rng: np.random.Generator, size: float = 1.0) -> N
     """Return a network whose joints' frames in its bodies are seen from others: the same mechanism."""
     moved = {one.name: random_pose(rng, size) for one in network.bodies} | {network.ground: np.eye(4)}
 
-    def frame(one: Joint, k: int) -> Transform:
-        return transform(np.linalg.inv(moved[one.bodies[k]]) @ matrix(one.frames[k]))
+    def frames(one: Joint) -> tuple[Transform, Transform]:
+        first, second = (
+            np.linalg.inv(moved[name]) @ matrix(A) for name, A in zip(one.bodies, one.frames, strict=True)
+        )
+        return transform(first), transform(second)
 
-    def point(one: ConstraintElement, k: int) -> Vec:
-        return vec(into(moved[one.bodies[k]], np.array(one.points[k])))
+    def seen(one: ConstraintElement) -> ConstraintElement:
+        first, second = (moved[name] for name in one.bodies)
+        n = np.array(one.normals[0])
+        # h counts from the origin of the first body
+        lift = f" - ({float(n @ first[:3, 3])!r})" if one.kind == "eg" else ""
+        points = vec(into(first, np.array(one.points[0]))), vec(into(second, np.array(one.points[1])))
+        normals = vec(first[:3, :3].T @ n), vec(second[:3, :3].T @ np.array(one.normals[1]))
+        return replace(one, length=Expression(one.length.text + lift), points=points, normals=normals)
 
-    def normal(one: ConstraintElement, k: int) -> Vec:
-        return vec(moved[one.bodies[k]][:3, :3].T @ np.array(one.normals[k]))
-
-    joints = tuple(replace(one, frames=(frame(one, 0), frame(one, 1))) for one in network.joints)
-    elements = tuple(
-        replace(one, length=lifted(one, moved[one.bodies[0]]), points=(point(one, 0), point(one, 1)),
-                normals=(normal(one, 0), normal(one, 1)))
-        for one in network.elements
-    )  # fmt: skip
+    joints = tuple(replace(one, frames=frames(one)) for one in network.joints)
+    elements = tuple(map(seen, network.elements))
     return replace(network, joints=joints, elements=elements)
-
-
-def lifted(element: ConstraintElement, moved: FloatArray) -> Expression:
-    """Return the length of an element whose first body is seen from elsewhere: h counts from its origin."""
-    if element.kind != "eg":
-        return element.length
-    return Expression(f"{element.length.text} - ({float(np.array(element.normals[0]) @ moved[:3, 3])!r})")
 
 
 def difference(function: Callable[[FloatArray], FloatArray], x: FloatArray, step: float = 1e-3) -> FloatArray:

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from known_mechanisms import four_bar_angles, four_bar_tables, tables_of
 from random_networks import FIRST, SECOND, assert_close, joint_matrix
 from test_higher_pairs import shaft
-from test_shipped import Answer, Rssr, Tables, bennett, rccc, rssr, slider_crank
+from test_shipped import Answer, Tables, bennett, bricard, rccc, rssr, slider_crank
 from urmpipe import load_network, network_drive
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.file import network_names
@@ -47,16 +47,6 @@ def planar(links: Sequence[float], crank: float = 0.9, sign: int = 1, **more: di
 # ---------------------------------------------------------------------------------------- closed forms
 
 
-def bricard(t: float) -> Answer:
-    """Return the smooth branch: A cos f + B sin f = C of its file with A^2 + B^2 - C^2 = D^2.
-
-    D = 2 sin(alpha) cos(t/2) where tan(alpha)^2 = 3. Its sign changes at t = pi, where both branches cross.
-    """
-    A, B, C = 0.75 + 1.25 * math.cos(t), -math.sin(t), -0.25 - 0.75 * math.cos(t)
-    f = math.atan2(B, A) + math.atan2(math.sqrt(3.0) * math.cos(t / 2), C)
-    return {"t2": (f,), "t3": (t,), "t4": (f,), "t5": (t,), "t6": (f,)}
-
-
 def four_bar(t: float) -> Answer:
     return {name: (angle,) for name, angle in four_bar_angles(CRANK_ROCKER, t).items() if name != "crank"}
 
@@ -67,18 +57,20 @@ def rccc_answer(t: float) -> Answer:
     return rccc(a, alpha, 0.05, t)[1]
 
 
-def bennett_answer(t: float) -> Answer:
-    return bennett(math.asin(0.6), math.asin(0.8), t)[0]
+def bricard_answer(t: float) -> Answer:
+    """Return the smooth branch: it is the other one beyond t = pi, where both branches cross."""
+    return bricard(PI / 3, t, margin=1.0)[math.cos(t / 2) < 0]
 
 
-RSSR = Rssr(0.15, 0.05, 0.4, 0.25, 0.04, 0.4, 0.1, math.atan2(0.6, 0.8))
+RSSR = (0.15, 0.05, 0.4, 0.25, 0.04, 0.4, 0.1), math.atan2(0.6, 0.8)
 
 CLOSED: dict[str, tuple[tuple[float, float], Callable[[float], Answer]]] = {
     "four-bar": ((1, 1 - 2 * TURN), four_bar),
     "slider-crank": ((0, TURN), lambda t: slider_crank(0.3, 0.8, 0.1, t)[1]),
-    "rssr": ((0, TURN), lambda t: rssr(RSSR, t)[0]),
-    "bennett": ((-3, 9), bennett_answer),  # through 0 and pi, where it is flat
-    "bricard": ((-1, 5), bricard),  # through pi, where two branches cross
+    "rssr": ((0, TURN), lambda t: rssr(*RSSR, t)[0]),
+    # through 0 and pi, where it is flat
+    "bennett": ((-3, 9), lambda t: bennett(math.asin(0.6), math.asin(0.8), t)[0]),
+    "bricard": ((-1, 5), bricard_answer),
     "rccc": ((0, TURN), rccc_answer),
     "screw-jack": ((-TURN, 3 * TURN), lambda t: {"rise": (0.005 * t / TURN,), "swivel": (-t,)}),
 }

@@ -195,29 +195,3 @@ def test_rules_are_derivatives(formula: str) -> None:
     scalar = rule(Taylor(u_at(0.3), 0.58, 0.6), Taylor(v_at(0.3), -0.1, -1.0))
     for part in ("value", "first", "second"):
         assert float(getattr(scalar, part)) == pytest.approx(getattr(found, part)[1], rel=1e-14, abs=0.0)
-
-
-@pytest.mark.parametrize("n", [0, 1, 2, 3])
-def test_powers_of_zero(n: int) -> None:
-    power = Taylor(np.array([0.0]), 0.7, 0.3) ** n
-    second = 0.3 * (n == 1) + 2 * 0.7**2 * (n == 2)
-    assert (power.value, power.first, power.second) == (0.0**n, 0.7 * (n == 1), second)
-
-
-def test_comparisons_are_of_the_values() -> None:
-    u, v = Taylor(np.array([1.0, 2.0]), 1.0), Taylor(np.array([2.0, 2.0]), -1.0)
-    results = (u < v, u <= v, u == v, u != 1.0, u >= 2.0)
-    expected = [[True, False], [True, True], [False, True], [False, True], [False, True]]
-    assert [np.asarray(result).tolist() for result in results] == expected
-
-
-NO_RULE: list[Callable[[Any], Any]] = [
-    np.arcsin, np.cosh, np.add.reduce, np.sum,
-    lambda u: np.sin(u, where=True), lambda u: np.concatenate((u, u)),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("call", NO_RULE)
-def test_a_function_without_a_rule_is_refused(call: Callable[[Any], Any]) -> None:
-    with pytest.raises(TypeError):
-        call(Taylor(np.array([0.1, 0.2]), 1.0))
