@@ -30,19 +30,16 @@ from urmpipe_models.robots.catalogue import load_robot
 
 Backend = Literal["native", "python"]
 
-SAME = 1e-12
-"""What the issue asks for, of the size of the values; sines of other libraries differ in the last place."""
+SAME = 1e-12  # of the size of the values; sines of other libraries differ in the last place
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 
-native = pytest.param("native", marks=needs_native)
-both_backends = pytest.mark.parametrize("backend", [native, "python"])
+both_backends = pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
 
 ROWS = np.random.default_rng(1).uniform(-3.0, 3.0, (30, 3))
 TABLE = Table(np.arange(30) * 7_000_000, ROWS)  # between the steps
 COLUMNS = [["q", "rad", 2], ["d", "m"]]
-ARM = with_drives(with_masses(load_robot("urm6")))
-"""The arm of importers/, where a log is run over a native `chain_dynamics` of it, too."""
+ARM = with_drives(with_masses(load_robot("urm6")))  # in importers/ a log is run over a native FMU of it, too
 
 UNITS: dict[str, tuple[str, dict[str, Any]]] = {
     "a URM arm with rates": ("kinematic_chain", {"robot": load_robot("urm6"), "rates": True}),

@@ -22,6 +22,7 @@ from urmpipe_models.arm.denavit_hartenberg import (
     modified_dh_chain,
     urm_chain,
 )
+from urmpipe_models.delta import delta, exceeds_tolerance
 from urmpipe_models.drives import (
     Drive,
     Gains,
@@ -77,7 +78,7 @@ def assert_traces(
     traced = casadi.Function("traced", symbols, [casadi.vertcat(*results)])
     for sample in samples:
         expected = np.array(flat(function(*sample)), dtype=float)
-        tolerance = size * TRACED if size else SAME * (1.0 + np.abs(expected).max())
+        tolerance = SAME * (1.0 + np.abs(expected).max()) if size is None else size * TRACED
         got = np.ravel(np.array(traced(*sample)))
         np.testing.assert_allclose(got, expected, rtol=0.0, atol=tolerance)
 
@@ -167,6 +168,15 @@ def test_a_pose_has_derivatives_by_every_parameter(name: str) -> None:
     slopes = np.array(casadi.Function("slopes", [x], [casadi.jacobian(pose, x)])(start))
     # up to 5 m; three derivatives by an angle
     assert_jacobian(lambda at: entries(at[:, 0].tolist()), slopes.T, start, third=5.0, size=5.0)
+
+
+def test_a_deviation_and_its_flag_trace_also_of_missing_values() -> None:
+    def of_points(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+        deviation = delta((a[0], a[1], a[2]), (b[0], b[1], b[2]))
+        return [deviation, exceeds_tolerance(deviation, 0.0035)]
+
+    samples = [[(1.0, 2.0, 3.0), (1.0, 2.0, 3.004)], [(1.0, 2.0, np.nan), (1.0, 2.0, 3.0)]]
+    assert_traces(of_points, samples, size=0.0)
 
 
 def drive_values(x: Sequence[Any]) -> list[Any]:
