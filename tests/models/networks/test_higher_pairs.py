@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from asserting import there
 from urmpipe import load_network, network_check, network_drive, network_solve
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.forces import Wrench, compute_forces
-from urmpipe_models.networks.joint_motion import transmission
 from urmpipe_models.networks.mechanism import build_mechanism
 
 UNEVEN = [[10, 0.0], [55, 4.0], [90, 9.0], [200, -3.0], [310, 1.5]]  # deg and mm
@@ -44,13 +42,13 @@ CAM = wheels({"kind": "cam", "profile": UNEVEN}, S=SLIDE)
 ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps
 
 
-def oracle(profile: list[list[float]]) -> CubicSpline:
+def spline_of(profile: list[list[float]]) -> CubicSpline:
     """Return SciPy's periodic spline of a profile in [deg] and [mm], in [rad] and [m]."""
     x, y = np.array([*profile, [profile[0][0] + 360, profile[0][1]]]).T
     return CubicSpline(np.radians(x), 1e-3 * y, bc_type="periodic", extrapolate="periodic")
 
 
-LIFT = float(oracle(UNEVEN)(math.radians(40)))  # m
+LIFT = float(spline_of(UNEVEN)(math.radians(40)))  # m
 INTERNAL = wheels({"kind": "gear", "teeth": [20, -80]}, B=shaft(("ground", "b"), 300))
 ROCKER = wheels({"kind": "cam", "profile": UNEVEN, "offset": 5}, R=shaft(("ground", "r"), 100))
 
@@ -104,24 +102,6 @@ def test_a_planetary_gear_moves_by_the_equation_of_willis() -> None:
     assert (there(found.mobility).mobility, found.structure) == (1, "closed chain")
 
 
-def test_a_cam_lifts_by_its_periodic_spline_of_columns_numbers_and_symbols() -> None:
-    import casadi as ca
-
-    (cam,) = load_network(CAM).elements
-    angles, spline = np.linspace(-20.0, 20.0, 4001), oracle(UNEVEN)
-    columns = transmission(cam, angles)
-    for order, column in enumerate(columns):  # lifts of 1e-2 m and their slopes: rounding
-        np.testing.assert_allclose(column, spline(angles, order), atol=(1e-15, 1e-14)[order])
-    symbol = ca.SX.sym("q")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
-        traced = ca.Function("cam", [symbol], [*transmission(cam, symbol)])
-    for k, angle in [*enumerate(angles.tolist())][::100]:
-        for column, number, symbolic in zip(columns, transmission(cam, angle), traced(angle), strict=True):
-            assert number == column[k]
-            assert float(symbolic) == pytest.approx(number, abs=1e-15)  # sums in another order
-
-
 def test_joints_of_denavit_hartenberg_elements_and_of_arms_are_coupled() -> None:
     tables = {
         "angle_unit": "deg",
@@ -147,7 +127,7 @@ def test_what_a_gear_is_off_by_is_an_angle() -> None:
 
 def test_a_driven_cam_moves_its_follower_with_the_derivatives_of_its_spline() -> None:
     motion = network_drive(CAM, {"turn": (0, 720)}, duration=1.0, torques={"S": -50.0})
-    spline, rate = oracle(UNEVEN), 4 * math.pi  # rad/s of the uniform drive
+    spline, rate = spline_of(UNEVEN), 4 * math.pi  # rad/s of the uniform drive
     angle = motion.joint_motion[0][:, motion.joints.index("A")]
     for order, values in enumerate(motion.joint_motion):
         expected = spline(angle, order) * rate**order

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any
 
+import casadi
 import numpy as np
 import pytest
 
 from random_networks import DOOR, FIRST, SECOND, difference, one_by_one
+from test_higher_pairs import CAM, UNEVEN, spline_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks import rates
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.elements import element_frame
 from urmpipe_models.networks.file import Network, load_network, network_names
+from urmpipe_models.networks.joint_motion import constraint_twists, transmission
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.rates import Taylor
 
@@ -39,12 +41,9 @@ KINDS: dict[str, Any] = {  # each kind of joint, each operator and function
 
 def traced(function: Callable[[Any], Sequence[Any]], size: int) -> Callable[[Any], FloatArray]:
     """Return a function of numbers that is computed by CasADi from symbols."""
-    import casadi as ca
-
-    symbols = [ca.SX.sym(f"x{k}") for k in range(size)]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
-        call = ca.Function("traced", symbols, [ca.vertcat(*map(ca.SX, function(symbols)))])
+    casadi.GlobalOptions.setNumpyMode(-1)
+    symbols = [casadi.SX.sym(f"x{k}") for k in range(size)]
+    call = casadi.Function("traced", symbols, [casadi.vertcat(*map(casadi.SX, function(symbols)))])
     return lambda x: np.array(call(*x)).ravel()
 
 
@@ -70,13 +69,30 @@ def test_poses_of_symbols_numbers_and_columns_are_the_same(network: Network) -> 
         np.testing.assert_allclose(symbols(x[:, k]), numbers, atol=1e-14)
 
 
-def test_the_frame_of_an_element_of_symbols_is_that_of_numbers() -> None:
+def test_frames_of_elements_and_what_joints_forbid_of_symbols_are_those_of_numbers() -> None:
+    joints = [one for one in load_network(KINDS).joints if one.kind != "user"]
+
     def entries(x: Sequence[Any]) -> list[Any]:
         frame = element_frame(x[0], x[1], x[2], x[3])
-        return [*frame.rotation[0], *frame.translation]
+        forbidden = [two for one in joints for two in constraint_twists(one, x[: len(one.units)], frame)]
+        twists = [entry for _, _, (w, v) in forbidden for entry in (*w, *v)]
+        return [*frame.rotation[0], *frame.translation, *twists]
 
     row = (0.3, -0.7, 0.2, 2.5)  # rounding of numbers near 1
     np.testing.assert_allclose(traced(entries, 4)(row), entries(row), atol=1e-15)
+
+
+def test_a_cam_lifts_by_its_periodic_spline_of_columns_numbers_and_symbols() -> None:
+    (cam,) = load_network(CAM).elements
+    angles, spline = np.linspace(-20.0, 20.0, 4001), spline_of(UNEVEN)
+    columns = np.array(transmission(cam, angles))
+    for order, column in enumerate(columns):  # lifts of 1e-2 m and their slopes: rounding
+        np.testing.assert_allclose(column, spline(angles, order), atol=(1e-15, 1e-14)[order])
+    symbols = traced(lambda x: transmission(cam, x[0]), 1)
+    for k in range(0, 4001, 100):
+        np.testing.assert_array_equal(columns[:, k], transmission(cam, float(angles[k])))
+        # sums in another order
+        np.testing.assert_allclose(symbols(angles[k : k + 1]), columns[:, k], atol=1e-15)
 
 
 # --- Newton steps
