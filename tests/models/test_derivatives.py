@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
-from typing import TypeAlias
 
 import numpy as np
 import pytest
@@ -53,7 +51,7 @@ def test_the_gradient_of_the_squared_miss_is_minus_j_transposed_e_at_any_target(
 
 @settings(max_examples=20, deadline=None)
 @given(data=st.data(), pose=st.booleans())
-def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObject, pose: bool) -> None:
+def test_it_is_so_for_any_chain(chains: SearchStrategy[Chain], data: st.DataObject, pose: bool) -> None:
     task, q = task_of(data.draw(chains), 3, pose=pose)
     error = task.error(q)
     if np.sqrt(error.angle2).max() < 3.0 * error.length:  # at half a turn the axis leaps
@@ -78,19 +76,14 @@ def test_the_miss_changes_by_the_jacobian_and_its_turn_by_that_of_the_logarithm(
 
 # --- closed forms --------------------------------------------------------------------------------------
 
-Quadric: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 
-
-@pytest.mark.parametrize(
-    ("of", "derivative"),
-    [(trigonometric._value, trigonometric._slope), (trigonometric._slope, trigonometric._curvature)],
-    ids=["slope", "curvature"],
-)
-def test_slope_and_curvature_of_a_quadric_are_its_derivatives(of: Quadric, derivative: Quadric) -> None:
+def test_slope_and_curvature_of_a_quadric_are_its_derivatives() -> None:
     rng = np.random.default_rng(3)
     k, x = rng.uniform(-1.0, 1.0, (6, 200)), rng.uniform(-4.0, 4.0, 200)
+    value, slope, curvature = trigonometric._value, trigonometric._slope, trigonometric._curvature
     # up to 2^3 of each of the three products, 1 of the two others
-    assert_slope(lambda h: of(k, x + h), derivative(k, x), third=40.0, size=6.0)
+    assert_slope(lambda h: value(k, x + h), slope(k, x), third=40.0, size=6.0)
+    assert_slope(lambda h: slope(k, x + h), curvature(k, x), third=40.0, size=6.0)
 
 
 @pytest.mark.parametrize("kinds", list(product((True, False), repeat=3)), ids=str)
