@@ -144,8 +144,10 @@ def test_perturbed_change_points_keep_the_branch_of_their_start(seed: int) -> No
         assert np.abs(apart(column(moved, "theta4"), theta4)).max() < 1e-8, case
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("end", "sign"), [(3.0, 1), (-3.0, 1), (3.0, -1)])
+ENDS = [(-3.0, 1), *(pytest.param(end, sign, marks=pytest.mark.slow) for end, sign in ((3.0, 1), (3.0, -1)))]
+
+
+@pytest.mark.parametrize(("end", "sign"), ENDS)
 def test_a_four_bar_that_cannot_turn_stops_at_its_limit(end: float, sign: int) -> None:
     """Its coupler and rocker are in line where (b + c)^2 = a^2 + d^2 - 2 a d cos(crank)."""
     links = (0.5, 0.5, 0.5, 1.2)
@@ -365,8 +367,8 @@ def test_transmission_and_dead_points_of_a_four_bar() -> None:
 def test_rates_and_forces_at_rows_where_branches_meet_are_those_of_the_motion() -> None:
     """A parallelogram turns its rocker with the crank: theta4' = crank', and the torque passes through."""
     tables = planar((0.4, 1.0, 0.4, 1.0))
-    moved = network_drive(tables, {"crank": (-PI / 2, PI)}, steps=150, torques={"theta4": -10.0})
-    assert [event.row for event in moved.events] == pytest.approx([50, 150], abs=1e-6)
+    moved = network_drive(tables, {"crank": (0.0, 1.5 * PI)}, steps=150, torques={"theta4": -10.0})
+    assert [event.row for event in moved.events] == pytest.approx([0, 100], abs=1e-6)
     _, rates, accelerations = moved.joint_motion
     assert_close(np.abs(rates), TURN, 1e-7)  # polynomials of 7th degree, rows 4 mm apart
     assert_close(accelerations, 0.0, 1e-4)  # 39 rad/s2 would be the crank's centripetal one

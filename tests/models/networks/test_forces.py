@@ -67,8 +67,7 @@ def test_drives_and_loads_do_no_work_together(name: str) -> None:
     assert np.abs(np.sum(powers, axis=0) / size).max() < 1e-10
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["rccc", "rssr"])
+@pytest.mark.parametrize("name", [pytest.param("rccc", marks=pytest.mark.slow), "rssr"])
 def test_every_body_is_in_equilibrium(name: str) -> None:
     """Reactions are on second bodies, at the frames of joints, and opposite on first ones."""
     moved, forces, load, _ = loaded(name)
