@@ -267,6 +267,7 @@ def test_what_to_do_removes_the_causes(setup: dict[str, Any], parameters: list[s
     assert there(run.statistics["norm"]).rms == pytest.approx(diagnosis.remainder.rms, abs=2.6e-4)
 
 
+@pytest.mark.slow
 def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:
     table = pd.read_csv(RIGHT)
     table.assign(q3=np.degrees(table.q3)).to_csv("mixed.csv", index=False)

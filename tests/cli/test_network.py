@@ -145,6 +145,7 @@ def test_a_control_moves_on_the_branch_of_the_start_or_another_branch_is_reporte
     assert f"leads to crank = -2: it turns back at crank = {least:.6g}; " in ran.err
 
 
+@pytest.mark.slow
 def test_solves_with_the_last_values_as_start_stay_on_one_branch() -> None:
     found = api.network_solve("four-bar", controls={"crank": 0.0})
     for k in range(1, 74):

@@ -22,6 +22,7 @@ LINKAGE = ("network", "drive", "four-bar")
 TURN = (*LINKAGE, "crank=0:360deg", "--point", "coupler:0.45,0.2,0")
 
 
+@pytest.mark.slow
 def test_a_motion_is_printed_in_words_and_as_json(urmpipe: Run) -> None:
     ran = urmpipe(*TURN, "--steps", "20")
     assert (ran.code, ran.err) == (0, "")

@@ -109,6 +109,7 @@ def test_how_a_process_ended_is_reported(code: str, how: str) -> None:
     assert (report.ran, report.variables[0].before, report.variables[0].after) == (False, 0.0, None)
 
 
+@pytest.mark.slow
 def test_many_short_calls_do_not_hang() -> None:
     assert simulated(trouble_in("step", "usleep(200000);"), timeout=1.5).failed is None  # 2 s in all
 
@@ -118,6 +119,7 @@ def test_an_fmu_that_reads_its_input_gets_none() -> None:
     assert (run_problems(report), report.warnings, report.ran) == ((), (), True)
 
 
+@pytest.mark.slow
 def test_a_process_that_an_fmu_started_ends_with_it() -> None:
     code = f'int pid = fork(); if (!pid) {HANGS} LOG(m, fmi2Error, "%d", pid);'
     failed = there(simulated(trouble_in("step", f"{code} return fmi2Error;")).failed)

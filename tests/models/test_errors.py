@@ -25,6 +25,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 any_text = st.text(st.characters(exclude_categories=()))
 
 
+@pytest.mark.slow
 @given(name=st.text(min_size=1, max_size=9))
 @example("größe $HOME; 'a' \"b\" `c` \u2019")
 @example("q1\xa0\n\x7f\u2028")

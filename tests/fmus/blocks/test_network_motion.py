@@ -106,6 +106,7 @@ def test_an_fmu_follows_its_control_as_closely_as_a_converged_solution(name: str
         assert name == "rssr" or np.abs(np.diff(values)).max() < 0.05
 
 
+@pytest.mark.slow
 def test_a_four_bar_is_that_of_the_law_of_cosines_over_two_turns() -> None:
     model = make_block("network_motion", network="four-bar", points=["coupler:0.9,0,0"])
     crank = 0.9 + np.linspace(0.0, 2.0 * TURN, 401, dtype=np.float64)
@@ -122,6 +123,7 @@ def test_a_four_bar_is_that_of_the_law_of_cosines_over_two_turns() -> None:
     assert turned == pytest.approx(-2.0 * TURN, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_motion_goes_straight_on_where_branches_meet() -> None:
     """Where all hinges of Bricard's linkage are at pi, t2 changes by -0.27 or by -3.7 times the turn."""
     model = make_block("network_motion", network="bricard")
@@ -134,6 +136,7 @@ def test_a_motion_goes_straight_on_where_branches_meet() -> None:
     assert np.abs(np.diff(slope)).max() < 10.0 * h  # a bend would change it by 3.4 at once
 
 
+@pytest.mark.slow
 def test_a_rotation_vector_follows_three_turns_and_stays_within_half_a_turn() -> None:
     axis = np.array([0.48, 0.6, 0.64])
     parts: dict[str, Any] = {

@@ -41,6 +41,7 @@ SEEDS = st.integers(0, 10**6)
 WRENCH = Wrench((1.0, -2.0, 3.0), (0.5, 0.2, -0.4))
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None)
 @given(SEEDS)
 def test_power_mass_matrix_terms_recursion_and_forward_dynamics_are_one_equation(seed: int) -> None:

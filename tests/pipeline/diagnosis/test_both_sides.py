@@ -220,6 +220,7 @@ def test_all_joints_in_degrees_are_corrected_at_once(write: Write) -> None:
     assert hint.value == dict.fromkeys(run.run.log.joints, "deg")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["ur10e", "ur3"])
 def test_another_robot_on_a_turned_base_is_found_with_it(write: Write, robot: str) -> None:
     base = Transform(((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)))

@@ -62,6 +62,7 @@ STEMS = {
 }
 
 
+@pytest.mark.slow
 @given(
     stem=st.sampled_from([*STEMS]),
     done=st.tuples(st.sampled_from(MEASURED), STYLES),
