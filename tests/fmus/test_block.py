@@ -11,17 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_fmus.block import (
-    INTERNAL_STEP,
-    BlockModel,
-    Input,
-    Parameter,
-    State,
-    Table,
-    Values,
-    read_table,
-    table_bytes,
-)
+from small_models import block, variable
+from urmpipe_fmus.block import INTERNAL_STEP, Input, Parameter, State, Table, Values, read_table, table_bytes
 
 
 def test_values_are_copied_pickled_and_asked_as_any_object_is() -> None:
@@ -33,20 +24,15 @@ def test_values_are_copied_pickled_and_asked_as_any_object_is() -> None:
 
 
 def test_an_array_has_a_scalar_an_element_counted_from_one() -> None:
-    phi = Input(name="phi", description="", size=3, start=(1.0, 2.0, 3.0))
+    phi = variable(Input, "phi", size=3, start=(1.0, 2.0, 3.0))
     assert (phi.width, phi.names, phi.starts) == (3, ("phi[1]", "phi[2]", "phi[3]"), (1.0, 2.0, 3.0))
-    u = Input(name="u", description="", start=2)
+    u = variable(Input, "u", start=2)
     assert (u.width, u.names, u.starts) == (1, ("u",), (2.0,))
 
 
 def test_a_unit_with_states_has_the_integrators_step_as_a_fixed_parameter() -> None:
-    model = BlockModel(
-        name="u",
-        description="",
-        variables=(State(name="x", description=""), Parameter(name="k", description="")),
-        derivatives=lambda v: {"x": v.k},
-        internal_step=2e-3,
-    )
+    variables = variable(State, "x"), variable(Parameter, "k")
+    model = block(*variables, derivatives=lambda v: {"x": v.k}, internal_step=2e-3)
     assert [name for name, _ in model.scalars] == ["x", "k", INTERNAL_STEP]
     step = model.parameters[-1]
     assert (step.start, step.unit, step.minimum, step.variability) == (2e-3, "s", 1e-9, "fixed")
@@ -98,14 +84,6 @@ def test_where_half_a_nanosecond_is_an_ulp_the_time_is_not_rounded_again() -> No
     table = Table(np.array([odd - 1, odd, odd + 1]), np.array([[0.0], [1.0], [2.0]]))
     [seconds] = [t for t in (odd / 1e9, math.nextafter(odd / 1e9, 0.0)) if t * 1e9 == odd][:1]
     assert float(table.rows_at(seconds).before[0]) == 1.0
-
-
-def test_outside_the_table_its_ends_hold_without_a_fraction() -> None:
-    table = Table(np.array([10, 20]), np.array([[1.0, 5.0], [2.0, 6.0]]))
-    for time, before, after in ((-1.0, (1.0, 5.0), (2.0, 6.0)), (1.0, (2.0, 6.0), (2.0, 6.0))):
-        rows = table.rows_at(time)
-        assert (tuple(map(float, rows.before)), tuple(map(float, rows.after))) == (before, after)
-        assert float(rows.fraction) == 0.0
 
 
 def test_a_column_of_times_gives_what_each_of_them_gives() -> None:

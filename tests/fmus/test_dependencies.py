@@ -7,22 +7,16 @@ import pytest
 from hypothesis import given, settings
 
 from random_units import PATIENT, random_units
-from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, State, Table
+from small_models import block, variable
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, State, Table, Variable
 from urmpipe_fmus.dependencies import FUNCTIONS, TIME, Dependencies
 
 
 def test_every_function_of_a_unit_has_its_own_dependencies() -> None:
-    model = BlockModel(
-        name="u",
-        description="",
-        variables=(
-            Parameter(name="k", description=""),
-            Input(name="u", description="", size=2),
-            State(name="x", description=""),
-            Memory(name="m", description=""),
-            Output(name="y", description="", size=2),
-            Output(name="c", description=""),
-        ),
+    arrays = variable(Input, "u", size=2), variable(Output, "y", size=2)
+    kinds: dict[str, type[Variable]] = {"k": Parameter, "x": State, "m": Memory, "c": Output}
+    model = block(
+        *(*arrays, *(variable(kind, name) for name, kind in kinds.items())),
         outputs=lambda v: {"y": (v.x + v.table.before[0], v.u[1] * v.m), "c": 4.0},
         derivatives=lambda v: {"x": v.k * v.u[0]},
         update=lambda v: {"m": v.m + v.time},

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,34 +12,26 @@ from hypothesis import given, settings
 
 from asserting import refusal
 from random_units import PATIENT, UnitCase, random_cases
-from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Input, Memory, Output, Parameter, State, Variable
+from small_models import block, mixed, variable
+from stepped_unit import SteppedUnit
+from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Input, Memory, Output, Parameter, State
 from urmpipe_fmus.instance import Equations, Instance
 from urmpipe_fmus.run import run
 from urmpipe_models.errors import UnitError
 
-Kind = TypeVar("Kind", bound=Variable)
-
-
-def scalar(kind: type[Kind], name: str, **fields: Any) -> Kind:
-    return kind(name=name, description="", **fields)
-
-
-def block(*variables: Variable, name: str = "u", **functions: Any) -> BlockModel:
-    return BlockModel(name=name, description="", variables=variables, **functions)
-
 
 def unit_of(outputs: Any) -> BlockModel:
-    return block(scalar(Input, "x"), scalar(Output, "y"), scalar(Output, "p", size=2), outputs=outputs)
+    return block(variable(Input, "x"), variable(Output, "y"), variable(Output, "p", size=2), outputs=outputs)
 
 
 def test_elements_go_in_by_kind_and_come_out_in_order() -> None:
     model = block(
-        scalar(Output, "y"),
-        scalar(Memory, "m", size=2),
-        scalar(State, "s"),
-        scalar(Input, "i"),
-        scalar(Parameter, "p"),
-        scalar(Output, "w", size=2),
+        variable(Output, "y"),
+        variable(Memory, "m", size=2),
+        variable(State, "s"),
+        variable(Input, "i"),
+        variable(Parameter, "p"),
+        variable(Output, "w", size=2),
         outputs=lambda v: {"w": (v.s, v.m[1]), "y": v.p + 10.0 * v.i},
         derivatives=lambda v: {"s": v.time},
         update=lambda v: {"m": [v.m[1], v.m[0]]},
@@ -72,81 +63,49 @@ def test_a_division_by_zero_is_infinite_as_in_c_and_warns_nobody(recwarn: pytest
     assert not recwarn.list
 
 
-def mixed() -> BlockModel:
-    """A unit of every kind: y is fresh, m is the input of the point before, x the input's integral."""
-    return block(
-        scalar(Parameter, "k", start=2.0, minimum=0.0, maximum=10.0),
-        scalar(Parameter, "fixed", tunable=False),
-        scalar(Input, "u", minimum=-100.0, maximum=100.0),
-        scalar(Input, "n", type="Integer"),
-        scalar(State, "x", output=True),
-        scalar(Memory, "m", output=True),
-        scalar(Output, "y"),
-        outputs=lambda v: {"y": v.k * v.u + v.x + 100.0 * v.m},
-        derivatives=lambda v: {"x": v.u / (v.fixed - 1.0)},
-        update=lambda v: {"m": v.u},
-        internal_step=0.25,
-        name="mixed",
-    )
-
-
-def put(instance: Instance, **values: float) -> None:
-    instance.set([instance.reference(name) for name in values], list(values.values()))
-
-
-def put_arrays(instance: Instance, variables: Iterable[Variable], values: Mapping[str, Any]) -> None:
-    for variable in variables:
-        if variable.name in values:
-            references = [instance.reference(name) for name in variable.names]
-            instance.set(references, np.ravel(values[variable.name]).tolist())
-
-
-def shown(instance: Instance, *names: str) -> list[float]:
-    return [float(one) for one in instance.get([instance.reference(name) for name in names])]
-
-
 def everything(instance: Instance) -> tuple[Any, ...]:
     return (instance.time, *instance.get(range(len(instance.model.scalars))))
 
 
 def test_an_output_is_that_of_the_inputs_as_they_stand_without_a_step() -> None:
-    instance = Instance(mixed())
+    instance = SteppedUnit(mixed())
     for u in (3.0, -1.0):
-        put(instance, u=u)
-        assert shown(instance, "y") == [2.0 * u]
-    put(instance, k=5.0)
-    assert shown(instance, "y") == [-5.0]
+        instance.put(u=u)
+        assert instance.read("y").tolist() == [2.0 * u]
+    instance.put(k=5.0)
+    assert instance.read("y").tolist() == [-5.0]
 
 
 def test_a_step_takes_the_sample_first_and_integrates_with_the_inputs_held() -> None:
-    instance = Instance(mixed())
-    put(instance, u=3.0)
+    instance = SteppedUnit(mixed())
+    instance.put(u=3.0)
     instance.do_step(0.0, 0.5)
-    assert shown(instance, "m", "x", "y") == [3.0, -1.5, 6.0 - 1.5 + 300.0]
-    put(instance, u=1.0)
-    assert shown(instance, "m", "y") == [3.0, 2.0 - 1.5 + 300.0]  # m is still the sample of the point before
+    assert instance.read("m", "x", "y").tolist() == [3.0, -1.5, 6.0 - 1.5 + 300.0]
+    instance.put(u=1.0)
+    # m is still the sample of the point before
+    assert instance.read("m", "y").tolist() == [3.0, 2.0 - 1.5 + 300.0]
     instance.do_step(0.5, 0.5)
-    assert shown(instance, "m", "x") == [1.0, -2.0]
+    assert instance.read("m", "x").tolist() == [1.0, -2.0]
 
 
 def test_fixed_parameters_states_and_memories_are_set_before_the_first_step_only() -> None:
-    instance = Instance(mixed())
-    put(instance, fixed=3.0, x=4.0, m=5.0, internal_step=0.1)
-    assert shown(instance, "fixed", "x", "m", INTERNAL_STEP) == [3.0, 4.0, 5.0, 0.1]
+    instance = SteppedUnit(mixed())
+    instance.put(fixed=3.0, x=4.0, m=5.0, internal_step=0.1)
+    assert instance.read("fixed", "x", "m", INTERNAL_STEP).tolist() == [3.0, 4.0, 5.0, 0.1]
     instance.do_step(0.0, 1.0)
-    put(instance, k=1.0, u=2.0)  # tunable, and an input
+    instance.put(k=1.0, u=2.0)  # tunable, and an input
 
 
 def test_a_step_whose_states_fail_leaves_all_as_it_was() -> None:
-    instance = Instance(mixed())
-    put(instance, fixed=1.0, u=2.0)
+    instance = SteppedUnit(mixed())
+    instance.put(fixed=1.0, u=2.0)
     before = everything(instance)
     assert refusal(UnitError, instance.do_step, 0.0, 1.0) == "unit mixed: state x is not finite at 0 s"
     assert everything(instance) == before  # also the sample that was taken before the states failed
 
 
 def test_a_step_may_pass_the_stop_time_by_what_rounding_adds() -> None:
-    instance = Instance(mixed())
+    instance = SteppedUnit(mixed())
     instance.setup_experiment(0.0, 0.5)
     instance.do_step(0.0, 0.4)
     instance.do_step(0.4, 0.1001)
@@ -159,37 +118,37 @@ def test_an_error_of_the_functions_undoes_the_step_too() -> None:
         return {"x": {0.0: 1.0}[float(v.x)]}  # fails once x has moved
 
     model = block(
-        scalar(State, "x"), scalar(Memory, "m"), derivatives=rates, update=lambda v: {"m": v.m + 1.0}
+        variable(State, "x"), variable(Memory, "m"), derivatives=rates, update=lambda v: {"m": v.m + 1.0}
     )
-    instance = Instance(model)
+    instance = SteppedUnit(model)
     with pytest.raises(UnitError, match="unit u: derivatives: KeyError"):
         instance.do_step(0.0, 1.0)
     assert everything(instance)[:3] == (0.0, 0.0, 0.0)
 
 
 def test_an_output_that_is_not_finite_is_an_error_until_its_inputs_are_mended() -> None:
-    model = block(scalar(Input, "u"), scalar(Output, "y"), outputs=lambda v: {"y": 1.0 / v.u})
-    instance = Instance(model, 2.5)
+    model = block(variable(Input, "u"), variable(Output, "y"), outputs=lambda v: {"y": 1.0 / v.u})
+    instance = SteppedUnit(model)
+    instance.setup_experiment(2.5)
     for _ in range(2):
         with pytest.raises(UnitError, match=r"^unit u: output y is not finite at 2.5 s$"):
-            shown(instance, "y")
-        assert shown(instance, "u") == [0.0]
-    put(instance, u=4.0)
-    assert shown(instance, "y") == [0.25]
+            instance.read("y")
+        assert instance.read("u").tolist() == [0.0]
+    instance.put(u=4.0)
+    assert instance.read("y").tolist() == [0.25]
 
 
 def error_at(step: float) -> float:
     """The error at t = 2 of x' = -2 t x^2, x(0) = 1, of which x = 1 / (1 + t^2)."""
     model = block(
-        scalar(State, "x", start=1.0),
+        variable(State, "x", start=1.0),
         derivatives=lambda v: {"x": -2.0 * v.time * v.x * v.x},
         internal_step=step,
         name="ode",
     )
-    instance = Instance(model)
-    for k in range(4):
-        instance.do_step(0.5 * k, 0.5)
-    return abs(shown(instance, "x")[0] - 0.2)
+    instance = SteppedUnit(model)
+    instance.steps(4, 0.5)
+    return abs(float(instance.read("x")[0]) - 0.2)
 
 
 def test_the_error_falls_with_the_fourth_power_of_the_internal_step() -> None:
@@ -205,7 +164,7 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
         times.append(float(v.time))
         return {"x": 0.0}
 
-    model = block(scalar(State, "x"), derivatives=rates, internal_step=0.1)
+    model = block(variable(State, "x"), derivatives=rates, internal_step=0.1)
     steps = ((0.0, 0.3, 3), (0.3, 0.6 - 0.3, 3), (0.0, 0.05, 1), (0.0, 0.1001, 2), (1.0, 0.35, 4))
     for time, step, count in steps:
         times.clear()
@@ -221,13 +180,13 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
 @given(random_cases(6))
 def test_a_restored_instance_goes_on_bit_by_bit(case: UnitCase) -> None:
     model, start, columns = case
-    instance = Instance(model)
-    put_arrays(instance, model.arguments, start)
+    instance = SteppedUnit(model)
+    instance.put(**start)
 
     def go(first: int, last: int) -> list[Any]:
         seen = []
         for k in range(first, last):
-            put_arrays(instance, model.inputs, {name: column[k] for name, column in columns.items()})
+            instance.put(**{name: column[k] for name, column in columns.items()})
             seen.append(everything(instance))
             instance.do_step(0.01 * k, 0.01)
         return [*seen, everything(instance)]
@@ -239,36 +198,36 @@ def test_a_restored_instance_goes_on_bit_by_bit(case: UnitCase) -> None:
     instance.restore(saved)
     assert go(3, 6) == expected
     assert pickle.dumps(saved) == kept  # going on has not changed what was saved
-    other = Instance(model)
+    other = SteppedUnit(model)
     other.restore(pickle.loads(kept))
     instance = other
     assert go(3, 6) == expected
 
 
 def test_saving_keeps_whether_it_runs() -> None:
-    instance = Instance(mixed())
+    instance = SteppedUnit(mixed())
     saved = instance.save()
     instance.do_step(0.0, 1.0)
     instance.restore(saved)
-    put(instance, fixed=3.0)
-    assert shown(instance, "fixed") == [3.0]
+    instance.put(fixed=3.0)
+    assert instance.read("fixed").tolist() == [3.0]
 
 
 def test_runs_side_by_side_are_the_single_runs() -> None:
     k = np.array([1.0, 2.0, 5.0])
-    together = Instance(mixed())
+    together = SteppedUnit(mixed())
     together.set([together.reference("k"), together.reference("u")], [k, np.array([3.0, -1.0, 0.5])])
     together.do_step(0.0, 0.5)
     [y, x] = together.get([together.reference("y"), together.reference("x")])
     for index, u in enumerate((3.0, -1.0, 0.5)):
-        single = Instance(mixed())
-        put(single, k=float(k[index]), u=u)
+        single = SteppedUnit(mixed())
+        single.put(k=float(k[index]), u=u)
         single.do_step(0.0, 0.5)
-        assert [y[index], x[index]] == shown(single, "y", "x")
+        assert [y[index], x[index]] == single.read("y", "x").tolist()
 
 
 def test_a_column_is_refused_for_any_row_and_kept_as_it_was() -> None:
-    instance, column = Instance(mixed()), np.array([1.0, 101.0, 3.0])
+    instance, column = SteppedUnit(mixed()), np.array([1.0, 101.0, 3.0])
     for wrong, said in ((101.0, "found 101"), (math.nan, "found nan"), (-math.inf, "found -inf")):
         column[1] = wrong
         with pytest.raises(UnitError, match=f"^unit mixed: u: {said}, allowed"):
@@ -283,11 +242,11 @@ def test_a_column_is_refused_for_any_row_and_kept_as_it_was() -> None:
 
 def gain(**more: Any) -> BlockModel:
     return block(
-        scalar(Parameter, "k", start=2.0, minimum=0.0),
-        scalar(Input, "u", size=2, start=(1.0, 3.0)),
-        scalar(Output, "y", size=2),
-        scalar(Output, "t"),
-        scalar(Output, "one"),
+        variable(Parameter, "k", start=2.0, minimum=0.0),
+        variable(Input, "u", size=2, start=(1.0, 3.0)),
+        variable(Output, "y", size=2),
+        variable(Output, "t"),
+        variable(Output, "one"),
         outputs=lambda v: {"y": tuple(v.k * u for u in v.u), "t": v.time, "one": 1.0},
         **more,
         name="gain",
@@ -309,9 +268,9 @@ def test_outputs_are_columns_and_inputs_that_are_not_given_stay_at_their_start()
 
 def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
     model = block(
-        scalar(Input, "u"),
-        scalar(Memory, "m", output=True),
-        scalar(Output, "y"),
+        variable(Input, "u"),
+        variable(Memory, "m", output=True),
+        variable(Output, "y"),
         outputs=lambda v: {"y": v.m + v.u},
         update=lambda v: {"m": v.m + v.u},
         name="sum",
@@ -328,10 +287,10 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
 def test_a_unit_without_memory_gives_at_once_what_it_gives_step_by_step(case: UnitCase) -> None:
     model, start, columns = case
     t = np.array([0.0, 0.125, 0.25, 0.375, 0.5])  # t + h is exact
-    found, instance = run(model, t, columns, start), Instance(model)
-    put_arrays(instance, model.arguments, start)
+    found, instance = run(model, t, columns, start), SteppedUnit(model)
+    instance.put(**start)
     for k, time in enumerate(t):
-        put_arrays(instance, model.inputs, {name: column[k] for name, column in columns.items()})
+        instance.put(**{name: column[k] for name, column in columns.items()})
         for one in model.computed:
             seen = instance.get([instance.reference(name) for name in one.names])
             # NumPy computes a column's sine with other instructions than a number's: last places differ

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from loaded_fmu import Loaded
-from urmpipe_fmus.block import BlockModel, Input, Output
+from small_models import block, variable
+from urmpipe_fmus.block import Input, Output
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.dependencies import FUNCTIONS, LOGICAL
 
@@ -48,13 +49,8 @@ def outputs(x: Any, y: Any) -> dict[str, Any]:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of what is not finite, which is meant here
 def test_each_function_gives_what_numpy_gives(tmp_path: Path) -> None:
     names = [f"np_{name}" for name in FUNCTIONS] + ["angle"]
-    variables = [*(Input(name=name, description="") for name in "xy")]
-    model = BlockModel(
-        name="all_functions",
-        description="",
-        variables=(*variables, *(Output(name=name, description="") for name in names)),
-        outputs=lambda v: outputs(v.x, v.y),
-    )
+    variables = [*(variable(Input, name) for name in "xy"), *(variable(Output, name) for name in names)]
+    model = block(*variables, name="all_functions", outputs=lambda v: outputs(v.x, v.y))
     fmu = Loaded(build_fmu(model, tmp_path, backend="native").path).fmu
     assert fmu.getReal([2 + len(FUNCTIONS)]) == [-np.pi]  # atan2 tells signs of zero apart by half a turn
     rng = np.random.default_rng(5)

@@ -15,7 +15,9 @@ from fmpy.validation import validate_fmu
 from asserting import refusal
 from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
-from urmpipe_fmus.block import BlockModel, Input, Output
+from small_models import block, variable
+from stepped_unit import needs_native
+from urmpipe_fmus.block import Input, Output
 from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.fmu_file import content_guid
@@ -23,9 +25,6 @@ from urmpipe_fmus.native import native_unavailable_reason, this_platform
 from urmpipe_models.errors import FmuError
 from urmpipe_models.robots.catalogue import load_robot
 from written_units import TABLE, unit_of
-
-WHY = native_unavailable_reason([this_platform()])
-needs_native = pytest.mark.skipif(WHY is not None, reason=f"needs the native backend: {WHY}")
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -126,13 +125,8 @@ def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: s
 def test_numbers_of_numpy_are_numbers_in_c_and_in_the_description(tmp_path: Path) -> None:
     angles = tuple(np.deg2rad([30.0, 45.0]))
     bounds = {"minimum": np.deg2rad(-90), "maximum": np.float64(1.5)}
-    phi = Input(name="phi", description="", size=2, start=angles, **bounds)
-    model = BlockModel(
-        name="angles",
-        description="",
-        variables=(phi, Output(name="y", description="")),
-        outputs=lambda v: {"y": v.phi[0] + v.phi[1]},
-    )
+    phi = variable(Input, "phi", size=2, start=angles, **bounds)
+    model = block(phi, variable(Output, "y"), name="angles", outputs=lambda v: {"y": v.phi[0] + v.phi[1]})
     fmu = Loaded(build_fmu(model, tmp_path, backend="native").path)
     first = fmu.described.modelVariables[0]
     assert [float(one) for one in (first.start, first.min, first.max)] == [np.pi / 6.0, -np.pi / 2.0, 1.5]

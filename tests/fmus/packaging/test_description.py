@@ -14,20 +14,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lxml import html  # type: ignore[import-untyped]
 
-from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, Table
+from small_models import BOUNDED
+from urmpipe_fmus.block import BlockModel, Input, Output, Table
 from urmpipe_fmus.build.description import documentation, model_description
 from written_units import NAMES, unit_of
 
 NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """XML 1.0, production 2."""
-BOUNDED = BlockModel(
-    name="bounded",
-    description="",
-    variables=(
-        Parameter(name="n", description="", type="Integer", minimum=-1.5, maximum=1e12),
-        Input(name="b", description="", type="Boolean", minimum=0, maximum=1),
-    ),
-)
 
 
 @pytest.mark.parametrize("name", [*NAMES, "bounded"])
