@@ -20,7 +20,6 @@ def se3(frame: Transform) -> Any:
 def pinocchio_model(chain: Chain) -> Any:
     """Build a chain without mimics, with its masses; its points are the frames p1, p2, ..., tool."""
     model, parent, frame = pinocchio.Model(), 0, se3(chain.base)
-    add_bodies(model, parent, frame, chain, None)
     for k, joint in enumerate(chain.joints):
         at_joint = frame * se3(joint.origin)
         add_frame(model, f"p{k}", parent, pinocchio.SE3(frame.rotation, at_joint.translation))
@@ -30,20 +29,16 @@ def pinocchio_model(chain: Chain) -> Any:
             kind = pinocchio.JointModelRevoluteUnaligned if turns else pinocchio.JointModelPrismaticUnaligned
             parent = model.addJoint(parent, kind(np.array(joint.axis)), frame, joint.name)
             frame = pinocchio.SE3.Identity()
-        add_bodies(model, parent, frame, chain, joint.name)
+        for body in chain.inertials:
+            if body.joint == joint.name and parent:
+                ixx, iyy, izz, ixy, ixz, iyz = body.inertia
+                inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+                solid = pinocchio.Inertia(body.mass, np.array(body.centre), inertia)
+                model.appendBodyToJoint(parent, solid, frame)
     add_frame(model, "tool", parent, frame * se3(chain.tip) * se3(chain.tool))
     model.gravity.linear = np.array(chain.gravity)
     return model
 
 
-def add_frame(model: Any, name: str, parent: int, placement: Any) -> int:
-    return int(model.addFrame(pinocchio.Frame(name, parent, placement, pinocchio.FrameType.OP_FRAME)))
-
-
-def add_bodies(model: Any, parent: int, frame: Any, chain: Chain, joint: str | None) -> None:
-    for body in chain.inertials:
-        if body.joint == joint and parent:
-            ixx, iyy, izz, ixy, ixz, iyz = body.inertia
-            inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-            solid = pinocchio.Inertia(body.mass, np.array(body.centre), inertia)
-            model.appendBodyToJoint(parent, solid, frame)
+def add_frame(model: Any, name: str, parent: int, placement: Any) -> None:
+    model.addFrame(pinocchio.Frame(name, parent, placement, pinocchio.FrameType.OP_FRAME))

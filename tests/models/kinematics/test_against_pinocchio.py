@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from urmpipe_models.robots.urdf_writer import write_urdf
 AGREES = 1e-12
 
 
-def assert_same(model: Any, frames: Sequence[str], chain: Chain) -> None:
+def assert_same(model: Any, frames: list[str], chain: Chain) -> None:
     """Compare 1000 poses: the position of each frame, and of the last one the orientation."""
     q = np.random.default_rng(7).uniform(-math.pi, math.pi, (1000, len(chain.coordinates)))
     position, rotation = poses_over_log(chain, q)
@@ -36,10 +35,8 @@ def assert_same(model: Any, frames: Sequence[str], chain: Chain) -> None:
     data, joints = model.createData(), list(model.joints)[1:]
     for k, row in enumerate(q):
         values = np.append(row, np.zeros(len(joints) - len(row)))  # fingers that the chain does not have
-        parts = [  # a continuous joint is a cosine and a sine
-            [math.cos(value), math.sin(value)] if joint.nq == 2 else [value]
-            for joint, value in zip(joints, values, strict=True)
-        ]
+        pairs = zip(joints, values, strict=True)  # a continuous joint is a cosine and a sine
+        parts = [[math.cos(value), math.sin(value)] if joint.nq == 2 else [value] for joint, value in pairs]
         pinocchio.framesForwardKinematics(model, data, np.concatenate(parts))
         poses = [data.oMf[model.getFrameId(frame)] for frame in frames]
         expected = [pose.translation for pose in (*poses, poses[-1])]
@@ -61,11 +58,8 @@ BY_HAND = {  # roll, pitch, x, z from each axis to the next, and after the last
 
 @pytest.mark.parametrize("robot", BY_HAND)
 def test_arms_are_those_built_by_hand(robot: str) -> None:
-    model, parent = pinocchio.Model(), 0
-    links = [
-        pinocchio.SE3(pinocchio.rpy.rpyToMatrix(roll, pitch, 0.0), np.array([x, 0.0, z]))
-        for roll, pitch, x, z in BY_HAND[robot]
-    ]
+    model, parent, turn = pinocchio.Model(), 0, pinocchio.rpy.rpyToMatrix
+    links = [pinocchio.SE3(turn(a, b, 0.0), np.array([x, 0.0, z])) for a, b, x, z in BY_HAND[robot]]
     for k in range(6):
         parent = model.addJoint(parent, pinocchio.JointModelRZ(), links[k], f"q{k}")
     add_frame(model, "tool", parent, math.prod(links[6:], start=pinocchio.SE3.Identity()))
@@ -95,9 +89,7 @@ def test_urdfs_of_others(shared: Path, file: str, tip: str) -> None:
 
 @settings(deadline=None, max_examples=25)
 @given(data=st.data(), seed=st.integers(0, 2**32 - 1))
-def test_motion_and_jacobian_of_every_point(
-    chains: SearchStrategy[Chain], data: st.DataObject, seed: int
-) -> None:
+def test_motions_and_jacobians(chains: SearchStrategy[Chain], data: st.DataObject, seed: int) -> None:
     chain = data.draw(chains.filter(lambda chain: not any(joint.mimic for joint in chain.joints)))
     model, aligned = pinocchio_model(chain), pinocchio.LOCAL_WORLD_ALIGNED
     state = model.createData()

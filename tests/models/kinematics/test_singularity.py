@@ -26,7 +26,6 @@ from urmpipe_models.robots.catalogue import load_robot, robot_names
 ARM6 = load_robot("arm6")
 
 SINGULAR = 1e-14  # a singular value that is zero but for the rounding of entries of about 1
-
 REGULAR = 1e-3  # far from singular: twelve digits of the least motion remain
 
 
@@ -59,29 +58,20 @@ def test_the_factors_of_arm6_are_its_determinant() -> None:
 
 # Singular poses of the paper, and corrections in errata.md
 ELBOW = 0.7 - math.pi / 2  # theta3 of an elbow that is neither stretched nor withdrawn
-
-
-def wrist_on_axis_1(t3: float) -> float:
-    """Return theta2 that brings the wrist of arm6 onto axis 1: X = 0."""
-    a1, a2, a4, d5 = Arm6Lengths()
-    along, across = a2 - a4 * math.sin(t3) - d5 * math.cos(t3), -a4 * math.cos(t3) + d5 * math.sin(t3)
-    # X + a1 = along cos t2 + across sin t2
-    return math.atan2(across, along) + math.acos(a1 / math.hypot(along, across))
-
-
-ON_AXIS_1 = wrist_on_axis_1(ELBOW)
+A1, A2, A4, D5 = Arm6Lengths()
+ALONG = A2 - A4 * math.sin(ELBOW) - D5 * math.cos(ELBOW)
+ACROSS = D5 * math.sin(ELBOW) - A4 * math.cos(ELBOW)
+# theta2 that brings the wrist onto axis 1: X = 0, X + a1 = along cos t2 + across sin t2
+WRIST = math.atan2(ACROSS, ALONG) + math.acos(A1 / math.hypot(ALONG, ACROSS))
 COLLINEAR = math.acos((0.03 - 0.02) / 0.12)  # a2 cos t2 + a4 = a1: axis 4 lies on axis 1
 STRETCHED = math.atan2(0.02, 0.13)  # a4 cos t3 = d5 sin t3: the wrist on the line of the upper arm
 HALF = math.pi / 2
 FAMILIES = {  # theta2 to theta5 of singular poses, and of regular ones next to them
     "wrist on axis 1": (
-        [(ON_AXIS_1, ELBOW, 0.3, 0.9), (ON_AXIS_1, ELBOW, 1.2, -0.4)],
-        [(ON_AXIS_1 + 0.1, ELBOW, 0.3, 0.9)],
+        [(WRIST, ELBOW, 0.3, 0.9), (WRIST, ELBOW, 1.2, -0.4)],
+        [(WRIST + 0.1, ELBOW, 0.3, 0.9)],
     ),
-    "axis 4 on axis 1, not parallel to it": (
-        [(COLLINEAR, -COLLINEAR - HALF, 0.3, 0.9)],
-        [(0.6, -0.6 - HALF, 0.3, 0.9)],
-    ),
+    "axis 4 on axis 1": ([(COLLINEAR, -COLLINEAR - HALF, 0.3, 0.9)], [(0.6, -0.6 - HALF, 0.3, 0.9)]),
     "axes 4 and 6 aligned": ([(0.6, ELBOW, 0.3, 0.0), (0.6, ELBOW, 0.3, math.pi)], [(0.6, ELBOW, 0.3, 0.9)]),
     "stretched": ([(0.6, STRETCHED, 0.3, 0.9)], [(0.6, STRETCHED + 0.2, 0.3, 0.9)]),
     "withdrawn": ([(0.6, STRETCHED + math.pi, 0.3, 0.9)], [(0.6, STRETCHED + math.pi + 0.2, 0.3, 0.9)]),
@@ -102,7 +92,7 @@ def test_families_of_singular_poses(family: str) -> None:
     axes = jacobian_over_log(ARM6, np.vstack((singular, regular)))[:, 3:]
     if family == "wrist on axis 1":
         assert np.abs(axes[:, 2, 5]).max() < 0.95  # axis 6 need not be aligned with it, and leans against it
-    elif family == "axis 4 on axis 1, not parallel to it":
+    elif family == "axis 4 on axis 1":
         assert_allclose(axes[:, :, 3], axes[:, :, 0], rtol=0.0, atol=1e-15)  # both point up
     elif family == "axes 4 and 6 aligned":  # they lose a turn, but no way
         assert singularity_over_log(ARM6, singular, orientation=False).smallest.min() > REGULAR
@@ -141,10 +131,8 @@ def test_a_scale_model_is_as_near_to_singular(factor: float, seed: int) -> None:
     ]
 
     def scaled(factor: float) -> Chain:
-        larger = [
-            GeometricModelRow(kind, axis, tuple(factor * x for x in shift)) for kind, axis, shift in rows
-        ]
-        return geometric_chain("scaled", larger, tip=(0.0, 0.1 * factor, 0.1 * factor))
+        links = [GeometricModelRow(kind, axis, tuple(factor * x for x in r)) for kind, axis, r in rows]
+        return geometric_chain("scaled", links, tip=(0.0, 0.1 * factor, 0.1 * factor))
 
     q = np.random.default_rng(seed).uniform(-1.0, 1.0, (3, 6))
     unit = singularity_over_log(scaled(1.0), q)
@@ -172,14 +160,9 @@ def test_a_joint_whose_limits_are_equal_counts_as_if_it_were_fixed_there(orienta
     panda = replace(load_robot("panda"), inertials=())  # a joint with a mass may not lose its name
     q = poses(panda, 50, 8)
     q[:, 2] = 0.4
-    third = panda.joints[2]
-    locked, fixed = (
-        replace(panda, joints=(*panda.joints[:2], joint, *panda.joints[3:]), start=())
-        for joint in (
-            replace(third, lower=0.4, upper=0.4),
-            Joint("fixed", "fixed", third.origin @ rotation_z(0.4)),
-        )
-    )
+    first, second, third, *rest = panda.joints
+    both = replace(third, lower=0.4, upper=0.4), Joint("fixed", "fixed", third.origin @ rotation_z(0.4))
+    locked, fixed = (replace(panda, joints=(first, second, joint, *rest), start=()) for joint in both)
     with_limits = singularity_over_log(locked, q, orientation=orientation, length=1.0)
     without = singularity_over_log(fixed, np.delete(q, 2, axis=1), orientation=orientation, length=1.0)
     # rounding of a frame that is multiplied before instead of after: entries and products of about 1
@@ -223,16 +206,12 @@ def test_the_length_is_that_of_the_links_after_the_first_axis(chain: Chain, leng
     longer = chain.placed(from_offset((1.0, 2.0, 3.0, 0.4, 0.5, 0.6)), translation(0.0, 0.0, 0.25))
     if chain is not SKEW:  # along its last axis
         assert characteristic_length(longer) == pytest.approx(length + 0.25, rel=1e-14)
-    shifts = [
-        translation(*np.multiply(0.1 * k, joint.axis)) @ rotation_about(joint.axis, 0.3 * k)
-        for k, joint in enumerate(chain.joints)
-    ]
-    before = [Transform(), *(shift.inverse() for shift in shifts)]
-    joints = tuple(
-        replace(joint, origin=back @ joint.origin @ shift)
-        for joint, back, shift in zip(chain.joints, before, shifts, strict=False)
-    )
-    moved = replace(chain, joints=joints, tip=shifts[-1].inverse() @ chain.tip)
+    joints, back = list[Joint](), Transform()
+    for k, joint in enumerate(chain.joints):
+        shift = translation(*np.multiply(0.1 * k, joint.axis)) @ rotation_about(joint.axis, 0.3 * k)
+        joints.append(replace(joint, origin=back @ joint.origin @ shift))
+        back = shift.inverse()
+    moved = replace(chain, joints=tuple(joints), tip=back @ chain.tip)
     assert characteristic_length(moved) == pytest.approx(length, rel=1e-13)
 
 
