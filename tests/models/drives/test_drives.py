@@ -18,8 +18,7 @@ from urmpipe_models.drives import Drive, Gains, JointMotion, control_voltage, sa
 from urmpipe_models.elementwise import FloatArray
 
 LOAD = 1.0
-
-angles = st.floats(-10.0, 10.0)
+angles, bounds = st.floats(-10.0, 10.0), st.floats(0.05, 20.0)
 
 
 def integrated(drive: Drive, voltage: float, t: FloatArray) -> FloatArray:
@@ -118,23 +117,15 @@ def test_the_stiffer_the_shaft_the_nearer_the_rigid_drive_in_proportion_to_1_ove
     assert distances[2] < 1e-4
 
 
-bounds = st.floats(0.05, 20.0)
-
-
-def duration(distance: float, speed: float, acceleration: float) -> float:
-    """Return how long a trapezoid takes: its two halves are a triangle where it is too short."""
-    if distance < speed**2 / acceleration:
-        return float(2.0 * np.sqrt(distance / acceleration))
-    return distance / speed + speed / acceleration
-
-
 @given(angles, angles, bounds, bounds, st.floats(-1.0, 1.0))
 @example(1.0, 1.0, 2.0, 10.0, 0.1)
 @example(0.0, 5e-324, 2.0, 10.0, 0.1)
 def test_a_trapezoid_keeps_its_limits_and_rates_and_arrives_to_the_bit_on_time(
     initial: float, target: float, speed: float, acceleration: float, begin: float
 ) -> None:
-    total = duration(abs(target - initial), speed, acceleration)
+    distance = abs(target - initial)
+    is_triangle = distance < speed**2 / acceleration
+    total = 2.0 * np.sqrt(distance / acceleration) if is_triangle else distance / speed + speed / acceleration
     t = begin + np.linspace(-0.1, 1.1, 2_001) * max(total, 1e-3)
     motion = drives.trapezoid(t, begin, initial, target, speed, acceleration)
     slack = 1.0 + 1e-12  # a product of roots, rounded
@@ -151,7 +142,7 @@ def test_a_trapezoid_keeps_its_limits_and_rates_and_arrives_to_the_bit_on_time(
     allowed = 0.25 * acceleration * h * h + 4.0 * speed * rounded + 1e-14
     means = 0.5 * (motion.velocity[1:] + motion.velocity[:-1])
     assert_allclose(np.diff(motion.position), h * means, rtol=0.0, atol=allowed)
-    rise = min(speed / acceleration, np.sqrt(abs(target - initial) / acceleration))
+    rise = min(speed / acceleration, np.sqrt(distance / acceleration))
     corners = np.searchsorted(t, begin + np.array([0.0, rise, total - rise, total]))
     differences = np.diff(motion.velocity) - h * motion.acceleration[:-1]
     differences[np.add.outer(corners, (-2, -1, 0))] = 0.0  # a corner may be rounded to either side
@@ -181,7 +172,6 @@ def test_the_kind_chooses_the_form_for_columns_and_numbers(kind: int, count: int
 
 GAINS = Gains(position=7.5, velocity=0.75, acceleration=0.01)
 REST = JointMotion(0.0, 0.0, 0.0)
-
 values = st.floats(-100.0, 100.0)
 motions = st.builds(JointMotion, values, values, values)
 

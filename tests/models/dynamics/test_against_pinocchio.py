@@ -22,7 +22,6 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
 
 SAME = 1e-10  # relative to the largest value of a state: what is required; found are 1e-13
-
 STATES = 1000
 
 URDFS = {

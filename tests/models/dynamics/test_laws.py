@@ -63,9 +63,7 @@ def test_power_mass_matrix_terms_recursion_and_forward_dynamics_are_one_equation
     assert 0.5 * qd @ M @ qd == pytest.approx(kinetic_energy(chain, q, qd), rel=ROUNDED)
     # centrifugal is what squares of rates need without gravity, Coriolis what products need
     free, still = replace(chain, gravity=(0.0, 0.0, 0.0)), np.zeros_like(q)
-    single = np.array(
-        [inverse_dynamics(free, q, list(qd * unit), still) for unit in np.eye(len(q))], dtype=float
-    )
+    single = np.array([inverse_dynamics(free, q, list(rate), still) for rate in np.diag(qd)], dtype=float)
     products = np.array(inverse_dynamics(free, q, qd, still), dtype=float) - single.sum(axis=0)
     size = ROUNDED * (1.0 + np.abs(single).sum())
     assert_allclose(np.array(terms.centrifugal, dtype=float), single.sum(axis=0), rtol=0.0, atol=size)
@@ -116,10 +114,8 @@ def test_bodies_that_are_fixed_to_one_frame_are_one_body() -> None:
 def test_long_logs_are_as_each_row() -> None:
     chain = with_masses(load_robot("urm6"))
     q, qd, qdd = np.random.default_rng(5).normal(size=(3, 40_000, 6))  # more than two blocks
-    tau, terms = (
-        equations.torques_over_log(chain, q, qd, qdd),
-        equations.torque_terms_over_log(chain, q, qd, qdd),
-    )
+    tau = equations.torques_over_log(chain, q, qd, qdd)
+    terms = equations.torque_terms_over_log(chain, q, qd, qdd)
     assert_allclose(sum(terms.values()), tau, rtol=0.0, atol=1e-11)
     kinetic, potential = equations.energies_over_log(chain, q, qd)
     for k in (0, 20_000, 39_999):

@@ -23,7 +23,6 @@ G = 9.81
 UPRIGHT = (0.0, -1.0, 0.0)
 """An axis about which angles count from x towards z: the arm moves in the vertical plane."""
 
-
 L1, L2 = 0.6, 0.25  # upper arm and crank of the parallelogram in [m]
 
 BODIES = {"q1": (8.0, 0.3, 0.3), "crank": (3.0, -0.1, 0.05), "rod": (2.0, 0.3, 0.07), "q2": (5.0, -0.2, 0.12)}
@@ -87,11 +86,8 @@ def test_a_parallelogram_has_the_equations_of_absolute_angles(state: list[float]
 
 def test_a_slide_on_a_turning_table_feels_centrifugal_and_coriolis_forces() -> None:
     m, r, w, v = 2.0, 0.5, 3.0, 0.7
-    chain = Chain(
-        "table",
-        (Joint("turn"), Joint("slide", "prismatic", axis=(1.0, 0.0, 0.0))),
-        inertials=(Inertial("slide", m),),
-    )
+    joints = Joint("turn"), Joint("slide", "prismatic", axis=(1.0, 0.0, 0.0))
+    chain = Chain("table", joints, inertials=(Inertial("slide", m),))
     terms = torque_terms(chain, [0.3, r], [w, v], [0.0, 0.0])
     assert terms.centrifugal == pytest.approx([0.0, -m * r * w**2])
     assert terms.coriolis == pytest.approx([2.0 * m * r * w * v, 0.0])

@@ -20,6 +20,7 @@ from urmpipe_models.lagrange.formulas import ARGUMENTS, c_name
 from urmpipe_models.math3d import Transform, from_xyz_rpy
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]  # q, q', q'' of each coordinate
+Terms = dict[str, FloatArray]  # each term of each coordinate
 
 
 def random_arm(rng: np.random.Generator, coordinates: int) -> Chain:
@@ -66,12 +67,10 @@ def compiled(code: str, folder: Path) -> ctypes.CDLL:
     return ctypes.CDLL(str(library))
 
 
-def c_terms(
-    library: ctypes.CDLL, chain: Chain, motion: Motion, wrench: Sequence[float]
-) -> dict[str, FloatArray]:
-    """Return each term of each coordinate, and the sum as `torque`, as compiled C computes them."""
+def c_terms(library: ctypes.CDLL, chain: Chain, motion: Motion, wrench: Sequence[float]) -> Terms:
+    """Return each term, and the sum as `torque`, as compiled C computes them."""
     inputs = dict(zip(("q", "qd", "qdd"), motion, strict=True)) | {"force": np.asarray(wrench)}
-    pointer, terms = ctypes.POINTER(ctypes.c_double), dict[str, FloatArray]()
+    pointer, terms = ctypes.POINTER(ctypes.c_double), Terms()
     for term, names in [*ARGUMENTS.items(), ("torque", tuple(inputs))]:
         terms[term] = np.full(len(chain.coordinates), np.nan)
         arrays = [*(np.ascontiguousarray(inputs[name]) for name in names), terms[term]]
@@ -79,14 +78,14 @@ def c_terms(
     return terms
 
 
-def text_terms(text: str) -> Callable[[Motion, Sequence[float]], dict[str, FloatArray]]:
+def text_terms(text: str) -> Callable[[Motion, Sequence[float]], Terms]:
     """Return a function that computes each term of each coordinate as a text says it."""
     coordinates = re.findall(r"^tau_(\w+) = ", text, re.MULTILINE)
     angles = re.findall(r"^# (c\w+) = (cos\(.*\)), (s\w+) = (sin\(.*\))$", text, re.MULTILINE)
     lines = re.findall(r"^  (\w+) = (.*)$", text, re.MULTILINE)
     code = [(term, line.replace("''", "_dd").replace("'", "_d").replace("^", "**")) for term, line in lines]
 
-    def terms(motion: Motion, wrench: Sequence[float]) -> dict[str, FloatArray]:
+    def terms(motion: Motion, wrench: Sequence[float]) -> Terms:
         names: dict[str, Any] = {"cos": math.cos, "sin": math.sin}
         for mark, values in zip(("", "_d", "_dd"), motion, strict=True):
             names |= dict(zip((f"{name}{mark}" for name in coordinates), values.tolist(), strict=True))

@@ -52,9 +52,7 @@ def test_the_arms_have_all_kinds_of_joints_and_parallel_axes_and_others() -> Non
     ("count", "seed"),
     [pytest.param(*case, marks=pytest.mark.slow if case[0] > 1 else ()) for case in CASES],
 )
-def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
-    count: int, seed: int, tmp_path: Path
-) -> None:
+def test_terms_in_text_and_c_are_those_of_numeric_dynamics(count: int, seed: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, count)
     form = seeded_form(count, seed)

@@ -66,15 +66,10 @@ UNIFORM_LINKS = {  # with centres at half their lengths, and any moment of inert
     "tool 1": (L1 * s1 + L2 * s12) * fx - (L1 * c1 + L2 * c12) * fy - mz,  # -J^T F
     "tool 2": L2 * s12 * fx - L2 * c12 * fy - mz,
 }
-
-
 ARMS = [(two_links(1.0, 0.0, 0.0), POINT_MASSES), (two_links(0.5, I1, I2), UNIFORM_LINKS)]
 
 
-@pytest.mark.parametrize(
-    ("chain", "printed"),
-    [(two_links(1.0, 0.0, 0.0), POINT_MASSES), (two_links(0.5, I1, I2), UNIFORM_LINKS)],
-)
+@pytest.mark.parametrize(("chain", "printed"), ARMS)
 def test_two_links_are_those_of_textbooks(chain: Chain, printed: dict[str, sympy.Expr]) -> None:
     formulas = open_formulas(chain)
     differences = {term: sympy.expand(formulas[term] - formula) for term, formula in printed.items()}

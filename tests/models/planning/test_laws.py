@@ -26,10 +26,7 @@ KEPT = 1.0 + 1e-9  # so much of a limit may be used: rounding
 
 speeds, rises, jerks = st.floats(0.05, 2.0), st.floats(0.2, 20.0), st.floats(1.0, 300.0)
 places = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5)
-
-
-def contour() -> LineArcPath:
-    return rows_to_path(PathRows(np.array(CONTOUR), 0.03))
+PATH = rows_to_path(PathRows(np.array(CONTOUR), 0.03))
 
 
 def law_of(path: LineArcPath, v: float, a: float, j: float | None, arcs: Arcs) -> TimeLaw:
@@ -39,30 +36,27 @@ def law_of(path: LineArcPath, v: float, a: float, j: float | None, arcs: Arcs) -
 @pytest.mark.parametrize(("arcs", "printed"), [("tangential", 4.780324), ("total", 4.855270)])
 def test_the_papers_contour_takes_its_time(arcs: Arcs, printed: float) -> None:
     """v = 0.5 m/s, a = 6 m/s2; T after errata of the paper, to its digits."""
-    law = trapezoid_law(contour(), 0.5, 6.0, arcs)
+    law = trapezoid_law(PATH, 0.5, 6.0, arcs)
     assert law.duration == pytest.approx(printed, abs=1e-6)
-    on_arcs = law.at(law.time_at(contour().bounds[1:-1:2] + 0.02)).v
+    on_arcs = law.at(law.time_at(PATH.bounds[1:-1:2] + 0.02)).v
     assert_allclose(on_arcs, 0.5 if arcs == "tangential" else 0.424264, atol=1e-6)
 
 
 def test_a_trapezoid_from_stop_to_stop_is_that_of_a_set_point_and_of_ruckig_without_a_limit_of_jerk() -> None:
-    path, t = contour(), np.linspace(0.0, 4.78, 1000)
-    law = trapezoid_law(path, 0.5, 6.0)
-    motion, setpoint = law.at(t), trapezoid(t, 0.0, 0.0, path.total, 0.5, 6.0)
+    t, law = np.linspace(0.0, 4.78, 1000), trapezoid_law(PATH, 0.5, 6.0)
+    motion, setpoint = law.at(t), trapezoid(t, 0.0, 0.0, PATH.total, 0.5, 6.0)
     assert_allclose([motion.s, motion.v, motion.a], setpoint, atol=1e-14)  # rounding of 2 m
-    from_ruckig = jerk_law(path, 0.5, 6.0, math.inf, "tangential").duration
+    from_ruckig = jerk_law(PATH, 0.5, 6.0, math.inf, "tangential").duration
     assert from_ruckig == pytest.approx(law.duration, abs=1e-9)
     # with a jerk the law approaches that from above, by a / j for each of its two ramps
-    late = jerk_law(path, 0.5, 6.0, 6e6, "total").duration - trapezoid_law(path, 0.5, 6.0, "total").duration
+    late = jerk_law(PATH, 0.5, 6.0, 6e6, "total").duration - trapezoid_law(PATH, 0.5, 6.0, "total").duration
     assert 0.0 < late < 20 * 6.0 / 6e6
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.01, 5.0), speeds, rises)
 @example(entry=0.015625, leave=1.0, length=0.01171875, v=1.3314804301090923, a=6.887068678770632)
-def test_ruckig_without_a_limit_of_jerk_takes_the_same_time(
-    entry: float, leave: float, length: float, v: float, a: float
-) -> None:
-    """Line by line, from any speed to any that can be reached: what the total acceleration asks for."""
+def test_ruckig_takes_the_same_time(entry: float, leave: float, length: float, v: float, a: float) -> None:
+    """Without a limit of jerk, from any speed to any in reach: what the total acceleration asks for."""
     reach = 2.0 * a * length * (1.0 - 1e-9)  # where all fits to the last bit Ruckig takes another way
     start = min(entry * v, math.sqrt(reach))
     end = max(min(leave * v, math.sqrt(start**2 + reach)), math.sqrt(max(start**2 - reach, 0.0)))
@@ -163,28 +157,24 @@ def test_the_pieces_that_no_speed_can_be_constant_on() -> None:
 def test_ruckig_missing_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ruckig", None)
     message = "law: found jerk without ruckig, allowed: with ruckig: pip install urmpipe[planning]"
-    assert refusal(OptionError, jerk_law, contour(), 0.5, 6.0, 60.0, "tangential") == message
+    assert refusal(OptionError, jerk_law, PATH, 0.5, 6.0, 60.0, "tangential") == message
 
 
 def test_a_path_with_its_stops_is_run_in_stretches() -> None:
     """Each stretch as if there were no other."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
-    whole_path, stretch = (
-        trapezoid_law(rows_to_path(PathRows(points[:n], [0, 0.2, 0, 0][:n], corner=True)), 0.5, 2.0)
-        for n in (4, 3)
-    )
-    assert_allclose(whole_path.phases[:3], stretch.phases, atol=1e-12)
-    assert whole_path.duration == pytest.approx(stretch.duration + 1.0 / 0.5 + 0.5 / 2.0, abs=1e-12)
+    paths = (rows_to_path(PathRows(points[:n], [0, 0.2, 0, 0][:n], corner=True)) for n in (4, 3))
+    both, stretch = (trapezoid_law(path, 0.5, 2.0) for path in paths)
+    assert_allclose(both.phases[:3], stretch.phases, atol=1e-12)
+    assert both.duration == pytest.approx(stretch.duration + 1.0 / 0.5 + 0.5 / 2.0, abs=1e-12)
 
 
 @pytest.mark.parametrize(("first", "j"), [(1e-11, None), (1e-11, 60.0), (5e-10, None), (5e-10, 60.0)])
 def test_a_stretch_may_be_as_short_as_two_rows_are_apart(first: float, j: float | None) -> None:
     """Alone, and before another one: its own time and that of the other one."""
     points = [[0.0, 0.0, 0.0], [first, 0.0, 0.0], [1.0, 1.0, 0.0]]
+    paths = [rows_to_path(PathRows(rows)) for rows in (points, points[:2], points[1:])]
     for arcs in ARCS:
-        both, short, other = (
-            law_of(rows_to_path(PathRows(rows)), 0.5, 6.0, j, arcs).duration
-            for rows in (points, points[:2], points[1:])
-        )
+        both, short, other = (law_of(path, 0.5, 6.0, j, arcs).duration for path in paths)
         assert 0.0 < short < 1e-3  # 4 cbrt(s / 2 / j), 6e-4 s
         assert both == pytest.approx(short + other, abs=1e-9)

@@ -90,9 +90,7 @@ def test_a_path_is_a_smooth_curve_of_unit_speed(rows: PathRows, share: float) ->
 
 
 @slow_law(corner_rows(variants=True), st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
-def test_rows_give_one_curve_by_corners_or_first_points_reversed_or_moved(
-    rows: PathRows, motion: list[float]
-) -> None:
+def test_one_curve_by_corners_or_first_points_reversed_or_moved(rows: PathRows, motion: list[float]) -> None:
     path, first = rows_to_path(rows), rows_to_path(by_first_points(rows))
     assert path.kinds == first.kinds
     s = along(path)
@@ -191,8 +189,7 @@ def test_sections_have_the_length_of_their_kind_and_keep_the_orientation(kind: s
     for plane in PLANES[kind]:
         rows = cube_rows(kind, 0.6, 0.03, CENTRE, plane, down)
         assert np.array_equal(there(rows.rotation), [down] * 6)
-        total = rows_to_path(rows).total
-        assert total == pytest.approx(length, abs=5e-7, rel=0)  # six decimals are printed
+        assert rows_to_path(rows).total == pytest.approx(length, abs=5e-7, rel=0)  # six decimals are printed
 
 
 WITHIN = 1e-11
