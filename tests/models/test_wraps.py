@@ -14,24 +14,13 @@ from hypothesis.extra import numpy as st_np
 from numpy.typing import NDArray
 
 from judged_wraps import TSP, find_in_between, judge, wrap
+from urmpipe_models import wraps
 from urmpipe_models.elementwise import BLOCK, FloatArray
 from urmpipe_models.math3d import FORMS, RotationForm, from_rpy, to_quaternions
-from urmpipe_models.wraps import (
-    FULL_TURN,
-    MIN_DISTANCE_RATIO,
-    WrapState,
-    reinterpolate,
-    repolarize,
-    repolarize_sample,
-    unwrap_euler,
-    unwrap_orientations,
-    unwrap_quaternions,
-    unwrap_rotation_vectors,
-)
+from urmpipe_models.wraps import FULL_TURN, WrapState, repolarize, repolarize_sample
 
-motions = st_np.arrays(
-    float, st.tuples(st.integers(2, 200), st.integers(1, 4)), elements=st.floats(-1.5, 1.5)
-)  # each step below a quarter turn, pi / 2 = 1.57
+shapes = st.tuples(st.integers(2, 200), st.integers(1, 4))
+motions = st_np.arrays(float, shapes, elements=st.floats(-1.5, 1.5))  # below a quarter turn, 1.57, a step
 
 
 @settings(max_examples=50, deadline=None)
@@ -129,9 +118,7 @@ def with_in_between(direction: float) -> tuple[FloatArray, FloatArray]:
 @pytest.mark.parametrize("max_speed", [math.inf, 4.0])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize("missing", [(), (9,), (11,), (7, 9, 11, 13), (8, 9), (11, 12)])
-def test_k_is_right_after_the_pair_whatever_the_fraction(
-    max_speed: float, direction: float, missing: tuple[int, ...]
-) -> None:
+def test_k_is_right_at_any_fraction(max_speed: float, direction: float, missing: tuple[int, ...]) -> None:
     x, q = with_in_between(direction)
     q[list(missing)] = np.nan
     result = repolarize(q, np.full(len(q), TSP), max_speed=max_speed)
@@ -148,7 +135,7 @@ def test_an_in_between_sample_is_found_where_it_is_off_the_motion(max_speed: flo
     """By `MIN_DISTANCE_RATIO`, from either end of the jump: 4 x 0.01 rad of 6.28, 0.7 % of it."""
     _, q = with_in_between(direction)
     samples = [find_in_between(column, max_speed).in_between for column in q.T]
-    share = MIN_DISTANCE_RATIO * MOVE / FULL_TURN
+    share = wraps.MIN_DISTANCE_RATIO * MOVE / FULL_TURN
     clear = np.minimum(FRACTIONS, 1.0 - FRACTIONS) > share + 0.002
     assert all(rows == [10] for rows, is_clear in zip(samples, clear, strict=True) if is_clear)
     assert sum(not rows for rows in samples) <= 2 * round(len(FRACTIONS) * share + 2)
@@ -163,23 +150,15 @@ def test_the_repolarized_in_between_sample_stays_until_it_is_repaired() -> None:
     result = repolarize(q[:, np.newaxis], np.diff(t, prepend=0.0))
     assert result.q[s, 0] == q[s]
     assert result.in_between.tolist() == [[s, 0]]
-    repaired = reinterpolate(result.q, t, result.in_between)
+    repaired = wraps.reinterpolate(result.q, t, result.in_between)
     np.testing.assert_allclose(repaired[:, 0], x, rtol=0, atol=3e-15)  # values of 3: units in the last place
     others = np.delete(np.arange(20), s)
     assert repaired[others].tobytes() == result.q[others].tobytes()
 
 
-clean = st.tuples(
-    st.floats(1e-6, 0.3), st.floats(0.0, 1.0), st.sampled_from([1.0, -1.0]), st.integers(0, 10**6)
-)
-
-
-@given(clean)
-def test_clean_wraps_have_no_in_between_samples_and_noise_is_explained(
-    motion: tuple[float, float, float, int],
-) -> None:
+@given(st.floats(1e-6, 0.3), st.floats(0.0, 1.0), st.sampled_from([1.0, -1.0]), st.integers(0, 10**6))
+def test_clean_wraps_and_noise_are_explained(move: float, offset: float, direction: float, seed: int) -> None:
     """Even motion at any speed; and noise about +-pi of any size below P / 4 a step."""
-    move, offset, direction, seed = motion
     x = np.asarray(direction * (np.pi + move * (np.arange(30) - 14.5 + offset)), dtype=np.float64)
     assert find_in_between(wrap(x))[1:] == ([], [])
     noise = np.random.default_rng(seed).uniform(np.pi - move, np.pi + move, 30)
@@ -191,9 +170,9 @@ def test_noise_about_the_limit_is_rarely_taken_for_in_between_samples() -> None:
     rng = np.random.default_rng(5)
     for spread in (1e-4, 0.01, 0.3):
         found = find_in_between(wrap(rng.normal(np.pi, spread, 100_000)))
-        wraps = np.count_nonzero(np.diff(found.turns))
-        assert wraps > 45_000
-        assert len(found.in_between) < 1e-3 * wraps, (spread, len(found.in_between))
+        count = np.count_nonzero(np.diff(found.turns))
+        assert count > 45_000
+        assert len(found.in_between) < 1e-3 * count, (spread, len(found.in_between))
 
 
 SIZE = 1e-13  # angles to 20 rad are wrapped and back, two roundings of 4e-15, then sine and cosine
@@ -211,7 +190,7 @@ def test_quaternions_of_any_sign_become_continuous(moves: list[tuple[float, ...]
     true = np.cumsum(np.array([[0.0, 0.0, 0.0, 5.0], *([*move, 0.0] for move in moves)]), axis=0)
     true /= np.linalg.norm(true, axis=1)[:, np.newaxis]
     signs = np.where([False, *flips[: len(moves)]], -1.0, 1.0)
-    np.testing.assert_array_equal(unwrap_quaternions(true * signs[:, np.newaxis]), true)
+    np.testing.assert_array_equal(wraps.unwrap_quaternions(true * signs[:, np.newaxis]), true)
 
 
 @given(st.lists(st.floats(-0.9, 0.9), min_size=1, max_size=60), st.floats(0.0, 0.02), st.floats(0.3, 3.0))
@@ -222,7 +201,7 @@ def test_a_turn_about_a_drifting_axis_goes_on_past_pi(turns: list[float], drift:
     axis = np.column_stack((np.sin(lean), np.zeros(len(angle)), np.cos(lean)))
     true = axis * angle[:, np.newaxis]
     recorded = axis * wrap(angle)[:, np.newaxis]  # of a length up to pi, as a controller writes it
-    np.testing.assert_allclose(unwrap_rotation_vectors(recorded), true, rtol=0, atol=SIZE)
+    np.testing.assert_allclose(wraps.unwrap_rotation_vectors(recorded), true, rtol=0, atol=SIZE)
 
 
 @given(st.lists(st.tuples(*[st.floats(-6.0, 6.0)] * 3), min_size=1, max_size=40))
@@ -230,7 +209,7 @@ def test_a_turn_about_a_drifting_axis_goes_on_past_pi(turns: list[float], drift:
 @example([(0.0, 0.0, 4.0), (0.0, 5e-324, 0.0)])
 def test_continuous_vectors_are_the_same_rotations(vectors: list[tuple[float, ...]]) -> None:
     v = np.array(vectors)
-    found = unwrap_rotation_vectors(v)
+    found = wraps.unwrap_rotation_vectors(v)
     np.testing.assert_array_equal(found[0], v[0])
     before, after = (to_quaternions(one, "vector") for one in (v, found))
     same = np.abs(np.einsum("ij,ij->i", before, after))
@@ -255,10 +234,10 @@ def test_euler_angles_of_either_family_become_continuous(
     recorded = wrap(np.where(swapped, true * [1.0, -1.0, 1.0] + np.pi, true))
     recorded[0] = true[0]
     np.testing.assert_allclose(rotation_matrices(recorded), rotation_matrices(true), rtol=0, atol=SIZE)
-    np.testing.assert_allclose(unwrap_euler(recorded), true, rtol=0, atol=SIZE)
+    np.testing.assert_allclose(wraps.unwrap_euler(recorded), true, rtol=0, atol=SIZE)
     if 0 < missing < len(true):  # steps of up to 0.6 then, still below the quarter turn between the families
         recorded[missing] = true[missing] = np.nan
-        np.testing.assert_allclose(unwrap_euler(recorded), true, rtol=0, atol=SIZE)
+        np.testing.assert_allclose(wraps.unwrap_euler(recorded), true, rtol=0, atol=SIZE)
 
 
 def test_euler_angles_go_straight_through_the_vertical() -> None:
@@ -267,7 +246,7 @@ def test_euler_angles_go_straight_through_the_vertical() -> None:
     true = np.column_stack((np.full_like(ry, 0.3), ry, np.full_like(ry, -0.2)))
     beyond = (ry > np.pi / 2)[:, np.newaxis]
     recorded = np.where(beyond, wrap(true * [1.0, -1.0, 1.0] + np.pi), true)
-    np.testing.assert_allclose(unwrap_euler(recorded), true, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(wraps.unwrap_euler(recorded), true, rtol=0, atol=1e-14)
 
 
 # Two representations of one rotation in each form.
@@ -290,6 +269,6 @@ def test_two_names_of_one_rotation_become_one_in_every_form(form: RotationForm) 
     before = to_quaternions(recorded, form)
     # what stands in the table are two names of one rotation: the quaternions agree but for their sign
     np.testing.assert_allclose(np.abs(before[0] @ before[1]), 1.0, rtol=0, atol=1e-15)
-    found = unwrap_orientations(recorded, form)
+    found = wraps.unwrap_orientations(recorded, form)
     # pi is added and taken away: a few roundings of 4e-16
     np.testing.assert_allclose(found, recorded[[0, 0]], rtol=0, atol=3e-15)

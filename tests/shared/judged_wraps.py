@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from urmpipe_models import wraps
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.wraps import (
-    FULL_TURN,
-    MAX_VALUE,
-    Repolarized,
-    WrapState,
-    find_interpolated_samples,
-    repolarize,
-    repolarize_sample,
-)
+from urmpipe_models.wraps import FULL_TURN, WrapState, repolarize, repolarize_sample
 
 TSP = 0.005  # s
 
@@ -34,7 +27,7 @@ class Judged(NamedTuple):
     unexplained: list[int]
 
 
-def batch_judged(batch: Repolarized, j: int) -> Judged:
+def batch_judged(batch: wraps.Repolarized, j: int) -> Judged:
     """Return the results of a joint by `repolarize`."""
     changes, of_joint = np.zeros(len(batch.q), dtype=np.int64), batch.joints == j
     changes[batch.rows[of_joint]] = batch.change[of_joint]
@@ -42,12 +35,7 @@ def batch_judged(batch: Repolarized, j: int) -> Judged:
     return Judged(np.cumsum(changes).tolist(), *lists)
 
 
-def judge(
-    q: FloatArray,
-    dt: FloatArray | float = TSP,
-    period: FloatArray | float = FULL_TURN,
-    max_speed: float = math.inf,
-) -> list[Judged]:
+def judge(q: FloatArray, dt: Any = TSP, period: Any = FULL_TURN, max_speed: float = math.inf) -> list[Judged]:
     """Return the results of each joint, which the batch and the steps must give bit for bit."""
     periods, times = np.broadcast_to(period, q.shape[1]), np.broadcast_to(dt, len(q))
     batch = repolarize(q, times, period=periods, max_speed=max_speed)
@@ -58,17 +46,16 @@ def judge(
     joints = []
     for j, column in enumerate(q.T):
         state, out, changes, unexplained, in_between, last = WrapState(), [], [], set[int](), [], -1
+        options = {"period": float(periods[j]), "max_speed": max_speed}
         for i, (value, elapsed) in enumerate(zip(column, times, strict=True)):
-            state, result, flags = repolarize_sample(
-                state, value, elapsed, period=float(periods[j]), max_speed=max_speed
-            )
+            state, result, flags = repolarize_sample(state, value, elapsed, **options)
             out.append(float(result))
             changes.append(int(flags.change))
             unexplained |= {i} if flags.unexplained else set()
             if flags.in_between:
                 in_between.append(last)
                 unexplained -= {last}
-            last = i if abs(value) < MAX_VALUE else last
+            last = i if abs(value) < wraps.MAX_VALUE else last
         turns = np.cumsum(changes)
         assert np.array(out).tobytes() == np.ascontiguousarray(batch.q[:, j]).tobytes()
         np.testing.assert_array_equal(out, column + periods[j] * turns)
@@ -82,7 +69,7 @@ def find_in_between(q: FloatArray, max_speed: float = math.inf) -> Judged:
     """Return the results of a joint by the batch, with in-between samples that only the whole log shows."""
     t, here = TSP * np.arange(len(q), dtype=np.float64), np.flatnonzero(~np.isnan(q))
     batch = repolarize(q[:, np.newaxis], np.full(len(q), TSP), max_speed=max_speed)
-    wraps = np.searchsorted(here, batch.rows)
-    found = here[find_interpolated_samples(q[here], batch.q[here, 0], t[here], wraps, FULL_TURN)]
+    rows, unwrapped = np.searchsorted(here, batch.rows), batch.q[here, 0]
+    found = here[wraps.find_interpolated_samples(q[here], unwrapped, t[here], rows, FULL_TURN)]
     judged = batch_judged(batch, 0)
     return judged._replace(in_between=sorted({*judged.in_between, *found.tolist()}))
