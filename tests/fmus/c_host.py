@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import fmpy
 import numpy as np
 
 from urmpipe_fmus.block import TABLE_FILE, BlockModel, table_bytes
@@ -36,19 +37,11 @@ def script(model: BlockModel, count: int, seed: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def headers() -> str:
-    import fmpy
-
-    return str(Path(fmpy.__file__).parent / "c-code")
-
-
 def host(folder: Path, command: Sequence[str], name: str = "host") -> str:
     """Compile the host, from its folder: seen from above its own, zig builds its C libraries anew."""
-    program = str(folder / name)
-    subprocess.run(
-        [*command, "-O1", "-I", headers(), str(HOST), "-o", program],
-        cwd=folder, check=True, capture_output=True,
-    )  # fmt: skip
+    program, headers = str(folder / name), str(Path(fmpy.__file__).parent / "c-code")
+    flags = ["-O1", "-I", headers, str(HOST), "-o", program]
+    subprocess.run([*command, *flags], cwd=folder, check=True, capture_output=True)
     return program
 
 
@@ -72,14 +65,8 @@ def ran(
     environment: Mapping[str, str] = os.environ,
 ) -> list[str]:
     """What the host prints."""
-    place = resources or (folder / "resources").as_uri()
-    done = subprocess.run(
-        [*command, GUID, place],
-        input=given,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**environment, "ASAN_OPTIONS": "detect_leaks=1"},
-    )
+    program = [*command, GUID, resources or (folder / "resources").as_uri()]
+    env = {**environment, "ASAN_OPTIONS": "detect_leaks=1"}
+    done = subprocess.run(program, input=given, capture_output=True, text=True, check=False, env=env)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
     return done.stdout.splitlines()

@@ -9,15 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fmpy import calloc, extract, free, read_model_description
+from fmpy import calloc, extract, fmi2, free, read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
 
 
 class Loaded:
@@ -47,14 +40,14 @@ class Loaded:
         self.references = {one.name: one.valueReference for one in self.described.modelVariables}
         self.types = {one.name: one.type for one in self.described.modelVariables}
         self.log: list[tuple[int, str, str]] = []
-        self.callbacks = fmi2CallbackFunctions()
-        self.callbacks.logger = fmi2CallbackLoggerTYPE(self._take)
+        self.callbacks = fmi2.fmi2CallbackFunctions()
+        self.callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._take)
         self.blocks: set[int] = set()
         self.most_blocks = 1_000_000
-        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(self._allocate)
-        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(self._free)
+        self.callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(self._allocate)
+        self.callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(self._free)
         self._before = before
-        self.fmu: Any = FMU2Slave(
+        self.fmu: Any = fmi2.FMU2Slave(
             guid=self.described.guid if guid is None else guid,
             unzipDirectory=extract(str(path), unzipdir=None if folder is None else str(folder)),
             modelIdentifier=self.described.coSimulation.modelIdentifier,

@@ -14,12 +14,11 @@ from hypothesis import given, settings
 
 from fmu_run import FmuRun
 from loaded_fmu import Loaded
-from made_masses import with_drives, with_masses
 from random_units import PATIENT, UnitCase, random_cases
-from sliding_arm import sliding_arm, sprung_arm
+from shipped_units import UNITS
 from stepped_unit import SteppedUnit, needs_native
-from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Table, Variable
-from urmpipe_fmus.blocks import block_names, make_block
+from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Variable
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.instance import Instance
@@ -35,36 +34,6 @@ SAME = 1e-12  # of the size of the values; sines of other libraries differ in th
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 
 both_backends = pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
-
-ROWS = np.random.default_rng(1).uniform(-3.0, 3.0, (30, 3))
-TABLE = Table(np.arange(30) * 7_000_000, ROWS)  # between the steps
-COLUMNS = [["q", "rad", 2], ["d", "m"]]
-ARM = with_drives(with_masses(load_robot("urm6")))  # in importers/ a log is run over a native FMU of it, too
-
-UNITS: dict[str, tuple[str, dict[str, Any]]] = {
-    "a URM arm with rates": ("kinematic_chain", {"robot": load_robot("urm6"), "rates": True}),
-    "a UR arm with rates": ("kinematic_chain", {"robot": load_robot("ur5e"), "rates": True}),
-    "sliding joints": (
-        "kinematic_chain",
-        {"robot": sliding_arm(), "rates": True, "sensors": ["p1", "p3", "p5"], "points": ["p2", "p5"]},
-    ),
-    "six joints": ("repolarizer", {"joints": 6}),
-    "a deviation": ("delta_meter", {}),
-    "a held log": ("log_source", {"table": TABLE, "columns": COLUMNS}),
-    "an interpolated log": ("log_source", {"table": TABLE, "columns": COLUMNS, "interpolate": True}),
-    "a drive": ("dc_drive", {}),
-    "a load": ("inertia", {}),
-    "a controller": ("drive_controller", {}),
-    "a set point": ("set_point", {}),
-    "a network": ("network_motion", {"network": "rccc", "points": ["c3.body:0,0.1,0"]}),
-    "sliding joints with masses": ("chain_dynamics", {"robot": sprung_arm()}),
-    "a URM arm with drives": ("driven_arm", {"robot": ARM}),
-    "driven, relieved and held sliding joints": ("driven_arm", {"robot": sprung_arm()}),
-}
-
-
-def test_every_unit_that_is_shipped_is_here() -> None:
-    assert {name for name, _ in UNITS.values()} == set(block_names())
 
 
 @cache

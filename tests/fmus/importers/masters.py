@@ -93,14 +93,8 @@ def run_fmpy(system: System, step: float, steps: int) -> Trace:
     for scalar in inputs:
         rows[scalar.name] = block.inputs[scalar.name][: len(t)]
     shown = [scalar.name for scalar in system.outputs()]
-    found = simulate_fmu(
-        str(block.fmu),
-        stop_time=float(t[-1]),
-        output_interval=step,
-        input=rows if inputs else None,
-        output=shown,
-        fmi_type="CoSimulation",
-    )
+    options = {"stop_time": float(t[-1]), "output_interval": step, "fmi_type": "CoSimulation"}
+    found = simulate_fmu(str(block.fmu), input=rows if inputs else None, output=shown, **options)
     assert len(found) == len(t)
     return {name: {output: np.asarray(found[output], dtype=np.float64) for output in shown}}
 

@@ -207,18 +207,10 @@ print([[round(value, 9) for value in fmu.get(["y", "x"])] for fmu in (one, two)]
 
 USER_UNIT = """
 from urmpipe_fmus.block import BlockModel, Input, Output, State
-
-unit = BlockModel(
-    name="same",
-    description="A factor, and its integral",
-    variables=(
-        Input(name="u", description="input"),
-        Output(name="y", description="u times a factor"),
-        State(name="x", description="integral of y", output=True),
-    ),
-    outputs=lambda v: {{"y": {factor} * v.u}},
-    derivatives=lambda v: {{"x": {factor} * v.u}},
-)
+variables = [Input(name="u", description=""), Output(name="y", description="")]
+unit = BlockModel(name="same", description="A factor, and its integral",
+    variables=(*variables, State(name="x", description="", output=True)),
+    outputs=lambda v: {{"y": {factor} * v.u}}, derivatives=lambda v: {{"x": {factor} * v.u}})
 """
 
 

@@ -20,21 +20,8 @@ MOST_ULPS = 3 if EXACT is np.longdouble else 4
 """elementary.h promises 3 units in the last place; a C library of doubles is wrong by up to one itself."""
 
 EDGES = [
-    0.0,
-    -0.0,
-    1.0,
-    -1.0,
-    0.5,
-    2.0,
-    -2.0,
-    709.7,
-    709.8,
-    710.5,
-    -745.2,
-    1e-320,
-    1.7e308,
-    math.inf,
-    math.nan,
+    *(0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.0, 709.7, 709.8, 710.5, -745.2),
+    *(1e-320, 1.7e308, math.inf, math.nan),
 ]
 
 rng = np.random.default_rng(11)

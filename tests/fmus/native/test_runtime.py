@@ -87,20 +87,14 @@ def test_the_tests_of_the_runtime_pass_with_sanitizers() -> None:
     if not all(Path(one.strip()).is_file() for one in libraries):
         pytest.skip("needs gcc's libasan.so, to be loaded before Python")
     tests = [str(HERE / name) for name in ("test_states.py", "calls.cases")]
-    environment = {
+    env = {
         **os.environ,
         "CC": " ".join(["env", "-u", "LD_PRELOAD", *SANITIZED]),  # the compiler itself runs without
         "LD_PRELOAD": " ".join(map(str.strip, libraries)),
         "ASAN_OPTIONS": "detect_leaks=0",  # Python's own; those of the runtime the host would show
     }
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *tests],
-        env=environment,
-        cwd=HERE.parents[2],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *tests]
+    done = subprocess.run(command, cwd=HERE.parents[2], env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
     assert " passed" in done.stdout
     assert "skipped" not in done.stdout

@@ -5,7 +5,6 @@ from __future__ import annotations
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -14,7 +13,7 @@ from fmpy.validation import validate_fmu
 
 from asserting import refusal
 from loaded_fmu import Loaded
-from made_masses import with_drives, with_masses
+from shipped_units import UNITS
 from small_models import block, variable
 from stepped_unit import needs_native
 from urmpipe_fmus.block import Input, Output
@@ -23,8 +22,7 @@ from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.fmu_file import content_guid
 from urmpipe_fmus.native import native_unavailable_reason, this_platform
 from urmpipe_models.errors import FmuError
-from urmpipe_models.robots.catalogue import load_robot
-from written_units import TABLE, unit_of
+from written_units import unit_of
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -95,20 +93,10 @@ def test_platforms_that_cannot_be_compiled_here_are_refused_unless_python_is_ask
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [before]
 
 
-OPTIONS: dict[str, dict[str, Any]] = {
-    "kinematic_chain": {"robot": load_robot("urm6"), "rates": True},
-    "log_source": {"table": TABLE, "columns": [("q", "rad"), ("x", "m")], "interpolate": True},
-    "repolarizer": {"joints": 6},
-    "network_motion": {"network": "rssr", "points": ["output:0.25,0.04,0"]},
-    "chain_dynamics": {"robot": with_drives(with_masses(load_robot("urm6")))},
-    "driven_arm": {"robot": with_drives(with_masses(load_robot("urm6")))},
-}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", block_names())
 def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: str) -> None:
-    model = make_block(name, **OPTIONS.get(name, {}))
+    model = make_block(name, **dict(UNITS.values())[name])
     path = cached_fmu(model, "python")
     assert validate_fmu(str(path)) == []
     fmu = Loaded(path)
