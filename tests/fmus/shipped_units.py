@@ -14,7 +14,7 @@ from urmpipe_models.robots.catalogue import load_robot
 ROWS = np.random.default_rng(1).uniform(-3.0, 3.0, (30, 3))
 TABLE = Table(np.arange(30) * 7_000_000, ROWS)  # between the steps
 COLUMNS = [["q", "rad", 2], ["d", "m"]]
-ARM = with_drives(with_masses(load_robot("urm6")))  # in importers/ a log is run over a native FMU of it, too
+URM6 = with_drives(with_masses(load_robot("urm6")))  # in importers/ a log is run over native FMUs of it, too
 
 UNITS: dict[str, tuple[str, dict[str, Any]]] = {
     "a URM arm with rates": ("kinematic_chain", {"robot": load_robot("urm6"), "rates": True}),
@@ -33,6 +33,6 @@ UNITS: dict[str, tuple[str, dict[str, Any]]] = {
     "a set point": ("set_point", {}),
     "a network": ("network_motion", {"network": "rccc", "points": ["c3.body:0,0.1,0"]}),
     "sliding joints with masses": ("chain_dynamics", {"robot": sprung_arm()}),
-    "a URM arm with drives": ("driven_arm", {"robot": ARM}),
+    "a URM arm with drives": ("driven_arm", {"robot": URM6}),
     "driven, relieved and held sliding joints": ("driven_arm", {"robot": sprung_arm()}),
 }

@@ -77,8 +77,7 @@ def test_an_output_is_that_of_the_inputs_as_they_stand_without_a_step() -> None:
 
 
 def test_a_step_takes_the_sample_first_and_integrates_with_the_inputs_held() -> None:
-    instance = SteppedUnit(mixed())
-    instance.put(u=3.0)
+    instance = SteppedUnit(mixed(), {"u": 3.0})
     instance.do_step(0.0, 0.5)
     assert instance.read("m", "x", "y").tolist() == [3.0, -1.5, 6.0 - 1.5 + 300.0]
     instance.put(u=1.0)
@@ -97,8 +96,7 @@ def test_fixed_parameters_states_and_memories_are_set_before_the_first_step_only
 
 
 def test_a_step_whose_states_fail_leaves_all_as_it_was() -> None:
-    instance = SteppedUnit(mixed())
-    instance.put(fixed=1.0, u=2.0)
+    instance = SteppedUnit(mixed(), {"fixed": 1.0, "u": 2.0})
     before = everything(instance)
     assert refusal(UnitError, instance.do_step, 0.0, 1.0) == "unit mixed: state x is not finite at 0 s"
     assert everything(instance) == before  # also the sample that was taken before the states failed
@@ -180,8 +178,7 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
 @given(random_cases(6))
 def test_a_restored_instance_goes_on_bit_by_bit(case: UnitCase) -> None:
     model, start, columns = case
-    instance = SteppedUnit(model)
-    instance.put(**start)
+    instance = SteppedUnit(model, start)
 
     def go(first: int, last: int) -> list[Any]:
         seen = []
@@ -198,9 +195,8 @@ def test_a_restored_instance_goes_on_bit_by_bit(case: UnitCase) -> None:
     instance.restore(saved)
     assert go(3, 6) == expected
     assert pickle.dumps(saved) == kept  # going on has not changed what was saved
-    other = SteppedUnit(model)
-    other.restore(pickle.loads(kept))
-    instance = other
+    instance = SteppedUnit(model)
+    instance.restore(pickle.loads(kept))
     assert go(3, 6) == expected
 
 
@@ -220,8 +216,7 @@ def test_runs_side_by_side_are_the_single_runs() -> None:
     together.do_step(0.0, 0.5)
     [y, x] = together.get([together.reference("y"), together.reference("x")])
     for index, u in enumerate((3.0, -1.0, 0.5)):
-        single = SteppedUnit(mixed())
-        single.put(k=float(k[index]), u=u)
+        single = SteppedUnit(mixed(), {"k": float(k[index]), "u": u})
         single.do_step(0.0, 0.5)
         assert [y[index], x[index]] == single.read("y", "x").tolist()
 
@@ -287,8 +282,7 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
 def test_a_unit_without_memory_gives_at_once_what_it_gives_step_by_step(case: UnitCase) -> None:
     model, start, columns = case
     t = np.array([0.0, 0.125, 0.25, 0.375, 0.5])  # t + h is exact
-    found, instance = run(model, t, columns, start), SteppedUnit(model)
-    instance.put(**start)
+    found, instance = run(model, t, columns, start), SteppedUnit(model, start)
     for k, time in enumerate(t):
         instance.put(**{name: column[k] for name, column in columns.items()})
         for one in model.computed:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from scipy.optimize import root
 from asserting import refusal
 from fmu_run import FmuRun
 from made_masses import DRIVE, driven, with_drives, with_masses
+from shipped_units import URM6
 from sliding_arm import one_joint, sprung_arm, wristed
 from stepped_unit import SteppedUnit, make_unit, needs_native, run_system
 from urmpipe_fmus.block import BlockModel, Output
@@ -34,12 +34,6 @@ from urmpipe_models.robots.catalogue import load_robot
 
 PERIOD = 5e-3
 STILL = [0.0] * 6
-
-
-@cache
-def urm6() -> Chain:
-    """urm6 with masses that are made up, a drive on each joint."""
-    return with_drives(with_masses(load_robot("urm6")))
 
 
 class OneSystem:
@@ -93,7 +87,7 @@ class OneSystem:
 @needs_native
 def test_an_arm_at_rest_stays_for_two_seconds() -> None:
     # the arms of test_three_ways.py, whose FMUs are in the session's cache
-    for chain in (urm6(), sprung_arm()):
+    for chain in (URM6, sprung_arm()):
         model = make_block("driven_arm", robot=chain)
         with FmuRun(cached_fmu(model, "native"), model, {}) as fmu:
             found = fmu.over(PERIOD * np.arange(401, dtype=np.float64), {})
@@ -157,8 +151,8 @@ def test_a_force_on_the_tool_bends_the_springs_by_the_jacobian() -> None:
 
 def test_robots_with_too_little_voltage_are_refused() -> None:
     weak = DRIVE._replace(resistance=1e3)
-    robot = replace(urm6(), drives=tuple(driven(name, weak) for name in urm6().coordinates))
-    needed = [abs(one.current) * 1e3 for one in find_equilibrium(urm6())]
+    robot = replace(URM6, drives=tuple(driven(name, weak) for name in URM6.coordinates))
+    needed = [abs(one.current) * 1e3 for one in find_equilibrium(URM6)]
     assert max(needed) > 48.0 > min(needed)
     assert refusal(RobotError, make_block, "driven_arm", robot=robot).splitlines() == [
         f"robot urm6: drives.phi{k}: needs {volts:.4g} V to hold the arm at its start, allowed: u_max, 48 V"
@@ -198,12 +192,12 @@ TARGETS = np.array([0.5, 2.7, 0.6, 2.6, 0.4, 2.8])
 
 
 def system_of_urm6(step: float, duration: float) -> System:
-    """Return the system, its blocks at rest where the unit `driven_arm` of `urm6()` is."""
-    model = make_block("driven_arm", robot=urm6())
+    """Return the system, its blocks at rest where the unit `driven_arm` of `URM6` is."""
+    model = make_block("driven_arm", robot=URM6)
     at = {scalar: one.scalar_start(scalar) for scalar, one in model.scalars if not isinstance(one, Output)}
     no_wrench = {"force": STILL[:3], "moment": STILL[:3]}
-    starts: dict[str, dict[str, Any]] = {"arm": {"phi": list(urm6().start), **no_wrench}}
-    for k, (initial, target) in enumerate(zip(urm6().start, TARGETS.tolist(), strict=True), start=1):
+    starts: dict[str, dict[str, Any]] = {"arm": {"phi": list(URM6.start), **no_wrench}}
+    for k, (initial, target) in enumerate(zip(URM6.start, TARGETS.tolist(), strict=True), start=1):
         starts[f"set_point{k}"] = {"initial": initial, "target": target}
         starts[f"controller{k}"] = {"last": at[f"last[{k}]"]}
         starts[f"drive{k}"] = {name: at[f"{name}[{k}]"] for name in ("theta1", "i_a")}
@@ -212,15 +206,15 @@ def system_of_urm6(step: float, duration: float) -> System:
 
 
 def make_of_urm6(block: Block) -> BlockModel:
-    return make_block("chain_dynamics", robot=urm6()) if block.name == "arm" else make_unit(block)
+    return make_block("chain_dynamics", robot=URM6) if block.name == "arm" else make_unit(block)
 
 
 def as_one_function(duration: float) -> FloatArray:
     """Return the joints at the controllers' samples, of the unit `driven_arm`."""
-    model = make_block("driven_arm", robot=urm6())
+    model = make_block("driven_arm", robot=URM6)
     t = PERIOD * np.arange(round(duration / PERIOD) + 1, dtype=np.float64)
     columns = {name: np.empty((len(t), 6)) for name in ("set_phi", "set_phid", "set_phidd")}
-    for k, (initial, target) in enumerate(zip(urm6().start, TARGETS, strict=True)):
+    for k, (initial, target) in enumerate(zip(URM6.start, TARGETS, strict=True)):
         wanted = trapezoid(t, 0.1, initial, target, 2.0, 10.0)
         for name, values in zip(columns, wanted, strict=True):
             columns[name][:, k] = values

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,28 +23,18 @@ def solved(*arguments: object, **options: object) -> CosimulationRecord:
     return record
 
 
-def formula(name: str, inputs: str, y: str, **options: object) -> Foreign:
+def formula(name: str, inputs: str, y: str, **options: Any) -> Foreign:
     """Return an FMU whose output y follows from its inputs, one letter each."""
     values = ", ".join(f"{u} = v->r[{i}]" for i, u in enumerate(inputs))
-    return Foreign(
-        name=name,
-        scalars=(
-            *(Scalar(u, i, "input") for i, u in enumerate(inputs)),
-            Scalar("y", len(inputs), on=tuple(inputs)),
-        ),
-        compute=f"double {values}; v->r[{len(inputs)}] = {y};",
-        **options,  # type: ignore[arg-type]
-    )
+    ports = [Scalar(u, i, "input") for i, u in enumerate(inputs)]
+    scalars = (*ports, Scalar("y", len(inputs), on=tuple(inputs)))
+    return Foreign(name, scalars, f"double {values}; v->r[{len(inputs)}] = {y};", **options)
 
 
-def block(name: str, compute: str, *, u: str = "0", bounds: str = "", **options: object) -> Foreign:
+def block(name: str, compute: str, *, u: str = "0", bounds: str = "", **options: Any) -> Foreign:
     """Return an FMU with an input u, an output y that depends on it, and an output x; C computes them."""
-    return Foreign(
-        name=name,
-        scalars=(Scalar("u", 0, "input", start=u, extra=bounds), Scalar("y", 1, on=("u",)), Scalar("x", 2)),
-        compute=compute,
-        **{"start": f"m->v.r[0] = {u};", **options},  # type: ignore[arg-type]
-    )
+    scalars = (Scalar("u", 0, "input", start=u, extra=bounds), Scalar("y", 1, on=("u",)), Scalar("x", 2))
+    return Foreign(name, scalars, compute, **{"start": f"m->v.r[0] = {u};", **options})
 
 
 @pytest.mark.slow
@@ -103,14 +94,10 @@ def test_a_ring_of_many_inputs_is_solved() -> None:
     names = range(3)
     row = "v->r[10 + {i}] = {a} * v->r[0] + {b} * v->r[1] + {c} * v->r[2] + {i} + 1;"
     matrix = np.array([[0.3, -2.0, 0.5], [1.5, 0.2, -0.7], [-0.4, 3.0, 0.1]])
-    map3 = Foreign(
-        name="map3",
-        scalars=(
-            *(Scalar(f"u[{i}]", i, "input") for i in names),
-            *(Scalar(f"y[{i}]", 10 + i, on=("u[0]", "u[1]", "u[2]")) for i in names),
-        ),
-        compute=" ".join(row.format(i=i, a=a, b=b, c=c) for i, (a, b, c) in enumerate(matrix)),
-    )
+    inputs = tuple(Scalar(f"u[{i}]", i, "input") for i in names)
+    outputs = (Scalar(f"y[{i}]", 10 + i, on=("u[0]", "u[1]", "u[2]")) for i in names)
+    rows = (row.format(i=i, a=a, b=b, c=c) for i, (a, b, c) in enumerate(matrix))
+    map3 = Foreign("map3", (*inputs, *outputs), " ".join(rows))
     recorded = solved({"a": map3}, {"a.u": "a.y"})
     expected = np.linalg.solve(np.eye(3) - matrix, [1.0, 2.0, 3.0])
     assert np.allclose(recorded.values, expected, rtol=1e-10, atol=0.0)  # the tolerance, by the condition

@@ -60,12 +60,8 @@ def test_time_is_k_steps_and_an_fmus_own_time_meets_it(step: float, count: int) 
 
 def test_an_fmu_of_one_step_size_is_always_given_the_same() -> None:
     """t_k+1 - t_k differs from step to step in its last bits; such an FMU refuses any step but its first."""
-    fixed = Foreign(
-        name="fixed",
-        scalars=(Scalar("y", 1),),
-        step="if (!v->r[0]) v->r[0] = h; if (h != v->r[0]) return fmi2Error; v->r[1] += 1;",
-        variable_step=False,
-    )
+    code = "if (!v->r[0]) v->r[0] = h; if (h != v->r[0]) return fmi2Error; v->r[1] += 1;"
+    fixed = Foreign("fixed", (Scalar("y", 1),), step=code, variable_step=False)
     assert len({(k + 1) * 0.1 - k * 0.1 for k in range(10)}) > 1
     recorded = ran({"a": fixed})
     assert recorded.failed is None

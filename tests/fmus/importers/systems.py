@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from made_masses import with_drives, with_masses
+from shipped_units import UNITS, URM6
 from urmpipe_fmus.block import BlockModel, Input, Table, Variable
 from urmpipe_fmus.blocks import make_block
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.robots.catalogue import load_robot
 
 STEP = 0.005  # s; communication step
 MAX_INPUT = 2.0  # of inputs without bounds: angles, rates and volts for a small drive
@@ -27,20 +26,16 @@ CROSS_BUILT = ("delta_meter", "repolarizer", "log_source")  # booleans, integers
 
 def shipped_unit(name: str) -> BlockModel:
     """Return a shipped unit by name, of six joints where it has some."""
-    options: dict[str, Any] = {}
-    if name == "kinematic_chain":
-        options = {"robot": load_robot("urm6"), "rates": True}
-    elif name == "log_source":
-        t, joints = sample_times(400), np.arange(6)
-        swings = Table(np.rint(t * 1e9).astype(np.int64), np.sin(3.0 * t[:, None] + joints) + 0.1 * joints)
-        options = {"table": swings, "columns": [("q", "rad", 6)], "interpolate": True}
-    elif name in ("chain_dynamics", "driven_arm"):
-        options = {"robot": with_drives(with_masses(load_robot("urm6")))}
-    elif name == "repolarizer":
-        options = {"joints": 6}
-    elif name == "network_motion":
-        options = {"network": "four-bar"}
-    return make_block(name, **options)
+    t, joints = sample_times(400), np.arange(6)
+    swings = Table(np.rint(t * 1e9).astype(np.int64), np.sin(3.0 * t[:, None] + joints) + 0.1 * joints)
+    options: dict[str, dict[str, Any]] = {
+        "kinematic_chain": UNITS["a URM arm with rates"][1],
+        "log_source": {"table": swings, "columns": [("q", "rad", 6)], "interpolate": True},
+        "repolarizer": {"joints": 6},
+        "network_motion": {"network": "four-bar"},
+        **{arm: {"robot": URM6} for arm in ("chain_dynamics", "driven_arm")},
+    }
+    return make_block(name, **options.get(name, {}))
 
 
 def sample_times(count: int, step: float = STEP) -> FloatArray:
