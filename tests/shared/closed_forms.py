@@ -84,10 +84,8 @@ def arm_with_parallel_axes(
             direction[5] = direction[4]
         direction /= np.linalg.norm(direction, axis=1)[:, None]
         steps = np.diff(np.vstack((np.zeros(3), point)), axis=0)
-        joints = tuple(
-            Joint(f"j{k}", origin=from_offset(step.tolist()), axis=tuple(axis.tolist()))
-            for k, (step, axis) in enumerate(zip(steps, direction, strict=True))
-        )
+        pairs = enumerate(zip(steps.tolist(), direction.tolist(), strict=True))
+        joints = tuple(Joint(f"j{k}", origin=from_offset(at), axis=tuple(axis)) for k, (at, axis) in pairs)
         base, tip, tool = (from_offset(rng.uniform(-1.0, 1.0, 6).tolist()) for _ in range(3))
         chain = Chain("random", joints, tip, base, tool)
         if exact_closed_form(chain) is not None:
@@ -101,10 +99,8 @@ def kr3() -> Chain:
     frames += [(0.0, 0.0, 0.02), (0.26, 0.0, 0.0), (0.075, 0.0, 0.0)]
     y, back = (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)
     axes = [(0.0, 0.0, -1.0), y, y, back, y, back]
-    joints = (
-        Joint(f"joint_a{k}", origin=translation(*frame), axis=axis)
-        for k, (frame, axis) in enumerate(zip(frames, axes, strict=True), start=1)
-    )
+    pairs = enumerate(zip(frames, axes, strict=True), start=1)
+    joints = (Joint(f"joint_a{k}", origin=translation(*frame), axis=axis) for k, (frame, axis) in pairs)
     return Chain("kr3r540", tuple(joints))
 
 
@@ -200,9 +196,8 @@ def assert_met(
     """
     q = q.reshape(len(targets), -1, q.shape[-1])
     row, column = np.nonzero(np.isfinite(q).all(axis=2))
-    distance, turn = (
-        np.linalg.norm(error, axis=1) for error in pose_errors(chain, q[row, column], targets.rows(row))
-    )
+    errors = pose_errors(chain, q[row, column], targets.rows(row))
+    distance, turn = (np.linalg.norm(error, axis=1) for error in errors)
     np.testing.assert_allclose(distance, 0.0, rtol=0, atol=within)
     np.testing.assert_allclose(turn, 0.0, rtol=0, atol=within if angle is None else angle)
 

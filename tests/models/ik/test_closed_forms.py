@@ -12,32 +12,16 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+import closed_forms
 from asserting import there
-from closed_forms import (
-    EXACT,
-    FOLD,
-    SENSES,
-    SPECIAL,
-    UR,
-    WRISTS,
-    arm_of_kind,
-    arm_with_parallel_axes,
-    arm_with_wrist,
-    assert_solved,
-    described_anew,
-    distances,
-    form_of,
-    kr3,
-    random_joints,
-    solve_poses,
-)
+from closed_forms import EXACT, FOLD, SPECIAL, UR, WRISTS, arm_of_kind, form_of, random_joints, solve_poses
 from ik_arms import by_shorter_way
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.ik.closed import exact_closed_form
 from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.ik.spherical import SphericalWrist
-from urmpipe_models.kinematics.forward import Screws, chain_to_screws, jacobian_over_log
+from urmpipe_models.kinematics.forward import chain_to_screws, jacobian_over_log
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.math3d import from_offset, rotation_about
 from urmpipe_models.robots.catalogue import load_robot
@@ -58,8 +42,7 @@ def test_ten_thousand_poses_are_met_by_every_solution_the_given_one_among_them(n
     solutions = solve_poses(chain, random_joints(rng, chain, 10_000), given=1e-6 if name in UR else FOLD)
     counts = solutions.reached.sum(axis=1)
     assert ((counts == 8).mean() > 0.6) if name in UR else (set(counts) <= {2, 4, 6, 8})
-    assert np.nanmax(solutions.q) <= math.pi
-    assert np.nanmin(solutions.q) > -math.pi
+    assert np.nanmin(solutions.q) > -math.pi and np.nanmax(solutions.q) <= math.pi
 
 
 @pytest.mark.slow
@@ -68,7 +51,8 @@ def test_random_arms_are_solved(kind: str) -> None:
     rng = np.random.default_rng(len(kind))
     for number in range(8 if kind in list(SPECIAL)[1:] else 40):
         if kind == "closely":  # axes 5 and 6 pass each other; 1e-11 without the last polish
-            chain, within, given = arm_with_parallel_axes(rng, WRISTS[2], spread=0.05), 1e-12, 1e-5
+            chain = closed_forms.arm_with_parallel_axes(rng, WRISTS[2], spread=0.05)
+            within, given = 1e-12, 1e-5
         else:  # the root of the rounding
             chain, within, given = arm_of_kind(rng, kind, number), EXACT, 1e-6 if kind in WRISTS else FOLD
         q = random_joints(rng, chain, 60 if kind in SPECIAL else 100)
@@ -79,7 +63,7 @@ def test_random_arms_are_solved(kind: str) -> None:
 def test_prismatic_joints_among_the_first_three(kinds: str) -> None:
     for special in ("plain", "axes 1 and 2 meet", "axes 1 and 2 parallel"):
         rng = np.random.default_rng(7)
-        chains = [arm_with_wrist(rng, special, kinds) for _ in range(6)]
+        chains = [closed_forms.arm_with_wrist(rng, special, kinds) for _ in range(6)]
         with_form = [chain for chain in chains if exact_closed_form(chain)]
         for chain in with_form:
             solve_poses(chain, random_joints(rng, chain, 60))
@@ -107,7 +91,7 @@ def test_one_pose_alone_is_solved_as_among_many(seed: int, kind: str) -> None:
 @pytest.mark.parametrize("special", ["plain", "like a PUMA", "axes 1 and 2 meet"])
 def test_a_bad_row_gives_its_reason_and_touches_no_other(special: str) -> None:
     rng = np.random.default_rng(2)
-    chain = arm_with_wrist(rng, special)
+    chain = closed_forms.arm_with_wrist(rng, special)
     targets = forward_targets(chain, random_joints(rng, chain, 6))
     good = form_of(chain).solve(targets)
     targets.position[1], targets.position[2], there(targets.rotation)[3] = np.nan, np.inf, np.nan
@@ -133,12 +117,11 @@ def test_names_base_tool_and_zeros_change_no_branch(kind: str, seed: int) -> Non
     chain = arm_of_kind(rng, kind, seed)
     zeros = rng.uniform(-3.0, 3.0, 6)
     base, tool = (from_offset(rng.uniform(-1.0, 1.0, 6).tolist()) for _ in range(2))
-    other = described_anew(chain, base, tool, zeros)
+    other = closed_forms.described_anew(chain, base, tool, zeros)
     assert form_of(chain).branches == form_of(other).branches
     q = random_joints(rng, chain, 20)
-    first, second = (
-        form_of(arm).solve(forward_targets(arm, at)) for arm, at in ((chain, q), (other, q - zeros))
-    )
+    both = (chain, q), (other, q - zeros)
+    first, second = (form_of(arm).solve(forward_targets(arm, at)) for arm, at in both)
     # away from where two solutions meet: there a rounding may part or unite them, or move the given digits
     clear = (first.reached.sum(axis=1) == second.reached.sum(axis=1)) & ~is_crowded(first.q)
     assert clear.sum() >= 10
@@ -150,7 +133,7 @@ def test_names_base_tool_and_zeros_change_no_branch(kind: str, seed: int) -> Non
 @pytest.mark.parametrize("special", ["axes 2 and 3 parallel", "like a PUMA", "anthropomorphic"])
 def test_an_elbow_joint_that_counts_the_other_way_changes_no_branch(special: str) -> None:
     rng = np.random.default_rng(14)
-    chain = arm_with_wrist(rng, special)
+    chain = closed_forms.arm_with_wrist(rng, special)
     joints = list(chain.joints)
     x, y, z = joints[2].axis
     joints[2] = Joint("other way", "revolute", joints[2].origin, (-x, -y, -z))
@@ -171,7 +154,9 @@ def test_a_branch_keeps_its_name_along_a_path_between_singular_poses(kind: str) 
         chain = arm_of_kind(rng, kind)
         line = np.linspace(0.0, motion, 400)[:, None] * rng.uniform(-1, 1, 6)
         q = random_joints(rng, chain, 1) + line
-        column = distances(chain, form_of(chain).solve(forward_targets(chain, q)), q).argmin(axis=1)
+        column = closed_forms.distances(chain, form_of(chain).solve(forward_targets(chain, q)), q).argmin(
+            axis=1
+        )
         smallest = singularity_over_log(chain, q).smallest
         clear = np.minimum(smallest[1:], smallest[:-1]) > least
         assert not (np.diff(column) != 0)[clear].any()
@@ -189,7 +174,7 @@ def arm_points(form: SphericalWrist, q: FloatArray) -> list[FloatArray]:
     return points
 
 
-@pytest.mark.parametrize("chain", [load_robot("arm6"), kr3()], ids=lambda chain: chain.name)
+@pytest.mark.parametrize("chain", [load_robot("arm6"), closed_forms.kr3()], ids=lambda chain: chain.name)
 def test_elbow_up_is_above_the_line_from_shoulder_to_wrist_on_both_sides(chain: Chain) -> None:
     """Axis 1 of the first arm points upwards, of the other one downwards, and so does up."""
     form = form_of(chain)
@@ -227,9 +212,9 @@ def test_branches_of_a_ur_arm_are_where_they_say() -> None:
 
 def test_where_axes_5_and_6_are_parallel_right_is_where_axis_6_points() -> None:
     rng = np.random.default_rng(23)
-    for senses in SENSES:
-        chain = arm_with_parallel_axes(rng, WRISTS[1], senses)
-        screws, targets = screws_of(chain), forward_targets(chain, random_joints(rng, chain, 50))
+    for senses in closed_forms.SENSES:
+        chain = closed_forms.arm_with_parallel_axes(rng, WRISTS[1], senses)
+        screws, targets = there(chain_to_screws(chain)), forward_targets(chain, random_joints(rng, chain, 50))
         solutions = form_of(chain).solve(targets)
         axis1, axis2, *_, axis6 = screws.direction
         row, column = np.nonzero(solutions.reached)
@@ -240,13 +225,9 @@ def test_where_axes_5_and_6_are_parallel_right_is_where_axis_6_points() -> None:
         assert 0 < right.sum() < len(right)
 
 
-def screws_of(chain: Chain) -> Screws:
-    return there(chain_to_screws(chain))
-
-
 def angle_range(chain: Chain) -> tuple[float, float]:
     """Return the least and the largest angle between axes 4 and 6 in [rad], over a turn of joint 5."""
-    _, k2, _, k4, k5, k6 = screws_of(chain).direction
+    _, k2, _, k4, k5, k6 = there(chain_to_screws(chain)).direction
     axis6 = Rotation.from_rotvec(np.linspace(-math.pi, math.pi, 20_001)[:, None] * k5).apply(k6)
     angles = np.arccos(axis6 @ k4 * np.sign(k4 @ k2))
     return float(angles.min()), float(angles.max())
@@ -257,8 +238,9 @@ def test_the_limits_in_reasons_are_those_of_the_arm() -> None:
     rng = np.random.default_rng(31)
     seen: set[str] = set()
     for number in range(10):
-        chain = arm_with_parallel_axes(rng, WRISTS[0], SENSES[number % 4])
-        z, p = screws_of(chain).direction[1], screws_of(chain).point
+        chain = closed_forms.arm_with_parallel_axes(rng, WRISTS[0], closed_forms.SENSES[number % 4])
+        screws = there(chain_to_screws(chain))
+        z, p = screws.direction[1], screws.point
         upper, fore = (float(np.linalg.norm(np.cross(z, p[k + 1] - p[k]))) for k in (1, 2))
         bounds = {"from axis 2": (abs(upper - fore), upper + fore), "to axis 4": angle_range(chain)}
         targets = forward_targets(chain, random_joints(rng, chain, 100))
@@ -274,11 +256,11 @@ def test_the_limits_in_reasons_are_those_of_the_arm() -> None:
 
 
 def test_unreachable_tilt_of_a_wrist_that_is_not_square_has_figures() -> None:
-    chain = arm_with_wrist(np.random.default_rng(8), "like a PUMA", alpha4=0.5, alpha5=-0.8)
+    chain = closed_forms.arm_with_wrist(np.random.default_rng(8), "like a PUMA", alpha4=0.5, alpha5=-0.8)
     targets = forward_targets(chain, random_joints(np.random.default_rng(9), chain, 200))
     turned = Targets(targets.position, there(targets.rotation)[::-1].copy())
     solutions = form_of(chain).solve(turned)
-    assert_solved(chain, turned, solutions)
+    closed_forms.assert_solved(chain, turned, solutions)
     texts = {text for text in solutions.reasons.ravel() if text.startswith("axis 6")}
     assert len(texts) >= 20
     for text in texts:
@@ -296,10 +278,9 @@ def least_singular_value(chain: Chain, q: FloatArray) -> FloatArray:
 
 def eaik_solutions(chain: Chain, targets: Targets, row: int) -> FloatArray:
     """Return what EAIK finds and its own forward kinematics confirms, shape (k, 6)."""
-    screws = screws_of(chain)
-    robot = HPRobot(
-        screws.direction, np.diff(np.vstack((np.zeros(3), screws.point, screws.position)), axis=0)
-    )
+    screws = there(chain_to_screws(chain))
+    points = np.vstack((np.zeros(3), screws.point, screws.position))
+    robot = HPRobot(screws.direction, np.diff(points, axis=0))
     assert robot.hasSphericalWrist() == (form_of(chain).name == "spherical wrist")
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = there(targets.rotation)[row] @ screws.rotation.T, targets.position[row]

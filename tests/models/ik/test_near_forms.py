@@ -12,28 +12,13 @@ import numpy as np
 import pytest
 
 from asserting import refusal, there
-from closed_forms import (
-    arm_with_wrist,
-    as_built,
-    assert_solved,
-    distances,
-    moved,
-    random_joints,
-    solve_poses,
-)
+from closed_forms import arm_with_wrist, as_built, assert_solved, distances, moved, random_joints, solve_poses
 from ik_arms import limited
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.arm.denavit_hartenberg import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.closed import (
-    LOST_BRANCH_REASON,
-    MET,
-    NearClosedForm,
-    closed_form,
-    compact_axis_points,
-    iter_parallel_axes,
-    iter_spherical_wrists,
-)
+from urmpipe_models.ik import closed
+from urmpipe_models.ik.closed import LOST_BRANCH_REASON, MET, NearClosedForm, closed_form
 from urmpipe_models.ik.parallel_axes import parallel_axes
 from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.solve import solve
@@ -53,10 +38,8 @@ UR5E = [  # standard DH
     for name, d, a, alpha in zip("abcdef", D, A, (RIGHT, 0.0, 0.0, RIGHT, -RIGHT, 0.0), strict=True)
 ]
 # of modified parameters a and alpha stand a row later, the last in none
-MODIFIED = [
-    replace(row, a=before.a, alpha=before.alpha)
-    for row, before in zip(UR5E, (DHRow(name="base"), *UR5E[:-1]), strict=True)
-]
+ROWS = zip(UR5E, (DHRow(name="base"), *UR5E[:-1]), strict=True)
+MODIFIED = [replace(row, a=before.a, alpha=before.alpha) for row, before in ROWS]
 
 
 def described(how: str, chain: Chain, folder: Path) -> Chain:
@@ -79,18 +62,12 @@ def described(how: str, chain: Chain, folder: Path) -> Chain:
 
 
 HOW = ("URDF", "TOML joints", "names, base and tool")
+DESCRIBED = [(name, how, 1e-7) for name in ("ur5e", "arm6", "articulated6r") for how in HOW]
+DESCRIBED += [("ur5e", how, 1e-9) for how in ("standard", "modified", "a fixed frame")]
 
 
-@pytest.mark.parametrize(
-    ("name", "how", "within"),
-    [
-        *((name, how, 1e-7) for name in ("ur5e", "arm6", "articulated6r") for how in HOW),
-        *(("ur5e", how, 1e-9) for how in ("standard", "modified", "a fixed frame")),
-    ],
-)
-def test_an_arm_has_the_same_branches_in_the_same_order_whatever_describes_it(
-    name: str, how: str, within: float, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize(("name", "how", "within"), DESCRIBED)
+def test_branches_whatever_describes_an_arm(name: str, how: str, within: float, tmp_path: Path) -> None:
     chain = load_robot(name)
     other = described(how, chain, tmp_path)
     form, same = there(closed_form(chain)), there(closed_form(other))
@@ -143,9 +120,7 @@ def assert_all_found(chain: Chain, q: FloatArray) -> Solutions:
 
 
 @pytest.mark.parametrize(("name", "digits"), [("arm6", 4), ("arm6", 6), ("ur5e", 4), ("ur5e", 6)])
-def test_a_urdf_with_rounded_numbers_has_all_solutions_of_the_exact_arm(
-    tmp_path: Path, name: str, digits: int
-) -> None:
+def test_a_rounded_urdf_has_all_solutions_of_the_exact_arm(tmp_path: Path, name: str, digits: int) -> None:
     exact = load_robot(name)
     chain = rounded(exact, tmp_path, digits)
     before, form = there(closed_form(exact)), there(closed_form(chain))
@@ -206,9 +181,7 @@ def test_a_target_out_of_reach_or_not_finite_has_a_reason_and_stops_no_other() -
         assert message == "targets without orientation; allowed: poses"
 
 
-def test_near_an_aligned_wrist_a_lost_branch_has_a_reason_and_others_are_solved(
-    tmp_path: Path,
-) -> None:
+def test_near_an_aligned_wrist_a_lost_branch_has_a_reason_and_others_are_solved(tmp_path: Path) -> None:
     chain = as_built(load_robot("arm6"), 1e-3)
     q = random_joints(np.random.default_rng(2), chain, 200)
     q[:, 4] = np.random.default_rng(3).uniform(-2e-3, 2e-3, 200)  # about as far as the axes are off
@@ -223,8 +196,8 @@ def test_near_an_aligned_wrist_a_lost_branch_has_a_reason_and_others_are_solved(
 def idealised(chain: Chain) -> Chain:
     """Return the arm whose closed form an arm has nearly."""
     screws, names = there(chain_to_screws(chain)), chain.coordinates
-    wrists = (ideal for ideal in iter_spherical_wrists(screws) if spherical_wrist(ideal, names))
-    planes = (ideal for ideal in iter_parallel_axes(screws) if parallel_axes(ideal, names))
+    wrists = (ideal for ideal in closed.iter_spherical_wrists(screws) if spherical_wrist(ideal, names))
+    planes = (ideal for ideal in closed.iter_parallel_axes(screws) if parallel_axes(ideal, names))
     return screws_to_chain(next(chain_of(wrists, planes)), names)
 
 
@@ -256,7 +229,7 @@ def test_singular_poses_are_those_of_the_solutions_that_are_left() -> None:
 def test_frames_far_along_their_axes_change_nothing() -> None:
     screws = there(chain_to_screws(as_built(load_robot("ur5e"), 1e-4)))
     far = replace(screws, point=screws.point + screws.direction * np.array([[3, -50, 20, 70, 9, 1]]).T)
-    compact, other = compact_axis_points(screws), compact_axis_points(far)
+    compact, other = closed.compact_axis_points(screws), closed.compact_axis_points(far)
     np.testing.assert_allclose(compact.point, other.point, atol=1e-9)  # feet on lines 1e-4 from parallel
     assert compact.size == pytest.approx(other.size, abs=1e-9)
 

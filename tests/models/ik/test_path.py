@@ -27,9 +27,7 @@ amounts = st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)
 
 @settings(max_examples=15, deadline=None)  # the first case imports
 @given(amounts, amounts, st.sampled_from(["ur3", "ur5e", "ur10e"]))
-def test_the_motion_that_a_path_was_made_from_is_found_again(
-    first: list[float], by: list[float], robot: str
-) -> None:
+def test_the_motion_of_a_path_is_found_again(first: list[float], by: list[float], robot: str) -> None:
     q = line(by, 40, UR + np.array(first))
     path = follow(load_robot(robot), q)
     np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)

@@ -12,15 +12,9 @@ from ik_arms import follow, line, planar, times
 from urmpipe_datasets import LOGS
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik import path_numeric as sliding_window
+from urmpipe_models.ik import path_numeric
 from urmpipe_models.ik.path import JointPath, solve_path
-from urmpipe_models.ik.path_numeric import (
-    DAMPING,
-    SlidingWindow,
-    find_out_of_reach,
-    newton_sweep,
-    solve_recurrence,
-)
+from urmpipe_models.ik.path_numeric import DAMPING, SlidingWindow, newton_sweep, solve_recurrence
 from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.task import build_task
 from urmpipe_models.kinematics.forward import jacobian_over_log
@@ -78,8 +72,7 @@ def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(followed: Join
     J = jacobian_over_log(followed.chain, followed.q)[:, :3] / followed.singularity.length
     # the same matrix, decomposed twice
     np.testing.assert_allclose(smallest, np.linalg.svd(J, compute_uv=False)[:, -1], rtol=0.0, atol=1e-12)
-    assert smallest[0] < 1e-12
-    assert smallest[1000:].min() > 1e-3
+    assert smallest[0] < 1e-12 and smallest[1000:].min() > 1e-3
 
 
 @pytest.mark.slow
@@ -99,10 +92,8 @@ def test_windows_give_what_one_sample_after_the_other_gives(followed: JointPath)
 
 
 @pytest.mark.parametrize("longest", [96, 1000])
-def test_windows_of_other_sizes_give_the_same_motion(
-    followed: JointPath, longest: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sliding_window, "WINDOW_SIZE", longest)
+def test_windows_of_other_sizes(followed: JointPath, longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(path_numeric, "WINDOW_SIZE", longest)
     count = 1500
     path = solve_path(followed.chain, DEMO.rows(slice(count)), times(count))
     # rad: at the singular start the nanometre leaves that open; what comes after goes on from there
@@ -115,8 +106,7 @@ def test_windows_of_other_sizes_give_the_same_motion(
 def test_joints_within_pi_are_unwrapped_by_the_repolarizer(followed: JointPath) -> None:
     wrapped = solve_path(followed.chain, DEMO, followed.t_ns, within_pi=True)
     assert np.abs(followed.q).max() > math.pi
-    assert wrapped.q.max() <= math.pi
-    assert wrapped.q.min() > -math.pi
+    assert wrapped.q.min() > -math.pi and wrapped.q.max() <= math.pi
     again = repolarize(wrapped.q, np.append(0.0, np.diff(followed.t_ns) * 1e-9))
     assert len(again.rows) > 0
     # rad: whole turns taken off and added again
@@ -212,9 +202,7 @@ def test_one_sample_and_equal_samples_are_paths_too() -> None:
 
 @pytest.mark.parametrize("robot", ["ur5e", "arm6", "urm6"])
 @pytest.mark.parametrize(("place", "reason"), [(math.nan, "finite numbers"), (9.0, " m")])
-def test_a_path_of_which_no_sample_has_a_solution_has_a_reason_each(
-    robot: str, place: float, reason: str
-) -> None:
+def test_each_sample_of_a_path_without_solutions_has_a_reason(robot: str, place: float, reason: str) -> None:
     arm = load_robot(robot)
     targets = forward_targets(arm, np.full((3, 6), 0.3))
     targets.position[:] = place
@@ -333,4 +321,4 @@ def test_a_sweep_solves_the_linearised_path_exactly() -> None:
 def test_no_posture_is_too_far(robot: str) -> None:
     arm = load_robot(robot).placed(base=translation(5.0, -3.0, 1.0), tool=translation(0.1, 0.0, 0.2))
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (5000, len(arm.coordinates)))
-    assert not any(find_out_of_reach(arm, forward_targets(arm, q), None))
+    assert not any(path_numeric.find_out_of_reach(arm, forward_targets(arm, q), None))

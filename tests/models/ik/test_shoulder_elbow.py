@@ -12,9 +12,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.spherical import SphericalWrist
 
 
-def left_sides(
-    d: FloatArray, a: FloatArray, alpha: FloatArray, q3: FloatArray, wrist: FloatArray
-) -> FloatArray:
+def pieper(d: FloatArray, a: FloatArray, alpha: FloatArray, q3: FloatArray, wrist: FloatArray) -> FloatArray:
     """Pieper's equation of q3, zero at every posture.
 
     With the wrist at f(q3) before joint 2, r = |w - d1 z|^2 and h = z . w - d1 of the wrist centre w:
@@ -64,7 +62,7 @@ def test_a_general_arm_has_as_many_postures_as_piepers_equation_has_roots() -> N
         wrists += np.array(chain.base.translation)[:, None]
         postures = form.arm.solve(wrists)
         for row, wrist in enumerate(wrists.T):
-            values = left_sides(d, a, alpha, q3, np.array(at_base.point(tuple(wrist))))
+            values = pieper(d, a, alpha, q3, np.array(at_base.point(tuple(wrist))))
             roots = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
             if (len(roots) and np.diff(roots).min(initial=99) < 20) or is_grazing(values):
                 continue  # near a double root the grid may miss both

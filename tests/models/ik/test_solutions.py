@@ -54,9 +54,7 @@ def test_where_there_is_no_pose_there_is_no_turn_and_positions_have_none_at_all(
 @pytest.mark.slow
 @settings(deadline=None)
 @given(st.floats(-math.pi, math.pi), st.floats(-20.0, 20.0), st.floats(0.0, 20.0), st.floats(-30.0, 30.0))
-def test_of_all_turns_within_the_limits_the_nearest_is_taken(
-    value: float, lower: float, width: float, near: float
-) -> None:
+def test_the_nearest_turn_in_limits_is_taken(value: float, lower: float, width: float, near: float) -> None:
     chain = Chain("arm", (Joint("q1", lower=lower, upper=lower + width),))
     one = Solutions(np.array([[[value]]]), ("only",), np.array([[""]], dtype=np.object_))
     found = limit_solutions(chain, one, np.array([near]))

@@ -70,9 +70,8 @@ def test_a_joint_that_a_singular_pose_leaves_free_is_taken_from_the_start() -> N
     assert distances(UR5E, every, q[None]).min() < 1e-9
     # all solutions without a start: by the convention, not by the robot's own start
     turned = replace(UR5E, start=(*UR5E.start[:5], 0.8))
-    (by_start,), (by_convention,), (by_own_start,) = (
-        found.singular for found in (every, solve(turned, targets, every=True), solve(turned, targets))
-    )
+    found = every, solve(turned, targets, every=True), solve(turned, targets)
+    (by_start,), (by_convention,), (by_own_start,) = (each.singular for each in found)
     assert by_start.chosen == by_own_start.chosen
     assert by_start.chosen.startswith("wrist_3_joint as near, a")
     assert by_convention.chosen.startswith("wrist_3_joint = 0, and pi more for the flipped wrist")
@@ -99,9 +98,7 @@ def test_solutions_are_in_the_turn_nearest_to_the_start_that_the_limits_allow() 
         ("ur5e", [0.3, -1.0, 1.2, 1.9, 0.0, 0.1], 1.95),
     ],
 )
-def test_where_limits_refuse_the_choice_of_a_free_joint_they_choose(
-    name: str, q: list[float], limit: float
-) -> None:
+def test_where_limits_refuse_a_free_joint_they_choose_it(name: str, q: list[float], limit: float) -> None:
     chain = limited(load_robot(name), -limit, limit)
     targets = forward_targets(chain, np.array([q]))
     for start in (None, np.zeros(6), np.array(q)):
