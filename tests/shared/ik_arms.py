@@ -15,7 +15,6 @@ from urmpipe_models.ik.limits import joint_limits
 from urmpipe_models.ik.path import JointPath, solve_path
 from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.math3d import translation
-from urmpipe_models.robots.catalogue import load_robot
 
 PERIOD = 5_000_000  # ns
 UR = np.array([0.3, -1.2, 1.4, -0.8, 1.2, 0.3])  # a pose in rad of a UR arm, its elbow and wrist bent
@@ -62,13 +61,3 @@ def follow(chain: Chain, q: FloatArray, targets: Targets | None = None, **option
     """Solve the path of joint values at 5 ms, or that of other targets, from the first of them on."""
     targets = forward_targets(chain, q) if targets is None else targets
     return solve_path(chain, targets, times(len(targets)), **{"start": q[0], **options})
-
-
-def moved_over_a_gap(by: list[float]) -> tuple[FloatArray, Targets]:
-    """Return joint values in rad and poses of a UR5e that moves while its targets are out of reach."""
-    first = line([0.1] * 6, 20)
-    first[:, 4] -= 0.9
-    q = np.vstack((first, first + np.array(by)))
-    targets = forward_targets(load_robot("ur5e"), q)
-    targets.position[18:22, 2] += 3.0
-    return q, targets
