@@ -46,9 +46,7 @@ def parameter_values(chain: Chain) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("file", [*robot_names(), *URDFS])
-def test_a_robot_with_its_own_values_is_the_same_bit_by_bit(
-    request: pytest.FixtureRequest, file: str
-) -> None:
+def test_a_robot_of_its_own_values_is_the_same_by_bits(request: pytest.FixtureRequest, file: str) -> None:
     if file in URDFS:
         chain = load_robot(request.getfixturevalue("shared") / "robots" / file, tip_link=URDFS[file])
         first = chain.joints[0].name
@@ -65,9 +63,7 @@ def test_a_robot_with_its_own_values_is_the_same_bit_by_bit(
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
-def test_a_frame_is_what_stands_before_a_parameter_its_motion_and_what_stands_after(
-    chains: SearchStrategy[Chain], data: st.DataObject
-) -> None:
+def test_a_frame_is_before_step_and_after_in_turn(chains: SearchStrategy[Chain], data: st.DataObject) -> None:
     chain = data.draw(chains)
     assert len(parameter_values(chain)) == len(chain.parameters)  # names are unique
     for one in chain.parameters:
@@ -78,8 +74,7 @@ def test_a_frame_is_what_stands_before_a_parameter_its_motion_and_what_stands_af
 
 
 def test_a_frame_of_numbers_alone_turns_after_its_rotation() -> None:
-    turned = rotation_x(0.5)
-    tool = Transform(turned.rotation, (0.1, 0.2, 0.3))
+    tool = Transform(rotation_x(0.5).rotation, (0.1, 0.2, 0.3))
     arm = Chain("arm", (Joint("a"),)).placed(tool=tool)
     assert [one.value for one in arm.parameters[-6:]] == [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]
     assert arm.parameters[-1].before == tool
@@ -121,9 +116,7 @@ five_values = st.lists(st.floats(-2.0, 2.0), min_size=5, max_size=5)
 @pytest.mark.parametrize("kind", DESCRIBED)
 @settings(max_examples=20, deadline=None)
 @given(five_values, five_values)
-def test_other_values_make_the_arm_that_they_describe(
-    kind: str, values: Sequence[float], others: Sequence[float]
-) -> None:
+def test_values_make_the_arm_described(kind: str, values: Sequence[float], others: Sequence[float]) -> None:
     made, names = DESCRIBED[kind]
     found = made(*values).with_parameters(dict(zip(names.split(), others, strict=True)))
     assert found == made(*others)
@@ -164,9 +157,7 @@ def test_values_may_be_arrays() -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from([3, 4, 6]), st.sampled_from(["rod", "plate", "point"]))
-def test_a_body_that_was_turned_and_printed_with_few_digits_is_a_body(
-    seed: int, digits: int, what: str
-) -> None:
+def test_a_body_turned_and_printed_with_few_digits_is_a_body(seed: int, digits: int, what: str) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.uniform(0.5, 1.0, 2)
     moments = {"rod": (0.0, a, a), "plate": (a, b, a + b), "point": (0.0, 0.0, 0.0)}[what]

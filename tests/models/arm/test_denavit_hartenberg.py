@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import casadi
@@ -49,14 +50,12 @@ def homogeneous(frame: Transform) -> FloatArray:
     return result
 
 
-MATRICES = pytest.mark.parametrize(
-    ("build", "matrix"), [(builders.dh_chain, standard), (builders.modified_dh_chain, modified)]
-)
+MATRICES = [(builders.dh_chain, standard), (builders.modified_dh_chain, modified)]
 
 
 @pytest.mark.slow
 @settings(max_examples=50, deadline=None)
-@MATRICES
+@pytest.mark.parametrize(("build", "matrix"), MATRICES)
 @given(data=st.data())
 def test_the_tip_is_the_product_of_the_matrices(
     build: Any, matrix: Any, dh_rows: SearchStrategy[list[DHRow]], data: st.DataObject
@@ -74,19 +73,14 @@ def test_the_tip_is_the_product_of_the_matrices(
     np.testing.assert_allclose(homogeneous(tip), expected @ homogeneous(tool), rtol=0.0, atol=ROUNDING)
 
 
-@MATRICES
+@pytest.mark.parametrize(("build", "matrix"), MATRICES)
 def test_a_fixed_row_is_its_matrix_and_takes_no_coordinate(build: Any, matrix: Any) -> None:
-    rows = [
-        DHRow(0.1, 0.2, 0.3, 0.4),
-        DHRow(0.5, 0.6, 0.7, 0.8, kind="fixed"),
-        DHRow(0.9, -0.2, 0.1, -0.4, kind="prismatic"),
-        DHRow(-0.3, 0.1, 0.2, 1.1, name="flange", kind="fixed"),
-    ]
-    chain = build("arm", rows)
+    first, second = DHRow(0.1, 0.2, 0.3, 0.4), DHRow(0.9, -0.2, 0.1, -0.4, kind="prismatic")
+    still, end = DHRow(0.5, 0.6, 0.7, 0.8), DHRow(-0.3, 0.1, 0.2, 1.1, name="flange")
+    chain = build("arm", [first, replace(still, kind="fixed"), second, replace(end, kind="fixed")])
     assert chain.coordinates == ("q1", "q2")
     assert [joint.name for joint in chain.joints] == ["q1", "frame2", "q2", "flange"]
-    still = DHRow(0.5, 0.6, 0.7, 0.8), DHRow(-0.3, 0.1, 0.2, 1.1)  # the same rows as joints at 0
-    expected = matrix(rows[0], 1.2) @ matrix(still[0], 0.0) @ matrix(rows[2], 0.7) @ matrix(still[1], 0.0)
+    expected = matrix(first, 1.2) @ matrix(still, 0.0) @ matrix(second, 0.7) @ matrix(end, 0.0)
     got = homogeneous(forward(chain, [1.2, 0.7])[-1])
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=ROUNDING)
 
@@ -103,12 +97,8 @@ TRTTR1 = (
 TIP = (0.0, 0.12, 0.03)
 
 lengths = st.floats(-1.0, 1.0, allow_subnormal=False)
-geometric_rows = st.builds(
-    GeometricModelRow,
-    st.sampled_from(["R", "T"]),
-    st.sampled_from(["x", "y", "z"]),
-    st.tuples(lengths, lengths, lengths),
-)
+places = st.tuples(lengths, lengths, lengths)
+geometric_rows = st.builds(GeometricModelRow, st.sampled_from("RT"), st.sampled_from("xyz"), places)
 
 
 def products(rows: Any, q: Any, tip: Any) -> tuple[list[FloatArray], list[FloatArray]]:
@@ -127,7 +117,7 @@ def products(rows: Any, q: Any, tip: Any) -> tuple[list[FloatArray], list[FloatA
 @given(st.lists(geometric_rows, min_size=1, max_size=7), st.data())
 def test_it_is_matrix_products_and_the_chain(rows: list[GeometricModelRow], data: st.DataObject) -> None:
     q = data.draw(st.lists(st.floats(-4.0, 4.0), min_size=len(rows), max_size=len(rows)))
-    tip = data.draw(st.tuples(lengths, lengths, lengths))
+    tip = data.draw(places)
     model = geometric_model(rows, q, tip)
     rotations, steps = products(rows, q, tip)
     np.testing.assert_allclose(model.rotations, rotations, rtol=0.0, atol=ROUNDING)
@@ -145,18 +135,15 @@ def test_an_arm_that_slides_by_hand() -> None:
     s1, turn, s3, s4, swing = 0.1, math.pi / 2, 0.2, -0.3, math.pi / 2
     model = geometric_model(TRTTR1, [s1, turn, s3, s4, swing], TIP)
     # up by 0.4 + 0.1; then y becomes -x and x becomes y; then the gripper's y points up and its z along x
-    expected = [
-        (0.0, 0.0, 0.5), (0.0, 0.1, 0.2), (-0.5, 0.05, 0.0), (0.0, -0.2, -0.2), (-0.25, 0.0, 0.0),
-        (0.03, 0.0, 0.12),
-    ]  # fmt: skip
+    expected = [(0.0, 0.0, 0.5), (0.0, 0.1, 0.2), (-0.5, 0.05, 0.0), (0.0, -0.2, -0.2)]
+    expected += [(-0.25, 0.0, 0.0), (0.03, 0.0, 0.12)]
     np.testing.assert_allclose(model.steps, expected, rtol=0.0, atol=1e-16)
-    np.testing.assert_allclose(model.positions[-1], (-0.72, -0.05, 0.62), rtol=0.0, atol=2e-16)
+    pose = (-0.72, -0.05, 0.62, math.pi / 2, math.pi / 2, 0.0)
+    np.testing.assert_allclose(model.positions[-1], pose[:3], rtol=0.0, atol=2e-16)
     axes = model.equations[3:]
     np.testing.assert_allclose(axes, (0, 1, 0, 0, 0, 1, 1, 0, 0), rtol=0.0, atol=1e-16)
     assert model.equations[:3] == model.positions[-1]
-    np.testing.assert_allclose(
-        model.operational, (-0.72, -0.05, 0.62, math.pi / 2, math.pi / 2, 0.0), rtol=0.0, atol=2e-16
-    )
+    np.testing.assert_allclose(model.operational, pose, rtol=0.0, atol=2e-16)
 
 
 def test_a_column_of_joint_values_and_symbols_take_the_same_lines() -> None:

@@ -42,11 +42,6 @@ def pieces(solids: Sequence[Visual]) -> list[FloatArray]:
     return [ends_of(one) for one in solids if isinstance(one.shape, Capsule)]
 
 
-def scaled(chain: Chain, factor: float) -> Chain:
-    lengths = {one.name: factor * one.value for one in chain.parameters if one.kind == "along"}
-    return chain.with_parameters(lengths)
-
-
 def coloured(chain: Chain) -> dict[str, Visual]:
     """Return the solids of the joints that are drawn, by name."""
     colours = {joint.name: (0.1, 0.2, 0.3, 1.0) for joint in chain.joints}
@@ -57,9 +52,7 @@ def coloured(chain: Chain) -> dict[str, Visual]:
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
-def test_solids_of_any_arm_can_be_drawn_and_hang_on_moving_joints(
-    chains: SearchStrategy[Chain], data: st.DataObject
-) -> None:
+def test_solids_can_be_drawn_and_hang_on_joints(chains: SearchStrategy[Chain], data: st.DataObject) -> None:
     chain = data.draw(chains)
     solids = build_placeholder_solids(chain)
     moving = [joint.name for joint in chain.joints if joint.kind != "fixed"]
@@ -74,17 +67,14 @@ def test_solids_of_any_arm_can_be_drawn_and_hang_on_moving_joints(
 
 
 @pytest.mark.parametrize("name", robot_names())
-def test_links_lead_from_joint_to_joint_without_a_gap_by_cylinders_on_the_axes(
-    name: str,
-) -> None:
+def test_links_lead_from_joint_to_joint_without_a_gap_by_cylinders_on_the_axes(name: str) -> None:
     chain = load_robot(name)
     solids = coloured(chain)
     assert list(solids) == list(chain.coordinates)  # of irb60's mimics none
     for joint in chain.moving:
-        assert isinstance(solids[joint.name].shape, Cylinder)
-        np.testing.assert_allclose(
-            np.cross(ends_of(solids[joint.name]), joint.axis), 0.0, atol=1e-15
-        )  # rounding
+        solid = solids[joint.name]
+        assert isinstance(solid.shape, Cylinder)
+        np.testing.assert_allclose(np.cross(ends_of(solid), joint.axis), 0.0, atol=1e-15)  # rounding
     moving = [k for k, joint in enumerate(chain.joints) if joint.kind != "fixed"]
     position, rotation = frames_over_log(chain, np.array([[0.3 + 0.2 * k for k in range(len(chain.start))]]))
     for k, following in pairwise([None, *moving[:-1]]):
@@ -124,7 +114,8 @@ def test_no_link_goes_astray(alpha: float, d: float, a: float) -> None:
 @pytest.mark.parametrize("name", ["urm6", "ur5e", "panda"])
 def test_solids_are_as_large_as_their_arm(name: str, factor: float) -> None:
     small = load_robot(name).placed(tool=translation(0.0, 0.02, 0.1))
-    pair = build_placeholder_solids(small), build_placeholder_solids(scaled(small, factor))
+    lengths = {one.name: factor * one.value for one in small.parameters if one.kind == "along"}
+    pair = build_placeholder_solids(small), build_placeholder_solids(small.with_parameters(lengths))
     for one, large in zip(*pair, strict=True):
         np.testing.assert_allclose(ends_of(large), factor * ends_of(one), rtol=1e-6, atol=1e-9 * factor)
         assert type(large.shape) is type(one.shape)
@@ -169,9 +160,7 @@ def test_joints_at_one_place_do_not_hide_each_other() -> None:
         (-1.7e308, 0.3, (-0.7, 0.3)),  # which stands for none in a URDF
     ],
 )
-def test_a_sliding_joint_is_a_box_on_a_rail_as_long_as_its_limits(
-    lower: float, upper: float, rail: tuple[float, float]
-) -> None:
+def test_a_sliding_joint_is_a_box_on_a_rail(lower: float, upper: float, rail: tuple[float, float]) -> None:
     slide = Joint("slide", "prismatic", translation(0.0, 0.0, 0.4), (1.0, 0.0, 0.0), lower, upper)
     chain = Chain("arm", (Joint("turn"), slide), tip=translation(0.0, 0.0, 0.3))
     (on_link,) = (one for one in on(chain, "turn") if isinstance(one.shape, Box))
@@ -183,10 +172,8 @@ def test_a_sliding_joint_is_a_box_on_a_rail_as_long_as_its_limits(
 
 def test_a_gantry_of_rails_alone_is_as_thick_as_they_are_long() -> None:
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)
-    joints = tuple(
-        Joint(f"q{k}", "prismatic", axis=axis, lower=0.0, upper=0.8) for k, axis in enumerate(axes)
-    )
-    shapes = [one.shape for one in build_placeholder_solids(Chain("gantry", joints))]
+    joints = [Joint(f"q{k}", "prismatic", axis=axis, lower=0.0, upper=0.8) for k, axis in enumerate(axes)]
+    shapes = [one.shape for one in build_placeholder_solids(Chain("gantry", tuple(joints)))]
     assert all(0.01 < min(shape.size) < 0.1 for shape in shapes if isinstance(shape, Box))
 
 
