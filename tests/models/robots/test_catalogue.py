@@ -40,10 +40,8 @@ def test_a_robot_says_what_it_is_and_starts_within_its_ranges(name: str) -> None
 def test_universal_robots_geometry_limits_and_speeds(name: str) -> None:
     d1, a2, a3, d4, d5, d6 = DH[name]
     chain = load_robot(name)
-    assert chain.coordinates == (
-        "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
-        "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
-    )  # fmt: skip
+    joints = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+    assert chain.coordinates == tuple(f"{joint}_joint" for joint in joints)
     # stretched along -x (a2, a3 < 0), the wrist's offsets d4 and d6 to -y, d5 down
     tip = forward(chain, [0.0] * 6)[-1].translation
     np.testing.assert_allclose(tip, [a2 + a3, -d4 - d6, d1 - d5], atol=1e-15)  # rounding
@@ -80,10 +78,8 @@ URDFS = {  # robot, file, its link at the robot's tip, FK to [m, -], speeds and 
     # its right angles have 12 digits: 2.6e-12 rad times seven of them and 1 m
     "panda of FancySafeBot": ("panda", "FancySafeBot_fsb-library/panda.urdf", "panda_link8", 5e-11, None),
     # its limits are degrees cut to four digits: 2.0942 for 120 deg
-    "iiwa14 of ROS-Industrial": (
-        "iiwa14", "ros-industrial_kuka_experimental/lbr_iiwa_14_r820.urdf", "tool0", 1e-15, 3e-4,
-    ),
-}  # fmt: skip
+    "iiwa14": ("iiwa14", "ros-industrial_kuka_experimental/lbr_iiwa_14_r820.urdf", "tool0", 1e-15, 3e-4),
+}
 
 
 @pytest.mark.parametrize("which", list(URDFS))

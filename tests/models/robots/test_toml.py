@@ -27,9 +27,7 @@ def bits(chain: Chain) -> str:
 @pytest.mark.slow
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_a_toml_file_and_a_dictionary_are_the_same_chain_bit_by_bit(
-    heavy_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
-) -> None:
+def test_round_trip_of_bits(heavy_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path) -> None:
     chain = data.draw(heavy_chains)
     path = tmp_path / f"{chain.name or 'x'}.toml" if chain.name.isalnum() else tmp_path / "x.toml"
     path.write_text(robot_toml(chain), encoding="utf-8", newline="\n")

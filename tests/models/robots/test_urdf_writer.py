@@ -49,10 +49,8 @@ def assert_same(chain: Chain, back: Chain) -> None:
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_the_file_read_back_is_the_same_chain(
-    heavy_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
-) -> None:
-    """With its efforts, its masses on each joint in order, and its shapes likewise."""
+def test_what_is_read_back(heavy_chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path) -> None:
+    """The same chain with its efforts, its masses on each joint in order, and its shapes likewise."""
     chain = data.draw(heavy_chains)
     write_urdf(chain, tmp_path / "chain.urdf")
     back = read_urdf(tmp_path / "chain.urdf")
@@ -86,9 +84,7 @@ def configuration(model: Any, values: list[float]) -> Any:
 
 @settings(deadline=None, max_examples=25)
 @given(data=st.data())
-def test_pinocchio_reads_the_file_as_the_same_chain(
-    chains: SearchStrategy[Chain], data: st.DataObject
-) -> None:
+def test_pinocchio_reads_the_same_chain(chains: SearchStrategy[Chain], data: st.DataObject) -> None:
     pin = pytest.importorskip("pinocchio")
     chain = data.draw(chains.filter(lambda one: bool(one.name)))
     model = pin.buildModelFromXML(urdf_text(chain))
@@ -106,14 +102,10 @@ def test_pinocchio_reads_the_file_as_the_same_chain(
     assert_same_frame(tip, peers.oMf[model.getFrameId("tool0", pin.FrameType.BODY)])
 
 
-@pytest.mark.parametrize(
-    "chain",
-    [
-        load_robot("urm6"),
-        dh_chain("bent", [DHRow(0.3, 0.1, -0.2, 0.4), DHRow(1.0, -0.2, 0.0, 2.0), DHRow(0.0, 0.0, 0.3, 0.0)]),
-    ],
-    ids=lambda chain: str(chain.name),
-)
+BENT = dh_chain("bent", [DHRow(0.3, 0.1, -0.2, 0.4), DHRow(1.0, -0.2, 0.0, 2.0), DHRow(0.0, 0.0, 0.3, 0.0)])
+
+
+@pytest.mark.parametrize("chain", [load_robot("urm6"), BENT], ids=["urm6", "bent"])
 def test_an_arm_that_shows_nothing_gets_solids_in_shapes_that_urdf_has(chain: Chain, tmp_path: Path) -> None:
     """They are read by another name of their material; by ours they are left out."""
     path = tmp_path / "arm.urdf"
@@ -159,9 +151,7 @@ def test_pinocchio_reads_the_same_inertias(shared: Path, file: str, tip: str) ->
 @pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(data=st.data())
-def test_pinocchio_reads_the_file_that_was_written(
-    heavy_chains: SearchStrategy[Chain], data: st.DataObject
-) -> None:
+def test_pinocchio_reads_written_inertias(heavy_chains: SearchStrategy[Chain], data: st.DataObject) -> None:
     pin = pytest.importorskip("pinocchio")
     chain = data.draw(heavy_chains.filter(lambda one: bool(one.name and one.inertials)))
     assert_same_inertias(chain, pin.buildModelFromXML(urdf_text(chain)))
