@@ -15,10 +15,7 @@ from urmpipe_models.dynamics.driven_arm import spectral_radius
 from urmpipe_models.dynamics.links import Wrench
 from urmpipe_models.robots.catalogue import load_robot
 
-PERIOD = 5e-3
-MASS, RADIUS = 2.0, 0.5
-GRAVITY = 9.81
-
+PERIOD, MASS, RADIUS, GRAVITY = 5e-3, 2.0, 0.5, 9.81
 EXACT = 1e-7  # of values of about 1: eigenvalues of rates up to 1e3 / s; differences of gravity, 1e-16 / 1e-5
 
 

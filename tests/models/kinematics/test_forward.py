@@ -51,6 +51,10 @@ SLIDING_ARM = Chain(
     base=Transform(rotation_z(math.pi / 2).rotation, (1.0, 0.0, 0.0)),
     tool=rotation_x(-math.pi / 2),
 )
+SCREWS = there(chain_to_screws(SLIDING_ARM))
+ALTERNATING = (0.0, math.pi, 0.0, math.pi, 0.0, math.pi)
+# In m and for the entries of R: rounding of some hundred operations on 1 to 2 m is about 1e-15
+AGREES = 1e-12
 
 
 def test_frames_are_the_base_and_what_each_joint_moves() -> None:
@@ -75,9 +79,6 @@ def test_a_mimic_moves_with_its_leader_and_has_no_coordinate() -> None:
     assert_allclose(point_motions(chain, [0.2], [1.5], [0.0])[-1].velocity, [-3.0, 0.0, -1.5])
 
 
-SCREWS = there(chain_to_screws(SLIDING_ARM))
-
-
 @pytest.mark.parametrize(
     "call",
     [
@@ -90,11 +91,6 @@ SCREWS = there(chain_to_screws(SLIDING_ARM))
 def test_there_is_a_value_for_each_coordinate_and_a_name_for_each_screw(call: Callable[[], object]) -> None:
     with pytest.raises(ValueError, match=r"zip\(\) argument \d is (shorter|longer) than argument"):
         call()
-
-
-ALTERNATING = (0.0, math.pi, 0.0, math.pi, 0.0, math.pi)
-# In m and for the entries of R: rounding of some hundred operations on 1 to 2 m is about 1e-15
-AGREES = 1e-12
 
 
 def test_poses_of_urm6_are_the_papers() -> None:

@@ -26,10 +26,6 @@ REACH = 6.0
 """No arm here reaches as far in [m]: the most that a third derivative of its pose by an angle can be."""
 
 
-def q_of(chain: Chain, samples: int = 4) -> FloatArray:
-    return np.random.default_rng(1).uniform(-1.0, 1.0, (samples, len(chain.coordinates)))
-
-
 def twists_of(chain: Chain) -> list[Twist]:
     """A shift and a turn on a skew axis of each frame."""
     places = range(BASE, len(chain.joints) + 3)
@@ -40,7 +36,7 @@ def twists_of(chain: Chain) -> list[Twist]:
 @pytest.mark.parametrize("largest", [0.0, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_sensitivities_are_the_slopes_of_the_pose(chain: Chain, largest: float) -> None:
     """Compare those of a changed arm with differences of the pose: p' = v, R' = [w] R."""
-    q, twists = q_of(chain), twists_of(chain)
+    q, twists = np.random.default_rng(1).uniform(-1.0, 1.0, (4, len(chain.coordinates))), twists_of(chain)
     values = np.random.default_rng(2).uniform(-largest, largest, len(twists)).tolist()
     changes = [*zip(twists, values, strict=True)]
     changed, located = apply_twists(chain, changes)
@@ -59,7 +55,7 @@ def test_sensitivities_are_the_slopes_of_the_pose(chain: Chain, largest: float) 
 
 
 def test_a_base_that_is_turned_turns_all_poses_and_the_first_of_two_changes_is_the_outermost() -> None:
-    chain, q = ARMS[0], q_of(ARMS[0])
+    chain, q = ARMS[0], np.random.default_rng(1).uniform(-1.0, 1.0, (4, 6))
     x, y, z = poses_over_log(chain, q)[0].T
     c, s = np.cos(0.3), np.sin(0.3)
     twist = partial(Twist, BASE, frame=Transform())

@@ -24,6 +24,8 @@ from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_models.robots.catalogue import load_robot
 
 DOWN = np.diag([1.0, -1.0, -1.0])
+# Limits of rates in [rad/s] and accelerations in [rad/s2]: both count, rates count, accelerations count
+BOTH, RATES, ACCELERATIONS = (2.0, 5.0), (0.4, 20.0), (5.0, 1.0)
 SQUARE = np.array([[0.15, 0.15], [0.3, 0.15], [0.3, -0.15], [0.0, -0.15], [0.0, 0.15], [0.15, 0.15]])
 
 
@@ -122,10 +124,6 @@ def limit_shares(joints: PathJoints, law: TimeLaw, t: FloatArray) -> FloatArray:
     motion, limits = law.at(t.ravel()), joints.chain.moving[0]
     velocities, accelerations = joints.at(motion.s).rates(motion.v, motion.a)
     return np.abs([velocities / limits.velocity, accelerations / limits.acceleration])
-
-
-BOTH, RATES, ACCELERATIONS = (2.0, 5.0), (0.4, 20.0), (5.0, 1.0)
-"""Limits of rates in [rad/s] and accelerations in [rad/s2]: both count, rates count, accelerations count."""
 
 
 @pytest.mark.slow

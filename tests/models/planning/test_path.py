@@ -18,12 +18,12 @@ from urmpipe_models.math3d import from_offset, rotation_angle, to_matrices, to_q
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import PLANES, LineArcPath, PathRows, cube_rows
 
+# Of coordinates of up to 1 m through some tens of operations, and of unit vectors, in [m] and [-]
 ROUNDING = 1e-12
-"""Of coordinates of up to 1 m through some tens of operations, and of unit vectors, in [m] and [-]."""
-
+# In halves of an edge of 0.05 m: a rounding of 1e-15 m, which a first line of 0.01 a prolongs 49 times
+WITHIN = 1e-11
+# The rows of the paper, section 5: a cube of 0.6 m about CENTRE, R = 0.03 m
 CONTOUR = [[1.7, 0.3, 1], [1.97, 0.3, 1], [2, -0.27, 1], [1.43, -0.3, 1], [1.4, 0.27, 1], [1.7, 0.3, 1]]
-"""The rows of the paper, section 5: a cube of 0.6 m about (1.7, 0, 1), R = 0.03 m."""
-
 CENTRE = np.array([1.7, 0.0, 1.0])
 
 
@@ -190,10 +190,6 @@ def test_sections_have_the_length_of_their_kind_and_keep_the_orientation(kind: s
         rows = cube_rows(kind, 0.6, 0.03, CENTRE, plane, down)
         assert np.array_equal(there(rows.rotation), [down] * 6)
         assert rows_to_path(rows).total == pytest.approx(length, abs=5e-7, rel=0)  # six decimals are printed
-
-
-WITHIN = 1e-11
-"""In halves of an edge of 0.05 m: a rounding of 1e-15 m, which a first line of 0.01 a prolongs 49 times."""
 
 
 @given(
