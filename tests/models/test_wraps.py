@@ -35,21 +35,16 @@ def test_unwrapping_a_wrapped_motion_gives_it_back(steps: FloatArray, period: fl
 
 
 values = st.one_of(st.floats(-7, 7), st.sampled_from([-3.14, -1.57, 0.0, 1.57, 3.14]))  # halves and quarters
+logs = st_np.arrays(float, st.tuples(st.integers(1, 120), st.integers(1, 3)), elements=values)
+gaps = st_np.arrays(bool, (120, 3), elements=st.sampled_from([False, False, False, True]))
 
 
 @pytest.mark.slow
-@given(
-    st_np.arrays(float, st.tuples(st.integers(1, 120), st.integers(1, 3)), elements=values),
-    st_np.arrays(bool, (120, 3), elements=st.sampled_from([False, False, False, True])),
-    st.sampled_from([math.inf, 3.0, 300.0]),
-    st.floats(0.001, 0.1),
-)
+@given(logs, gaps, st.sampled_from([math.inf, 3.0, 300.0]), st.floats(0.001, 0.1))
 @settings(max_examples=50, deadline=None)
-def test_the_batch_is_the_steps_bit_for_bit(
-    q: FloatArray, missing: NDArray[np.bool_], max_speed: float, period_of_samples: float
-) -> None:
+def test_batch_is_the_steps(q: FloatArray, missing: NDArray[np.bool_], max_speed: float, step: float) -> None:
     q = np.where(missing[: len(q), : q.shape[1]], np.nan, q)
-    dt = period_of_samples * (1.0 + np.arange(len(q), dtype=np.float64) % 3)
+    dt = step * (1.0 + np.arange(len(q), dtype=np.float64) % 3)
     periods = np.array([FULL_TURN, 4.0, 2.0 * FULL_TURN])[: q.shape[1]]
     judge(q, dt, periods, max_speed)
 
@@ -178,6 +173,8 @@ def test_noise_about_the_limit_is_rarely_taken_for_in_between_samples() -> None:
 SIZE = 1e-13  # angles to 20 rad are wrapped and back, two roundings of 4e-15, then sine and cosine
 
 steps = st.lists(st.tuples(*[st.floats(-0.3, 0.3)] * 3), min_size=1, max_size=60)
+switches = st.lists(st.booleans(), min_size=60, max_size=60)
+starts = st.tuples(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0))
 
 
 def rotation_matrices(angles: FloatArray) -> FloatArray:
@@ -185,7 +182,7 @@ def rotation_matrices(angles: FloatArray) -> FloatArray:
 
 
 @settings(max_examples=40, deadline=None)
-@given(steps, st.lists(st.booleans(), min_size=60, max_size=60))
+@given(steps, switches)
 def test_quaternions_of_any_sign_become_continuous(moves: list[tuple[float, ...]], flips: list[bool]) -> None:
     true = np.cumsum(np.array([[0.0, 0.0, 0.0, 5.0], *([*move, 0.0] for move in moves)]), axis=0)
     true /= np.linalg.norm(true, axis=1)[:, np.newaxis]
@@ -219,12 +216,7 @@ def test_continuous_vectors_are_the_same_rotations(vectors: list[tuple[float, ..
 
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None)
-@given(
-    steps,
-    st.lists(st.booleans(), min_size=60, max_size=60),
-    st.integers(0, 59),
-    st.tuples(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0)),
-)
+@given(steps, switches, st.integers(0, 59), starts)
 def test_euler_angles_of_either_family_become_continuous(
     moves: list[tuple[float, ...]], swaps: list[bool], missing: int, start: tuple[float, float, float]
 ) -> None:

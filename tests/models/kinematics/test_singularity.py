@@ -180,26 +180,22 @@ def test_where_no_joint_can_move_all_count() -> None:
     assert_array_equal(columns(singularity_over_log(statue, q)), columns(singularity_over_log(ARM6, q)))
 
 
-SKEW = dh_chain(  # its axes pass each other at any angle
-    "skew",
-    [
-        *(DHRow(d=0.3, a=0.4, alpha=0.7), DHRow(theta=0.5, d=-0.2, a=-0.5, alpha=-1.2)),
-        *(DHRow(theta=-0.9, d=0.6, a=0.25, alpha=2.0), DHRow(theta=1.1, d=-0.35, a=0.15, alpha=0.4)),
-    ],
-)
+PASSING = [  # axes pass each other at any angle
+    *(DHRow(d=0.3, a=0.4, alpha=0.7), DHRow(theta=0.5, d=-0.2, a=-0.5, alpha=-1.2)),
+    *(DHRow(theta=-0.9, d=0.6, a=0.25, alpha=2.0), DHRow(theta=1.1, d=-0.35, a=0.15, alpha=0.4)),
+]
+SKEW = dh_chain("skew", PASSING)
+LENGTHS = [
+    (ARM6, 0.03 + 0.12 + 0.02 + 0.13 + 0.029),
+    (load_robot("articulated6r"), 0.45 + 0.4 + 0.15),
+    (load_robot("ur5"), 0.425 + 0.39225 + 0.10915 + 0.09465 + 0.0823),
+    (load_robot("panda"), 0.316 + 0.0825 + 0.0825 + 0.384 + 0.088 + 0.107),
+    # 0.4 + 0.5 + 0.25 between the axes, 0.2 + 0.6 along the second and the third; the last is the tip's
+    (SKEW, 1.95 + math.hypot(0.35, 0.15)),
+]
 
 
-@pytest.mark.parametrize(
-    ("chain", "length"),
-    [
-        (ARM6, 0.03 + 0.12 + 0.02 + 0.13 + 0.029),
-        (load_robot("articulated6r"), 0.45 + 0.4 + 0.15),
-        (load_robot("ur5"), 0.425 + 0.39225 + 0.10915 + 0.09465 + 0.0823),
-        (load_robot("panda"), 0.316 + 0.0825 + 0.0825 + 0.384 + 0.088 + 0.107),
-        # 0.4 + 0.5 + 0.25 between the axes, 0.2 + 0.6 along the second and the third; the last is the tip's
-        (SKEW, 1.95 + math.hypot(0.35, 0.15)),
-    ],
-)
+@pytest.mark.parametrize(("chain", "length"), LENGTHS)
 def test_the_length_is_that_of_the_links_after_the_first_axis(chain: Chain, length: float) -> None:
     """It depends neither on the base nor on the places of frames and the zeros of joints."""
     assert characteristic_length(chain) == pytest.approx(length, rel=1e-14)

@@ -24,6 +24,7 @@ from urmpipe_models.math3d import from_offset
 
 # Numbers of coordinates and seeds of arms
 CASES = [(1, 2), (1, 11), (1, 14), (2, 2), (2, 8), (3, 2), (3, 8), (3, 19), (4, 19)]
+MARKED = [pytest.param(*case, marks=pytest.mark.slow if case[0] > 1 else ()) for case in CASES]
 
 
 @cache
@@ -48,10 +49,7 @@ def test_the_arms_have_all_kinds_of_joints_and_parallel_axes_and_others() -> Non
     assert 3 <= sum(map(has_parallel_neighbours, arms)) <= len(arms) - 3
 
 
-@pytest.mark.parametrize(
-    ("count", "seed"),
-    [pytest.param(*case, marks=pytest.mark.slow if case[0] > 1 else ()) for case in CASES],
-)
+@pytest.mark.parametrize(("count", "seed"), MARKED)
 def test_terms_in_text_and_c_are_those_of_numeric_dynamics(count: int, seed: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, count)

@@ -25,6 +25,8 @@ WITHIN = 1e-11
 # The rows of the paper, section 5: a cube of 0.6 m about CENTRE, R = 0.03 m
 CONTOUR = [[1.7, 0.3, 1], [1.97, 0.3, 1], [2, -0.27, 1], [1.43, -0.3, 1], [1.4, 0.27, 1], [1.7, 0.3, 1]]
 CENTRE = np.array([1.7, 0.0, 1.0])
+SECTIONS = [(kind, plane) for kind, planes in PLANES.items() for plane in planes]
+centres = st.tuples(*[st.floats(-5.0, 5.0)] * 3)
 
 
 def along(path: LineArcPath, count: int = 400) -> FloatArray:
@@ -192,12 +194,7 @@ def test_sections_have_the_length_of_their_kind_and_keep_the_orientation(kind: s
         assert rows_to_path(rows).total == pytest.approx(length, abs=5e-7, rel=0)  # six decimals are printed
 
 
-@given(
-    st.floats(0.05, 2.0),
-    st.floats(0.0, 0.49),
-    st.tuples(*[st.floats(-5.0, 5.0)] * 3),
-    st.sampled_from([(kind, plane) for kind, planes in PLANES.items() for plane in planes]),
-)
+@given(st.floats(0.05, 2.0), st.floats(0.0, 0.49), centres, st.sampled_from(SECTIONS))
 def test_the_corners_are_those_of_a_rectangle_on_the_cube(
     side: float, share: float, centre: tuple[float, float, float], section: tuple[str, str]
 ) -> None:
