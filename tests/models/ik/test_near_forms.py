@@ -33,12 +33,10 @@ from urmpipe_models.robots.urdf_writer import urdf_text
 
 RIGHT = math.pi / 2
 D, A = (0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996), (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
-UR5E = [  # standard DH
-    DHRow(name=name, d=d, a=a, alpha=alpha)
-    for name, d, a, alpha in zip("abcdef", D, A, (RIGHT, 0.0, 0.0, RIGHT, -RIGHT, 0.0), strict=True)
-]
+ALPHA = (RIGHT, 0.0, 0.0, RIGHT, -RIGHT, 0.0)
+UR5E = [DHRow(d=d, a=a, alpha=alpha) for d, a, alpha in zip(D, A, ALPHA, strict=True)]  # standard DH
 # of modified parameters a and alpha stand a row later, the last in none
-ROWS = zip(UR5E, (DHRow(name="base"), *UR5E[:-1]), strict=True)
+ROWS = zip(UR5E, (DHRow(), *UR5E[:-1]), strict=True)
 MODIFIED = [replace(row, a=before.a, alpha=before.alpha) for row, before in ROWS]
 
 
