@@ -70,29 +70,27 @@ def noisy(truth: Truth, rng: np.random.Generator) -> tuple[FloatArray, FloatArra
     return measured, truth.measured_rotation @ noise
 
 
-def rotation_misfit(base: FloatArray, truth: Truth, tool: FloatArray, turns: FloatArray) -> FloatArray:
-    return np.asarray(hand_eye.RADIAN_LENGTH / np.sqrt(2) * (turns - base @ truth.rotation @ tool))
+def misfits(truth: Truth, measured: FloatArray, turns: FloatArray | None) -> FloatArray:
+    """Return what the frames leave of positions and orientations, all in [m]."""
+    apart = [] if turns is None else hand_eye.RADIAN_LENGTH / np.sqrt(2) * (turns - truth.measured_rotation)
+    return np.concatenate(((measured - truth.measured).ravel(), np.ravel(apart)))
 
 
 def least_squares_sum(truth: Truth, measured: FloatArray, turns: FloatArray | None = None) -> float:
     """Return the smallest sum of squares that any frames leave, by SciPy from the true frames."""
 
     def residuals(x: FloatArray) -> FloatArray:
-        base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
-        moved = (truth.position + truth.rotation @ (truth.offset + x[3:6])) @ base.T
-        left = (measured - moved - truth.shift - x[6:9]).ravel()
-        if turns is None:
-            return np.asarray(left)
-        tool = truth.tool @ Rotation.from_rotvec(x[9:]).as_matrix()
-        return np.concatenate((left, rotation_misfit(base, truth, tool, turns).ravel()))
+        base_turn, tool_turn = Rotation.from_rotvec([x[:3], x[9:]]).as_matrix()
+        base, tool = base_turn @ truth.base, truth.tool @ tool_turn
+        moved = Truth(base, truth.shift + x[6:9], tool, truth.offset + x[3:6], truth.position, truth.rotation)
+        return misfits(moved, measured, turns)
 
-    start = np.zeros(9 if turns is None else 12)
-    return 2.0 * float(least_squares(residuals, start, xtol=1e-15, ftol=1e-15, gtol=1e-15).cost)
+    return 2.0 * float(least_squares(residuals, np.zeros(12), xtol=1e-15, ftol=1e-15, gtol=1e-15).cost)
 
 
-def misfit(found: HandEye, truth: Truth, measured: FloatArray) -> FloatArray:
-    moved = (truth.position + truth.rotation @ found.tool_position) @ found.base_rotation.T
-    return measured - moved - found.base_position
+def fitted(found: HandEye, truth: Truth) -> Truth:
+    base, tool = found.base_rotation, found.tool_rotation
+    return Truth(base, found.base_position, tool, found.tool_position, truth.position, truth.rotation)
 
 
 def rms(values: FloatArray) -> float:
@@ -144,7 +142,7 @@ def test_no_other_frames_leave_less_of_noisy_positions(seed: int, turned: bool) 
     measured, turns = noisy(truth, np.random.default_rng(seed))
     found = solve_hand_eye(truth.position, truth.rotation, measured, turns if turned else None)
     least = np.sqrt(least_squares_sum(truth, measured) / 300)
-    assert rms(misfit(found, truth, measured)) == pytest.approx(least, rel=1e-9)
+    assert rms(measured - fitted(found, truth).measured) == pytest.approx(least, rel=1e-9)
     if turned:
         left = (Rotation.from_matrix(found.base_rotation @ truth.rotation @ found.tool_rotation)).inv()
         spun = (left * Rotation.from_matrix(turns)).as_rotvec()
@@ -157,7 +155,8 @@ def test_orientations_in_a_wrong_form_move_no_position() -> None:
     wrong = Rotation.random(100, np.random.default_rng(4)).as_matrix()
     alone = solve_hand_eye(truth.position, truth.rotation, measured)
     found = solve_hand_eye(truth.position, truth.rotation, measured, wrong)
-    assert rms(misfit(found, truth, measured)) == pytest.approx(rms(misfit(alone, truth, measured)), rel=1e-9)
+    least = rms(measured - fitted(alone, truth).measured)
+    assert rms(measured - fitted(found, truth).measured) == pytest.approx(least, rel=1e-9)
 
 
 def test_orientations_determine_what_positions_on_a_line_leave_open() -> None:
@@ -167,8 +166,7 @@ def test_orientations_determine_what_positions_on_a_line_leave_open() -> None:
     truth = placed(line, Rotation.from_rotvec(rng.normal(0, 0.3, (200, 3)) * [1, 0, 0]).as_matrix())
     measured, turns = noisy(truth, rng)
     found = solve_hand_eye(truth.position, truth.rotation, measured, turns)
-    apart = rotation_misfit(found.base_rotation, truth, found.tool_rotation, turns)
-    left = (misfit(found, truth, measured) ** 2).sum() + (apart**2).sum()
+    left = (misfits(fitted(found, truth), measured, turns) ** 2).sum()
     assert left == pytest.approx(least_squares_sum(truth, measured, turns), rel=1e-9)
     (direction,) = found.unobservable
     assert direction.part == "tool offset"  # along the axis of all turns
@@ -205,14 +203,13 @@ def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
     for expected, with_turns in ((alone, False), (turned, True)):
         found = solve(truth, turned=with_turns)
         assert [direction.part for direction in found.unobservable] == expected
-        assert_near(misfit(found, truth, truth.measured), 0.0, 1e-9)
+        assert_near(fitted(found, truth).measured, truth.measured, 1e-9)
         for direction in found.unobservable:
             assert np.linalg.norm(direction.axis) == pytest.approx(1.0)
             assert direction.seen < 1e-7  # the root of rounding
             assert direction.part != "tool offset" or abs(found.tool_position @ direction.axis) <= 1e-9
         if with_turns:
-            made = found.base_rotation @ truth.rotation @ found.tool_rotation
-            assert_near(made, truth.measured_rotation, 1e-9)
+            assert_near(fitted(found, truth).measured_rotation, truth.measured_rotation, 1e-9)
         elif not expected:
             assert_found(found, truth, turned=False)
 
