@@ -27,11 +27,6 @@ from urmpipe_models.robots.catalogue import load_robot
 ROUNDED = 1e-11  # sums of some thousand products, of values up to some hundred
 
 
-def seeded_arm(seed: int) -> Chain:
-    """An arm of one to four coordinates, with fixed joints and mimics, at any base, under any gravity."""
-    return random_arm(np.random.default_rng(seed), 1 + seed % 4)
-
-
 def random_state(chain: Chain, seed: int, count: int = 3) -> FloatArray:
     """Some sets of numbers, one a coordinate: shape (count, coordinates)."""
     return np.random.default_rng(seed + 1).normal(size=(count, len(chain.coordinates)))
@@ -45,7 +40,7 @@ WRENCH = Wrench((1.0, -2.0, 3.0), (0.5, 0.2, -0.4))
 @settings(max_examples=50, deadline=None)
 @given(SEEDS)
 def test_power_mass_matrix_terms_recursion_and_forward_dynamics_are_one_equation(seed: int) -> None:
-    chain = seeded_arm(seed)
+    chain = random_arm(np.random.default_rng(seed), 1 + seed % 4)
     q, qd, qdd = random_state(chain, seed)
     tau = np.array(inverse_dynamics(chain, q, qd, qdd, WRENCH), dtype=float)
     # tau . q' = dT/dt + dU/dt + what the tool takes, by a complex step along the motion
@@ -84,7 +79,7 @@ def test_power_mass_matrix_terms_recursion_and_forward_dynamics_are_one_equation
 @given(SEEDS)
 def test_centres_move_as_points_of_the_chain_do(seed: int) -> None:
     """A mass at the tool centre point, and omega, as the kinematics have them."""
-    chain = seeded_arm(seed)
+    chain = random_arm(np.random.default_rng(seed), 1 + seed % 4)
     q, qd, _ = random_state(chain, seed)
     body = Inertial(chain.joints[-1].name, 1.0, (chain.tip @ chain.tool).translation)
     carrying = replace(chain, inertials=(body,))

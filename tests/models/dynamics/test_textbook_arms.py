@@ -18,15 +18,11 @@ from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.math3d import translation
 
 ROUNDED = 1e-12  # some ten products of values up to some hundred
-
 G = 9.81
-UPRIGHT = (0.0, -1.0, 0.0)
-"""An axis about which angles count from x towards z: the arm moves in the vertical plane."""
-
+UPRIGHT = (0.0, -1.0, 0.0)  # about it angles count from x towards z: the arm moves in the vertical plane
 L1, L2 = 0.6, 0.25  # upper arm and crank of the parallelogram in [m]
-
+# Masses in [kg], centres on the x axes of joints in [m], moments of inertia about y in [kg m2]
 BODIES = {"q1": (8.0, 0.3, 0.3), "crank": (3.0, -0.1, 0.05), "rod": (2.0, 0.3, 0.07), "q2": (5.0, -0.2, 0.12)}
-"""Masses in [kg], centres on the x axes of joints in [m], moments of inertia about y in [kg m2]."""
 
 
 def parallelogram() -> Chain:

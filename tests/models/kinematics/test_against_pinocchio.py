@@ -54,6 +54,11 @@ BY_HAND = {  # roll, pitch, x, z from each axis to the next, and after the last
         *((HALF, 0.0, 0.0, 0.1333), (-HALF, 0.0, 0.0, 0.0997), (0.0, 0.0, 0.0, 0.0996)),
     ],
 }
+URDFS = [
+    ("Gepetto_example-robot-data/panda.urdf", "panda_hand_tcp"),
+    ("FancySafeBot_fsb-library/panda.urdf", "panda_hand"),
+    ("ros-industrial_kuka_experimental/lbr_iiwa_14_r820.urdf", "tool0"),
+]
 
 
 @pytest.mark.parametrize("robot", BY_HAND)
@@ -74,14 +79,7 @@ def test_every_point_of_urm6_is_that_of_the_exported_urdf(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("file", "tip"),
-    [
-        ("Gepetto_example-robot-data/panda.urdf", "panda_hand_tcp"),
-        ("FancySafeBot_fsb-library/panda.urdf", "panda_hand"),
-        ("ros-industrial_kuka_experimental/lbr_iiwa_14_r820.urdf", "tool0"),
-    ],
-)
+@pytest.mark.parametrize(("file", "tip"), URDFS)
 def test_urdfs_of_others(shared: Path, file: str, tip: str) -> None:
     path = shared / "robots" / file
     assert_same(pinocchio.buildModelFromUrdf(str(path)), [tip], read_urdf(path, tip_link=tip))
