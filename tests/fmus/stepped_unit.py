@@ -26,10 +26,8 @@ needs_native = pytest.mark.skipif(
 class SteppedUnit(Instance):
     """An instance of a unit, or of the shipped unit of a name with options; values are set before it runs."""
 
-    def __init__(
-        self, model: BlockModel | str, values: Mapping[str, Any] | None = None, **options: Any
-    ) -> None:
-        super().__init__(make_block(model, **options) if isinstance(model, str) else model)
+    def __init__(self, model: BlockModel | str, values: Mapping[str, Any] | None = None, **more: Any) -> None:
+        super().__init__(make_block(model, **more) if isinstance(model, str) else model)
         self.put(**values or {})
 
     def put(self, **values: Any) -> None:

@@ -44,22 +44,15 @@ def test_what_an_expression_of_casadi_depends_on_is_remembered_and_nothing_else(
     from urmpipe_fmus.native.trace import traced
 
     functions, found = traced(model), Dependencies(model)
-    names = [name for name, _ in model.scalars]
-    for function, remembered in (
-        (functions.outputs, found.outputs),
-        (functions.derivatives, found.derivatives),
-        (functions.update, found.update),
-    ):
+    for kind in ("outputs", "derivatives", "update"):
+        function, remembered = getattr(functions, kind), getattr(found, kind)
         arguments = function.sx_in()
-        values = [arguments[1][k] for k in range(len(names))] if names else []
+        symbols = [(name, arguments[1][k]) for k, (name, _) in enumerate(model.scalars)]
         rows = casadi.vertcat(arguments[0], *arguments[2:])
         with exact_expressions():  # x - x stays an expression of x
             results = function.call(arguments)[0] if remembered else []
         for k, (name, goes_in) in enumerate(remembered.items()):
-            one = results[k]
-            traced_names = {
-                n for n, symbol in zip(names, values, strict=True) if casadi.depends_on(one, symbol)
-            }
-            if casadi.depends_on(one, rows):
+            traced_names = {scalar for scalar, one in symbols if casadi.depends_on(results[k], one)}
+            if casadi.depends_on(results[k], rows):
                 traced_names.add(TIME)
             assert traced_names == goes_in, name

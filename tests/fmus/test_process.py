@@ -76,9 +76,7 @@ def ends(pid: int) -> bool:
         (HANGS, 3.0, "did not return within 3 s", ["load", "get", "step", "free"]),
     ],
 )
-def test_any_call_may_hang_or_end_the_process(
-    code: str, timeout: float, how: str, calls: Iterable[str]
-) -> None:
+def test_any_call_may_hang_or_exit(code: str, timeout: float, how: str, calls: Iterable[str]) -> None:
     before = set(children(os.getpid()))
     troubles = {call: trouble_in(call, code) for call in calls}
     with ThreadPoolExecutor(len(troubles)) as pool:
@@ -144,9 +142,7 @@ system = System(name="test", path=Path("test.toml"), step=0.1, duration=1.0, blo
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 @pytest.mark.parametrize("call", CALLS_OF_FMUS, ids=["check", "simulate"])
-def test_an_fmu_that_hangs_ends_with_the_process_that_started_it(
-    how: signal.Signals, call: str, tmp_path: Path
-) -> None:
+def test_an_fmu_that_hangs_ends_with_its_parent(how: signal.Signals, call: str, tmp_path: Path) -> None:
     started = tmp_path / "started"
     path = fmu(trouble_in("step", f'if (fork()) creat("{started}", 0600); {HANGS}'))
     environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -165,9 +161,7 @@ def test_an_fmu_that_hangs_ends_with_the_process_that_started_it(
 
 
 @pytest.mark.slow
-def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_endless_prints_do_not_fill_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     flood = Foreign(
         name="flood",
         scalars=(Scalar("y", 0),),

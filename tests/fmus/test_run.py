@@ -115,10 +115,8 @@ def test_an_error_of_the_functions_undoes_the_step_too() -> None:
     def rates(v: Any) -> dict[str, Any]:
         return {"x": {0.0: 1.0}[float(v.x)]}  # fails once x has moved
 
-    model = block(
-        variable(State, "x"), variable(Memory, "m"), derivatives=rates, update=lambda v: {"m": v.m + 1.0}
-    )
-    instance = SteppedUnit(model)
+    variables = variable(State, "x"), variable(Memory, "m")
+    instance = SteppedUnit(block(*variables, derivatives=rates, update=lambda v: {"m": v.m + 1.0}))
     with pytest.raises(UnitError, match="unit u: derivatives: KeyError"):
         instance.do_step(0.0, 1.0)
     assert everything(instance)[:3] == (0.0, 0.0, 0.0)

@@ -121,9 +121,7 @@ def test_a_run_gives_what_steps_give(what: str) -> None:
 @pytest.mark.slow
 @both_backends
 @pytest.mark.parametrize("what", UNITS)
-def test_an_fmu_gives_what_a_run_gives_and_goes_on_bit_by_bit_from_a_saved_state(
-    what: str, backend: Backend
-) -> None:
+def test_an_fmu_gives_what_a_run_gives_and_goes_on_from_a_saved_state(what: str, backend: Backend) -> None:
     (model, start, columns), t, expected = case_and_run(what)
     half = len(t) // 2
     before, after = (  # the sample in the middle is set and read twice
@@ -172,9 +170,7 @@ def test_a_step_begins_where_the_unit_stands(backend: Any, status: int | None) -
 @pytest.mark.slow
 @needs_native
 @pytest.mark.parametrize(("start", "step"), [(0.0, 1e-3), (1.7e9, 1e-3), (0.1, 1.0 / 3.0)])
-def test_masters_that_add_up_steps_and_those_that_multiply_stay_where_the_unit_stands(
-    start: float, step: float
-) -> None:
+def test_sums_and_multiples_of_steps_stay_where_the_unit_stands(start: float, step: float) -> None:
     fmu = Loaded(cached_fmu(unit_of("six joints"), "native"), start)
     time, count = start, 100_000  # a million in C: native/test_runtime.py
     state, call = fmu.fmu.getFMUstate(), partial(fmu.fmu.dll.fmi2DoStep, c_void_p(fmu.fmu.component))

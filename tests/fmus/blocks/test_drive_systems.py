@@ -85,9 +85,7 @@ def test_the_twist_of_a_controlled_load_at_rest_is_its_torque_over_the_rigidity(
 @pytest.mark.slow
 @needs_native
 @pytest.mark.parametrize(("load", "step"), [(0.2, 5e-3), (0.2, 2.5e-3), (1.0, 5e-3)])
-def test_a_simulation_grows_by_the_radius_of_the_step_map(
-    figures: Mapping[str, Any], load: float, step: float
-) -> None:
+def test_it_grows_by_the_radius_of_the_step_map(figures: Mapping[str, Any], load: float, step: float) -> None:
     starts = {"set_point": {"target": 0.0}, "load": {"theta": 1e-9, "J": load}, "controller": {"u_max": 1e9}}
     real = changed_drive(step, 2.0, **starts).column("load", "theta")
     second = round(1.0 / step)

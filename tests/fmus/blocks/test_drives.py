@@ -45,9 +45,7 @@ def native(duration: float, **changes: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("after", [stepped, pytest.param(native, marks=[pytest.mark.slow, needs_native])])
-def test_the_error_against_scipy_falls_with_the_fourth_power_of_the_internal_step(
-    after: Callable[..., FloatArray],
-) -> None:
+def test_the_error_against_scipy_falls_with_the_fourth_power(after: Callable[..., FloatArray]) -> None:
     expected = motor_after(BEGIN, STEP)
     size = np.abs(expected).max()
     errors = [float(np.abs(after(STEP, internal_step=h) - expected).max() / size) for h in HALVINGS]

@@ -56,9 +56,7 @@ values = (
     st.sampled_from([2 * math.pi, math.pi, 360.0, 1.0]),
     st.floats(1e-9, 10.0),
 )
-def test_it_gives_what_the_repolarizer_gives_over_a_regular_log_bit_by_bit(
-    rows: list[list[float]], period: float, max_step: float
-) -> None:
+def test_it_gives_what_repolarize_gives(rows: list[list[float]], period: float, max_step: float) -> None:
     raw = np.array(rows)
     expected = repolarize(raw, np.ones(len(raw)), period=period, max_speed=max_step)
     assert over(raw, period=period, max_step=max_step)["q"].tobytes() == expected.q.tobytes()
@@ -67,9 +65,7 @@ def test_it_gives_what_the_repolarizer_gives_over_a_regular_log_bit_by_bit(
 @pytest.mark.slow
 @settings(max_examples=10, **PATIENT)
 @given(st.integers(0, 10_000), st.floats(0.001, 1.5), st.floats(-3.0, 3.0))
-def test_a_joint_that_goes_round_and_round_goes_on_where_it_was(
-    seed: int, speed: float, first: float
-) -> None:
+def test_a_joint_that_goes_round_goes_on_where_it_was(seed: int, speed: float, first: float) -> None:
     steps = np.random.default_rng(seed).uniform(-speed, speed, (200, 2))
     joint = first + np.cumsum(steps, axis=0)
     raw = np.mod(joint + math.pi, 2 * math.pi) - math.pi

@@ -25,9 +25,7 @@ def test_every_unit_that_is_shipped_is_here() -> None:
 
 
 @pytest.mark.parametrize(("name", "options"), [*UNITS.values(), *OTHERS])
-def test_a_unit_has_help_for_its_options_and_its_recipe_makes_it_again_bit_by_bit(
-    name: str, options: dict[str, Any]
-) -> None:
+def test_a_unit_has_help_and_its_recipe_makes_it_again(name: str, options: dict[str, Any]) -> None:
     model = make_block(name, **options)
     module, recipe = importlib.import_module(model.recipe.module), model.recipe
     assert list(inspect.signature(getattr(module, name)).parameters) == list(block_option_help(name))

@@ -23,12 +23,10 @@ SVG = "{http://www.w3.org/2000/svg}"
 def diagrams(draw: st.DrawFn) -> Diagram:
     """Boxes with ports, wired anyhow: rings, long wires, boxes apart."""
     counts = draw(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=7))
-    boxes = {
-        f"b{i}": Box(
-            f"b{i}", "unit", [Pin(f"u{k}") for k in range(inputs)], [Pin(f"y{k}") for k in range(outputs)]
-        )
-        for i, (inputs, outputs) in enumerate(counts)
-    }
+    boxes = {}
+    for i, (inputs, outputs) in enumerate(counts):
+        left, right = [Pin(f"u{k}") for k in range(inputs)], [Pin(f"y{k}") for k in range(outputs)]
+        boxes[f"b{i}"] = Box(f"b{i}", "unit", left, right)
     sources = [(name, pin.name) for name, box in boxes.items() for pin in box.right]
     targets = [(name, pin.name) for name, box in boxes.items() for pin in box.left]
     wires = []
@@ -61,9 +59,8 @@ def test_boxes_stand_apart_and_wires_go_from_port_to_port_around_them(shown: Dia
         source, target = shown.boxes[wire.source], shown.boxes[wire.target]
         way = sampled(layout.route(wire))
         start = (source.x + source.width, source.y + source.offset(source.right, wire.output))
-        assert np.allclose(
-            way[[0, -1]], [start, (target.x, target.y + target.offset(target.left, wire.input))]
-        )
+        end = (target.x, target.y + target.offset(target.left, wire.input))
+        assert np.allclose(way[[0, -1]], [start, end])
         corners += [(x, y) for x, y in way]
         for box in boxes:
             inside = (way > (box.x + 1e-6, box.y)) & (way < (box.x + box.width - 1e-6, box.y + box.height))

@@ -129,9 +129,8 @@ def test_a_ring_with_a_state_is_the_implicit_equation_at_every_instant() -> None
 @pytest.mark.slow
 def test_a_block_whose_outputs_follow_at_once_only_before_the_first_step_is_seen_through() -> None:
     """y = 1 - 3 u, in a ring with u = 4 y + c(t): y = (1 - 3 c) / 13."""
-    early = formula(
-        "early", "u", "v->i[0] ? v->r[1] : 1 - 3 * u", step="v->i[0] = 1; v->r[1] = 1 - 3 * v->r[0];"
-    )
+    step = "v->i[0] = 1; v->r[1] = 1 - 3 * v->r[0];"
+    early = formula("early", "u", "v->i[0] ? v->r[1] : 1 - 3 * u", step=step)
     blocks = {"a": early, "b": formula("line4", "uc", "4 * u + c")}
     recorded = solved(blocks, RING, None, FOLLOW_C, column=lambda _: RISING)
     c = recorded.column("b", "c")

@@ -60,9 +60,8 @@ def test_every_input_is_that_of_the_instant_and_loops_are_what_leads_back_to_its
     size = (len(place), len(place))
     _, label = connected_components(csr_array((np.ones(len(edges)), edges.T), size), connection="strong")
     parts = strongly_connected_components(outputs, before.__getitem__)
-    assert sorted(sorted(place[port] for port in part) for part in parts) == sorted(
-        np.flatnonzero(label == part).tolist() for part in np.unique(label)
-    )
+    expected = sorted(np.flatnonzero(label == part).tolist() for part in np.unique(label))
+    assert sorted(sorted(place[port] for port in part) for part in parts) == expected
     rings = {part for part in label.tolist() if (label == part).sum() > 1}
     rings |= {int(label[x]) for x, y in edges if x == y}
     assert sum(isinstance(step, Loop) for step in steps) == len(rings)

@@ -71,9 +71,7 @@ def test_a_log_is_found_in_any_folder(folder: str, backend: Backend, tmp_path: P
 @pytest.mark.parametrize(
     ("compiler", "name"), [("fmutool", "repolarizer"), ("fmutool", "dc_drive"), ("fmpy", "log_source")]
 )
-def test_an_fmu_compiled_again_from_its_own_sources_gives_the_same_numbers(
-    compiler: str, name: str, tmp_path: Path
-) -> None:
+def test_an_fmu_compiled_again_gives_the_same_numbers(compiler: str, name: str, tmp_path: Path) -> None:
     original, unit = fmu_of(name), shipped_unit(name)
     again = tmp_path / f"{name}.fmu"
     with zipfile.ZipFile(original) as complete, zipfile.ZipFile(again, "w") as without_binaries:
@@ -146,9 +144,8 @@ def readelf(option: str, path: Path) -> str:
     """Return what readelf says of a binary."""
     if not shutil.which("readelf"):
         pytest.skip("needs readelf (Debian: binutils)")
-    return subprocess.run(
-        ["readelf", "--wide", option, str(path)], capture_output=True, text=True, check=True
-    ).stdout
+    command = ["readelf", "--wide", option, str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def checked_binary(fmu: Path, folder: Path) -> Path:
@@ -166,9 +163,7 @@ def checked_binary(fmu: Path, folder: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", block_names())
-def test_a_binary_needs_only_the_c_library_and_shows_only_the_functions_of_fmi(
-    name: str, tmp_path: Path
-) -> None:
+def test_a_binary_needs_only_the_c_library_and_shows_only_fmi(name: str, tmp_path: Path) -> None:
     checked_binary(fmu_of(name), tmp_path)
 
 
@@ -215,9 +210,7 @@ unit = BlockModel(name="same", description="A factor, and its integral",
 
 
 @pytest.mark.parametrize("backend", ["native", pytest.param("python", marks=pytest.mark.slow)])
-def test_two_fmus_with_equal_inner_names_compute_their_own_in_one_process(
-    backend: Backend, tmp_path: Path
-) -> None:
+def test_two_fmus_with_equal_inner_names_share_a_process(backend: Backend, tmp_path: Path) -> None:
     paths = []
     for folder, factor in (("one", 2.0), ("two", -7.0)):
         (tmp_path / folder).mkdir()

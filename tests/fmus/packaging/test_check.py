@@ -13,9 +13,7 @@ from written_units import NAMES, fmu_of, unit_of
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", ["python", "native"])
 @pytest.mark.parametrize("name", NAMES)
-def test_a_good_fmu_has_no_problems_and_its_values_are_those_of_an_instance(
-    name: str, backend: Backend
-) -> None:
+def test_a_good_fmu_has_no_problems_and_the_values_of_an_instance(name: str, backend: Backend) -> None:
     model, found = unit_of(name), check_fmu(fmu_of(name, backend))
     instance, everything = Instance(model), range(len(model.scalars))
     before = [float(one) for one in instance.get(everything)]

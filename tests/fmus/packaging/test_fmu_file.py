@@ -22,6 +22,7 @@ FILES = {"sources/b.c": b"int b;", "a.xml": b"<a/>", "binaries/linux64/a.so": by
 contents = st.dictionaries(
     st.text(st.characters(codec="utf-8"), max_size=3), st.binary(max_size=3), max_size=3
 )
+changed_bytes = st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255))
 
 
 @pytest.fixture(scope="module")
@@ -34,14 +35,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @pytest.mark.slow
 @settings(deadline=None, max_examples=300)
-@given(
-    changes=st.lists(
-        st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=6
-    )
-)
-def test_whatever_bytes_are_changed_it_is_read_or_refused_with_its_name(
-    sound: bytes, changes: Sequence[tuple[float, int]]
-) -> None:
+@given(changes=st.lists(changed_bytes, min_size=1, max_size=6))
+def test_changed_bytes_are_read_or_refused(sound: bytes, changes: Sequence[tuple[float, int]]) -> None:
     content = bytearray(sound)
     for place, value in changes:
         content[int(place * len(content))] = value

@@ -19,9 +19,8 @@ HELPERS = str(Path(__file__).parents[1])
 
 def printed(code: str, fmu: Path) -> str:
     """What a process prints that runs an FMU."""
-    done = subprocess.run(
-        [sys.executable, "-c", code, HELPERS, str(fmu)], capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "-c", code, HELPERS, str(fmu)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
