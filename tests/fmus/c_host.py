@@ -20,16 +20,13 @@ HOST = Path(__file__).parent / "native" / "host.c"
 def script(model: BlockModel, count: int, seed: int) -> str:
     """Random inputs and steps for the host, in hexadecimal: not all strtod round decimals alike."""
     rng = np.random.default_rng(seed)
-    inputs = [
-        k for k, (_, one) in enumerate(model.scalars) if one.causality == "input" and one.type == "Real"
-    ]
-    seen = [k for k, (_, one) in enumerate(model.scalars) if one.type == "Real"]
+    seen = {k: one.causality for k, (_, one) in enumerate(model.scalars) if one.type == "Real"}
+    inputs = [k for k, causality in seen.items() if causality == "input"]
     lines = []
     for k in range(count):
         values = (rng.normal(size=len(inputs)) * rng.choice([0.01, 1.0, 10.0])).tolist()
-        lines.append(
-            "set " + " ".join(f"{one} {value.hex()}" for one, value in zip(inputs, values, strict=True))
-        )
+        pairs = zip(inputs, values, strict=True)
+        lines.append("set " + " ".join(f"{one} {value.hex()}" for one, value in pairs))
         lines.append("get " + " ".join(map(str, seen)))
         lines.append(f"step {(k * 0.01).hex()} {(0.01).hex()}")
         if k % 10 == 9:

@@ -121,11 +121,9 @@ def cycle():
     fmu.freeFMUstate(state)
     loaded.free()
 
-for _ in range(2000):  # the heap of a large unit takes some hundred to find its form
-    cycle()
+for _ in range(2000): cycle()  # the heap of a large unit takes some hundred to find its form
 before = resident()
-for _ in range(5000):
-    cycle()
+for _ in range(5000): cycle()
 print(resident() - before)
 """
 

@@ -30,11 +30,8 @@ def test_every_value_is_that_of_the_instance_after_each_set_and_step(name: str, 
     names = [scalar for scalar, _ in model.scalars]
 
     def assert_same() -> None:
-        values = map(float, instance.get(range(len(names))))
-        expected = [
-            value if fmu.types[one] == "Real" else round(value)
-            for one, value in zip(names, values, strict=True)
-        ]
+        values = zip(names, map(float, instance.get(range(len(names)))), strict=True)
+        expected = [value if fmu.types[one] == "Real" else round(value) for one, value in values]
         # bit by bit, but for some units in the last place by which C's elementary functions differ
         tolerance = 1e-12 if backend == "native" else 0.0
         np.testing.assert_allclose(fmu.get(names), expected, rtol=tolerance, atol=tolerance)
