@@ -5,7 +5,7 @@ from __future__ import annotations
 from ctypes import c_double, c_void_p
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,14 +20,13 @@ from stepped_unit import SteppedUnit, needs_native
 from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Variable
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.user import load_block_file
+from urmpipe_fmus.build.description import Backend
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot
-
-Backend = Literal["native", "python"]
 
 SAME = 1e-12  # of the size of the values; sines of other libraries differ in the last place
 

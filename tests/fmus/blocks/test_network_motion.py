@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from random_networks import DOOR
 from stepped_unit import needs_native
 from urmpipe import network_drive
 from urmpipe_fmus.blocks import make_block
+from urmpipe_fmus.build.description import Backend
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
@@ -20,8 +21,6 @@ from urmpipe_models.networks.closure import solve_closure
 from urmpipe_models.networks.file import load_network
 from urmpipe_models.networks.joint_motion import exp3
 from urmpipe_models.networks.mechanism import build_mechanism
-
-Backend = Literal["native", "python"]
 
 POINTS, TURN = 1000, 2.0 * math.pi
 

@@ -31,8 +31,7 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 class {name}(Fmi2Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
-        self.u = 0.0
-        self.y = 0.0
+        self.u = self.y = 0.0
         self.register_variable(Real("u", causality=Fmi2Causality.input))
         self.register_variable(Real("y", causality=Fmi2Causality.output))
 
