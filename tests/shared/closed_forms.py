@@ -194,7 +194,7 @@ def assert_met(
     Args:
         within: Largest distance in [m], and angle in [rad] unless that is given.
     """
-    q = q.reshape(len(targets), -1, q.shape[-1])
+    q = q[:, np.newaxis] if q.ndim == 2 else q
     row, column = np.nonzero(np.isfinite(q).all(axis=2))
     errors = pose_errors(chain, q[row, column], targets.rows(row))
     distance, turn = (np.linalg.norm(error, axis=1) for error in errors)
