@@ -76,6 +76,8 @@ class CaseFile:
                 answer += case.calls[-2][1][len(answer) :] if line == SAME else [line[2:]]
             else:
                 case.files[-1][2].append(line)
+        if idle := [one.title for one in self.cases if not one.calls]:
+            raise ValueError(f"{path}: cases without a call: {', '.join(idle)}")
 
     def names(self) -> dict[str, Any]:
         """Run the Python code of the file, and return what it defines."""
