@@ -99,7 +99,7 @@ class Cases(pytest.File):
 
 
 class CaseItem(pytest.Item):
-    """One case: its calls answer as the file says, or with --accept the file says what they answer."""
+    """A case: compares the answers of its calls with the file; --accept writes them into the file."""
 
     def __init__(self, *, case: Case, **rest: Any) -> None:
         super().__init__(**rest)

@@ -107,8 +107,10 @@ def test_a_step_may_pass_the_stop_time_by_what_rounding_adds() -> None:
     instance.setup_experiment(0.0, 0.5)
     instance.do_step(0.0, 0.4)
     instance.do_step(0.4, 0.1001)
+    assert instance.time == pytest.approx(0.5001, abs=1e-15)
     instance.setup_experiment(0.5)
     instance.do_step(0.5, 0.25)
+    assert instance.time == 0.75
 
 
 def test_an_error_of_the_functions_undoes_the_step_too() -> None:

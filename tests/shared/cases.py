@@ -139,7 +139,7 @@ def _answer(call: str, names: dict[str, Any], folder: Path) -> list[str]:
 
 
 def _command(line: str) -> list[str]:
-    """Run a command; one that is refused prints nothing, leaves no file, and says error: in each line."""
+    """Run a command. A refused command must print nothing, write no file, and report only errors."""
     before = {path for path in Path().rglob("*") if path.is_file()}
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

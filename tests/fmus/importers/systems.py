@@ -95,7 +95,7 @@ class Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """An FMU in a system, its block model, and by scalar name columns of what is set before each step."""
+    """An FMU in a system, its block model, and columns of input values by the names of scalars."""
 
     fmu: Path
     unit: BlockModel

@@ -71,7 +71,7 @@ def test_branches_whatever_describes_an_arm(name: str, how: str, within: float, 
     form, same = there(closed_form(chain)), there(closed_form(other))
     assert (same.name, same.branches) == (form.name, form.branches)
     q = random_joints(np.random.default_rng(2), chain, 50)
-    # up to the rounding of what is written and of poses far from home
+    # tolerance: rounding of the written numbers, and of poses far from the base
     found, expected = (f.solve(forward_targets(arm, q)).q for f, arm in ((same, other), (form, chain)))
     np.testing.assert_allclose(found, expected, atol=within)
 

@@ -27,7 +27,7 @@ from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
 
-# what is promised by default in [m] and [rad], and there is the rounding of the peer's own rotation vector
+# the default tolerance in [m] and [rad], plus the rounding of the oracle's rotation vector
 MET = 1.01e-10
 URM6, ARM = load_robot("urm6"), planar(0.5, 0.4)
 FREE = [("urm8", True), ("urm8", False), ("urm6", False), ("panda", True), ("panda", False), ("iiwa14", True)]

@@ -21,7 +21,7 @@ from urmpipe_models.robots.catalogue import load_robot
 UR5E, ARM6 = load_robot("ur5e"), load_robot("arm6")
 RIGHT, PI = math.pi / 2, math.pi
 SHOULDER = articulated((0.4, 0.15, 0.0, 0.4, 0.0, 0.1), (0.05, 0.5, 0.02))  # 0.15 m from axis 1
-# its axes lie along no axis of the world: what is nearly along one is no small coordinate
+# its axes are oblique to the world axes: a nearly parallel axis has no coordinate near zero
 ASKEW = arm_with_wrist(np.random.default_rng(15), "like a PUMA", theta5=0.0, alpha4=RIGHT, alpha5=-RIGHT)
 TILTED = arm_with_wrist(np.random.default_rng(8), "like a PUMA", alpha4=0.5, alpha5=-0.8, theta5=0.0)
 

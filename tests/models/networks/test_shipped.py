@@ -329,7 +329,7 @@ def pose_of(mechanism: Mechanism, assembly: Assembly, body: str) -> FloatArray:
 def assert_same_answers(
     mechanism: Mechanism, assembled: AssemblyResult, answers: list[Answer], tolerance: float
 ) -> None:
-    """Compare the assemblies with the answers, each of which must be found once; angles up to whole turns."""
+    """Assert that the assemblies are the expected ones, each once; angles are equal up to whole turns."""
     units = {one.name: one.units for one in mechanism.network.joints}
     owners = list(answers[0])
     turns = np.array([unit == "rad" for owner in owners for unit in units[owner]])
