@@ -234,7 +234,7 @@ def angle_range(chain: Chain) -> tuple[float, float]:
 
 
 def test_the_limits_in_reasons_are_those_of_the_arm() -> None:
-    """The range allowed by a reason is within the range that joints 2, 3 and 5 reach over a turn each."""
+    """A reason states the limits that joints 2, 3 and 5 reach over a turn, and a value outside them."""
     rng = np.random.default_rng(31)
     seen: set[str] = set()
     for number in range(10):
