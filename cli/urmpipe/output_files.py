@@ -11,8 +11,14 @@ from typing import TypeVar
 from urmpipe import __version__
 from urmpipe.keyword_checks import PathLike
 from urmpipe_models.errors import Finding, OptionError, format_value, map_collecting_errors
-from urmpipe_pipeline.outputs import DRAWING_HEADER, NOUNS, OutputKind, guarded_output, refuse_output
-from urmpipe_pipeline.placing import all_or_none
+from urmpipe_pipeline.outputs import (
+    DRAWING_HEADER,
+    NOUNS,
+    OutputKind,
+    all_or_none,
+    guarded_output,
+    refuse_output,
+)
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.recording import import_ahead
 from urmpipe_pipeline.results import write_recording

@@ -18,8 +18,8 @@ from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.toml import chain_from_dict
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
-from urmpipe_pipeline.palette import MASS_COLOUR
-from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected
+from urmpipe_pipeline.presentation.palette import MASS_COLOUR
+from urmpipe_pipeline.presentation.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected
 
 NAMES = list(robot_names())
 

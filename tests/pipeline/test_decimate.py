@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_pipeline.decimate import decimate
+from urmpipe_pipeline.presentation.curves import decimate
 
 sizes = st.integers(1, 3000)
 seeds = st.integers(0, 2**32 - 1)

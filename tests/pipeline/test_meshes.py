@@ -14,7 +14,7 @@ from urmpipe_models.math3d import translation
 from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.meshes import drawable, missing_visuals
+from urmpipe_pipeline.presentation.meshes import drawable, missing_visuals
 from urmpipe_pipeline.runs.ingest import kinematics
 
 

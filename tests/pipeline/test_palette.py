@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from urmpipe_pipeline.palette import (
+from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
     JOINT_COLOURS,

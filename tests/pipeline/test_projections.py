@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from asserting import there
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.palette import MASS_COLOUR
-from urmpipe_pipeline.presentation.scene import Spot
-from urmpipe_pipeline.projections import (
+from urmpipe_pipeline.presentation.palette import MASS_COLOUR
+from urmpipe_pipeline.presentation.projections import (
     ABOVE,
     FRONT,
     LEGEND_WIDE,
@@ -27,6 +26,7 @@ from urmpipe_pipeline.projections import (
     chain_masses,
     projected,
 )
+from urmpipe_pipeline.presentation.scene import Spot
 
 VIEWS = (SIDEWAYS, FRONT, ABOVE)
 SVG = "{http://www.w3.org/2000/svg}"

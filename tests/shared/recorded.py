@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rerun.chunk import RrdReader
 
-from urmpipe_pipeline.palette import rgb
+from urmpipe_pipeline.presentation.palette import rgb
 
 
 def columns(path: Path, entity: str, component: str) -> list[Any]:

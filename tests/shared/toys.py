@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.palette import AXIS_COLOURS
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS
 from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.store import Opening
 from urmpipe_pipeline.recording.views.blueprint import send_views

@@ -122,7 +122,7 @@ def equations(
     form = form or ("c" if is_c else "text")
     if is_c and form == "text":
         raise OptionError(Finding(parameter="form", found=f"text for {output}", allowed="c, or another name"))
-    chain = cast(Chain, place_robot(robot, base, tool, base_link=base_link, tip_link=tip_link))
+    chain = cast("Chain", place_robot(robot, base, tool, base_link=base_link, tip_link=tip_link))
     found = open_form(chain, TERMS if term == "all" else (term,))
     text = c_code(found) if form == "c" else equations_text(found)
     target = None if output is None else Path(output)

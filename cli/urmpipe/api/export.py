@@ -49,7 +49,7 @@ def export(
         own: Path | None = result.recording
     else:
         refuse_others("result", [result], (), "a recording, or a result such as a Run or a Comparison")
-        own = Path(cast(PathLike, result))
+        own = Path(cast("PathLike", result))
         refuse_foreign([own])
         result = read_recording(own, lazy=True)
     return export_result(results.exports(result), own, target, options, [*([own] if own else []), *kept])

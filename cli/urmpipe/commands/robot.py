@@ -75,7 +75,7 @@ def show(
     from urmpipe.printing.robot import chain_at, print_chain
     from urmpipe_models.files import EXPORT_MARK, write_export
     from urmpipe_pipeline.masses import mass_notices
-    from urmpipe_pipeline.projections import (
+    from urmpipe_pipeline.presentation.projections import (
         FRONT,
         SIDEWAYS,
         Sketch,

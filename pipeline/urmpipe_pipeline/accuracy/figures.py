@@ -13,8 +13,8 @@ from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.parts import MEANT, at_velocity
 from urmpipe_pipeline.accuracy.published import published_points
 from urmpipe_pipeline.accuracy.result import DECIDES, Accuracy
-from urmpipe_pipeline.palette import AXIS_COLOURS, INK_COLOUR, REFERENCE_COLOUR, joint_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Over, Panel, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, INK_COLOUR, REFERENCE_COLOUR, joint_colour
 from urmpipe_pipeline.runs.figures import joint_panels
 
 MARKED = 6

@@ -46,7 +46,7 @@ from urmpipe_pipeline.comparison.warnings import (
 from urmpipe_pipeline.diagnosis.diagnose import diagnose
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
-from urmpipe_pipeline.meshes import missing_visuals
+from urmpipe_pipeline.presentation.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
 from urmpipe_pipeline.runs.results import Run

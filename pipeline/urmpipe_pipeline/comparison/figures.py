@@ -15,15 +15,15 @@ from urmpipe_pipeline.comparison.mended import mended_figure, mended_path
 from urmpipe_pipeline.comparison.scene import allowed_norm, deviation_arrows
 from urmpipe_pipeline.comparison.trajectory import extent
 from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, peak_words, symbol, when
-from urmpipe_pipeline.palette import (
+from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel, SpaceFigure, View
+from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
     REFERENCE_COLOUR,
     joint_colour,
     run_colour,
 )
-from urmpipe_pipeline.presentation.digits import written
-from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.parts import ends
 from urmpipe_pipeline.presentation.scene import Path, Spot
 from urmpipe_pipeline.presentation.section import Value

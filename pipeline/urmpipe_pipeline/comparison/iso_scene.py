@@ -18,7 +18,7 @@ from urmpipe_pipeline.iso9283.figures import (
     tube_of,
 )
 from urmpipe_pipeline.iso9283.result import AttainedPoses, IsoTest
-from urmpipe_pipeline.palette import DEVIATION_COLOUR, REFERENCE_COLOUR
+from urmpipe_pipeline.presentation.palette import DEVIATION_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.scene import Arm, Balls, Path, Scene
 from urmpipe_pipeline.runs.figures import times_of
 

@@ -41,7 +41,7 @@ from urmpipe_pipeline.comparison.wording import (
 from urmpipe_pipeline.diagnosis import presenter as diagnosis_presenter
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_tables
 from urmpipe_pipeline.diagnosis.result import Diagnosis
-from urmpipe_pipeline.palette import run_colour
+from urmpipe_pipeline.presentation.palette import run_colour
 from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import (
     Block,

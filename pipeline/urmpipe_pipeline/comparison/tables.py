@@ -11,7 +11,7 @@ from urmpipe_pipeline.comparison.comparison import ROW, Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, ShareKind, Statistics
 from urmpipe_pipeline.comparison.facts import MEANING, alignment_words, largest, place_of, share_value
 from urmpipe_pipeline.comparison.wording import size_of, symbol
-from urmpipe_pipeline.palette import run_colour
+from urmpipe_pipeline.presentation.palette import run_colour
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute_of, rows_table
 from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Ref, Table, Value
 

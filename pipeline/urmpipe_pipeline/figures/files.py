@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from urmpipe_models.errors import Finding, OptionError, OutputError, format_value, map_collecting_errors
 from urmpipe_pipeline.figures.listing import Listed, Plot, chosen, listed
 from urmpipe_pipeline.figures.size import COARSEST, FINEST, Size, size_of
-from urmpipe_pipeline.outputs import DRAWING_HEADER, guarded_output, refuse_output
-from urmpipe_pipeline.placing import all_or_none
+from urmpipe_pipeline.outputs import DRAWING_HEADER, all_or_none, guarded_output, refuse_output
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.text import unique

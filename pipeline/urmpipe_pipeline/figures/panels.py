@@ -15,7 +15,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.figures.letters import drawable
 from urmpipe_pipeline.figures.sheet import BAND, FAULT, INK, MUTED
 from urmpipe_pipeline.presentation.curves import (
@@ -24,10 +23,12 @@ from urmpipe_pipeline.presentation.curves import (
     across,
     cloud_rows,
     curves_of,
+    decimate,
     is_switch,
     logarithmic_ends,
     out_of_limit,
     place_of,
+    points_for,
     shown_unit,
     stretches,
 )

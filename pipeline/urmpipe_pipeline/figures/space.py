@@ -20,15 +20,15 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.figures.letters import drawable
 from urmpipe_pipeline.figures.panels import in_unit
 from urmpipe_pipeline.figures.sheet import INCH, Sheet, em, fitting, sheet
 from urmpipe_pipeline.figures.size import Size
 from urmpipe_pipeline.joint_log import seconds
-from urmpipe_pipeline.palette import VALUE_SCALE
+from urmpipe_pipeline.presentation.curves import decimate, points_for
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
+from urmpipe_pipeline.presentation.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.scene import Path, Sheets, Solid
 
 VALUES = LinearSegmentedColormap.from_list("urmpipe values", list(VALUE_SCALE))

@@ -10,18 +10,18 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import escape_html
-from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.iso9283.corners import CornerPath
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest
 from urmpipe_pipeline.iso9283.wording import amount
-from urmpipe_pipeline.palette import (
+from urmpipe_pipeline.presentation.curves import decimate
+from urmpipe_pipeline.presentation.figure import Drawing
+from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
     INK_COLOUR,
     REFERENCE_COLOUR,
 )
-from urmpipe_pipeline.presentation.figure import Drawing
-from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS
+from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS
 
 MOST = 12
 """Poses, or corners, that are drawn: the worst."""

@@ -8,11 +8,17 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest
 from urmpipe_pipeline.iso9283.wording import amount
-from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, INK_COLOUR, REFERENCE_COLOUR, RUN_COLOURS
+from urmpipe_pipeline.presentation.curves import decimate
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Over, Panel, SpaceFigure, View
+from urmpipe_pipeline.presentation.palette import (
+    AXIS_COLOURS,
+    DEVIATION_COLOUR,
+    INK_COLOUR,
+    REFERENCE_COLOUR,
+    RUN_COLOURS,
+)
 from urmpipe_pipeline.presentation.parts import ends
 from urmpipe_pipeline.presentation.scene import Path
 

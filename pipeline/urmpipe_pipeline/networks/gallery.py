@@ -13,7 +13,7 @@ from urmpipe_models.networks.file import Network
 from urmpipe_pipeline.networks.parts_in_space import body_points, find_plane, parts, placed
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.networks.sketch import mechanism_pieces
-from urmpipe_pipeline.outlines import Piece, drawn_pieces
+from urmpipe_pipeline.presentation.projections import Piece, drawn_pieces
 
 SMALL_PX, HEAD_PX, ABREAST = 190.0, 44.0, 5
 """Width and height of a small picture, room for a title, and pictures beside each other."""

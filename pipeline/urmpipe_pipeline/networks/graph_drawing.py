@@ -9,12 +9,12 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import escape_html
 from urmpipe_models.networks.parts import ConstraintElement, Control
-from urmpipe_pipeline.lettering import Box, width_of
 from urmpipe_pipeline.networks.drives import Tie, caption, controlled, is_driven, ties
 from urmpipe_pipeline.networks.graph_layout import TEXT_PX, Edge, GraphLayout, graph_layout
 from urmpipe_pipeline.networks.parts_in_space import BODY_COLOURS, CONTROL_COLOUR, body_colour
 from urmpipe_pipeline.networks.result import NetworkResult
-from urmpipe_pipeline.palette import INK_COLOUR
+from urmpipe_pipeline.presentation.palette import INK_COLOUR
+from urmpipe_pipeline.presentation.projections import Box, width_of
 
 MARGIN_PX, HEAD_PX, ROW_PX = 30.0, 40.0, 19.0
 """Around the graph, above it for the title, and for a line of the key, in pixels."""

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.lettering import HIGH, Box, box_about, freest, width_of
+from urmpipe_pipeline.presentation.projections import HIGH, Box, box_about, freest, width_of
 
 TEXT_PX = 13.0
 """Size of letters in pixels."""

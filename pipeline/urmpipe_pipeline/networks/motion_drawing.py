@@ -28,12 +28,11 @@ from urmpipe_pipeline.networks.parts_in_space import (
 )
 from urmpipe_pipeline.networks.scene import joined_labels, part_solids
 from urmpipe_pipeline.networks.sketch import mechanism_pieces, part_names, sketch_svg
-from urmpipe_pipeline.outlines import Piece
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.parts import spot_at
+from urmpipe_pipeline.presentation.projections import Piece, Sketch
 from urmpipe_pipeline.presentation.scene import Motion, MovingLines, Scene, Solid, Spot
 from urmpipe_pipeline.presentation.scene import Path as CurvePath
-from urmpipe_pipeline.projections import Sketch
 
 Curve: TypeAlias = tuple[str, FloatArray]
 """Name of a traced point, and its positions in [m], shape (n, 3)."""

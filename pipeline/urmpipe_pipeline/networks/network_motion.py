@@ -32,9 +32,9 @@ from urmpipe_pipeline.networks.motion_drawing import (
     motion_svg,
     moving_scene,
 )
-from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Line, Panel, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.parts import (
     Heads,
     columns_of,

@@ -28,7 +28,12 @@ from urmpipe_pipeline.networks.shapes import (
     sheet,
     square,
 )
-from urmpipe_pipeline.palette import DEVIATION_COLOUR, JOINT_COLOURS, NEUTRAL_COLOUR, REFERENCE_COLOUR
+from urmpipe_pipeline.presentation.palette import (
+    DEVIATION_COLOUR,
+    JOINT_COLOURS,
+    NEUTRAL_COLOUR,
+    REFERENCE_COLOUR,
+)
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import PlaneView
 

@@ -19,8 +19,8 @@ from urmpipe_pipeline.networks.parts_in_space import (
     placed,
 )
 from urmpipe_pipeline.networks.result import NetworkResult
-from urmpipe_pipeline.palette import GHOST_COLOURS
 from urmpipe_pipeline.presentation.figure import SpaceFigure
+from urmpipe_pipeline.presentation.palette import GHOST_COLOURS
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import PlaneView, Scene, Solid
 

@@ -16,11 +16,18 @@ from urmpipe_pipeline.networks.parts_in_space import (
 )
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.networks.scene import shown_assembly, title
-from urmpipe_pipeline.outlines import Piece
-from urmpipe_pipeline.palette import INK_COLOUR
+from urmpipe_pipeline.presentation.palette import INK_COLOUR
 from urmpipe_pipeline.presentation.parts import spot_at
+from urmpipe_pipeline.presentation.projections import (
+    ABOVE,
+    FRONT,
+    SIDEWAYS,
+    Piece,
+    Sketch,
+    projected,
+    projected_along,
+)
 from urmpipe_pipeline.presentation.scene import PlaneView, Spot
-from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected, projected_along
 
 NAMED = 24
 """Bodies and joints up to which each has its name in the projections."""

@@ -9,11 +9,11 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.planned_paths.parts import passes_ns
 from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.runs.figures import joint_panels
 
 COLOUR = AXIS_COLOURS["norm"]

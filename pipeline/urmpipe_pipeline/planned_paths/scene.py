@@ -10,13 +10,13 @@ from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.kinematics.forward import points_over_log, poses_over_log
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import DEVIATION_COLOUR, INK_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.planned_paths.planes import outlines
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
+from urmpipe_pipeline.presentation.palette import DEVIATION_COLOUR, INK_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import spot_at, within_words
+from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Sheets, Spot, Targets
-from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
 
 NAMED = 12
 """Rows, and obstacles, up to which each is named in space, and at which the arm is drawn: of more, some."""

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.palette import BEYOND_SCALE, WITHIN_SCALE
 from urmpipe_pipeline.presentation.figure import Computed, Line, Panel
+from urmpipe_pipeline.presentation.palette import BEYOND_SCALE, WITHIN_SCALE
 
 FAINT = 12.0
 """Largest value over the limit from which on a linear axis leaves the tolerance too few pixels."""

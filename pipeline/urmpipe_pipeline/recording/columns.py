@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_pipeline.recording.array_form import Column
+from urmpipe_pipeline.recording.codec import Column
 from urmpipe_pipeline.recording.sending import Values, scalar_column, times_column
 from urmpipe_pipeline.recording.store import PACKED, ROW
 

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.errors import format_value, shell_quote
-from urmpipe_pipeline.recording.array_form import ArrayOf, CodecError, In
-from urmpipe_pipeline.recording.codec import decode
-from urmpipe_pipeline.recording.forms import form_of
+from urmpipe_pipeline.recording.codec import ArrayOf, CodecError, In, decode, form_of
 from urmpipe_pipeline.recording.rows import Rows
 from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store, checksum
 

@@ -13,7 +13,7 @@ from threading import Thread
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.placing import interrupts_held_back
+from urmpipe_pipeline.outputs import interrupts_held_back
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
 
 if TYPE_CHECKING:

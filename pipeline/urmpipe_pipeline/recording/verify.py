@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError, RecordingError
-from urmpipe_pipeline.recording.array_form import Column
-from urmpipe_pipeline.recording.codec import Encoded
+from urmpipe_pipeline.recording.codec import Column, Encoded
 from urmpipe_pipeline.recording.store import SLICE, Store
 
 

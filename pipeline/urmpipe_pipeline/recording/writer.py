@@ -10,8 +10,7 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.isolated import believe
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
-from urmpipe_pipeline.recording.array_form import CodecError
-from urmpipe_pipeline.recording.codec import Encoded, encode
+from urmpipe_pipeline.recording.codec import CodecError, Encoded, encode
 from urmpipe_pipeline.recording.columns import column_rows
 from urmpipe_pipeline.recording.sink import Sink, write_into
 from urmpipe_pipeline.recording.store import PROPERTY, SLICE, checksum, document

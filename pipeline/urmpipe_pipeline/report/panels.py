@@ -9,22 +9,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.decimate import decimate, points_for
-from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.presentation.curves import (
     Curve,
     Span,
     across,
     cloud_rows,
     curves_of,
+    decimate,
     is_switch,
     logarithmic_ends,
     out_of_limit,
     place_of,
+    points_for,
     shown_unit,
 )
 from urmpipe_pipeline.presentation.figure import Mark, Over, Panel, Shape
 from urmpipe_pipeline.presentation.layout import TwoScales, two_scales
+from urmpipe_pipeline.presentation.palette import rgb
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.spec import MUTED, Spec, typed
 from urmpipe_pipeline.report.traces import (

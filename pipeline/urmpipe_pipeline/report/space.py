@@ -9,11 +9,11 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.joint_log import seconds
-from urmpipe_pipeline.palette import VALUE_SCALE
+from urmpipe_pipeline.presentation.curves import decimate, points_for
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
+from urmpipe_pipeline.presentation.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import Arrows, Path, PlaneView, Sheets, Solid, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed

@@ -12,8 +12,8 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_norm
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.wraps import unwrap_euler
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Mark, Panel, Shape, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.parts import within_words
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run

@@ -17,7 +17,7 @@ from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogWarning
 from urmpipe_pipeline.masses import mass_notices
-from urmpipe_pipeline.meshes import missing_visuals
+from urmpipe_pipeline.presentation.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree, used_method

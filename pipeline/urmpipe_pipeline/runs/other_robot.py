@@ -10,7 +10,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.masses import MASS_LEFT_OUT
-from urmpipe_pipeline.meshes import VISUAL_MISSING
+from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics, torque_warnings
 from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, beyond_limits, implausible

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import PointLog, point_over_log, positions_over_log
-from urmpipe_pipeline.decimate import decimate
+from urmpipe_pipeline.presentation.curves import decimate
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.results import Run
 

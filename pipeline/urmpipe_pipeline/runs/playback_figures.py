@@ -9,8 +9,8 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR
 from urmpipe_pipeline.presentation.parts import ends, spot_at
 from urmpipe_pipeline.presentation.scene import Path, Spot
 from urmpipe_pipeline.runs.figures import coordinates, point_name

@@ -7,11 +7,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import ends, within_words
+from urmpipe_pipeline.presentation.projections import (
+    FRONT,
+    SIDEWAYS,
+    Sketch,
+    chain_masses,
+    chain_spots,
+    projected,
+)
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
-from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_masses, chain_spots, projected
 from urmpipe_pipeline.runs.figures import times_of
 from urmpipe_pipeline.runs.results import Run
 

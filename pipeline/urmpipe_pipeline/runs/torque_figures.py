@@ -12,8 +12,8 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import energies_over_log, torque_terms_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Panel, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.runs.derivatives import acceleration_words
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED

@@ -12,8 +12,8 @@ from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 from urmpipe_pipeline.comparison.wording import SYMBOLS
-from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
 from urmpipe_pipeline.presentation.parts import ends, within_words
 from urmpipe_pipeline.presentation.scene import Path
 from urmpipe_pipeline.simulations.energy import EnergyBalance

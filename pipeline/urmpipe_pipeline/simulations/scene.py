@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_pipeline.palette import run_colour
+from urmpipe_pipeline.presentation.palette import run_colour
 from urmpipe_pipeline.presentation.scene import Arm, Scene
 from urmpipe_pipeline.simulations.figures import kept_rows, tip_paths
 from urmpipe_pipeline.simulations.simulation import Simulation

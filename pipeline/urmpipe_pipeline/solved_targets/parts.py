@@ -13,7 +13,7 @@ from urmpipe_models.ik.closed import format_method
 from urmpipe_models.ik.limits import TURN, joint_periods
 from urmpipe_models.ik.path import JointPath, Jump, SpeedViolation
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import colour_word, ghost_colour, run_colour
+from urmpipe_pipeline.presentation.palette import colour_word, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of
 from urmpipe_pipeline.presentation.section import Cell, Column, Event, Fact, Place, Table, Value
 from urmpipe_pipeline.solved_targets.result import SolvedTargets

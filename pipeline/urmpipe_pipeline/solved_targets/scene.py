@@ -8,7 +8,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.palette import ghost_colour, run_colour
+from urmpipe_pipeline.presentation.palette import ghost_colour, run_colour
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Targets
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 

@@ -14,8 +14,7 @@ from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.errors import Finding, OutputError, Voice, map_collecting_errors
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.json_values import json_ready
-from urmpipe_pipeline.outputs import EXPORT_HEADER, guarded_output, know_own, refuse_output
-from urmpipe_pipeline.placing import all_or_none
+from urmpipe_pipeline.outputs import EXPORT_HEADER, all_or_none, guarded_output, know_own, refuse_output
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat

@@ -17,8 +17,8 @@ from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.figures import velocity_figure
 from urmpipe_pipeline.accuracy.published import FIG7
 from urmpipe_pipeline.accuracy.result import Accuracy
-from urmpipe_pipeline.palette import REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Panel, SpaceFigure
+from urmpipe_pipeline.presentation.palette import REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.report.render import render_report
 from urmpipe_pipeline.results import present

@@ -17,7 +17,7 @@ from urmpipe_models.kinematics.forward import points_over_log, positions_over_lo
 from urmpipe_models.math3d import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.joint_log import LogColumn, LogWarning
-from urmpipe_pipeline.meshes import missing_visuals
+from urmpipe_pipeline.presentation.meshes import missing_visuals
 from urmpipe_pipeline.repolarization.audit import audit_log
 
 COLUMNS = tuple(LogColumn(f"q{i + 1}", f"q{i + 1}", "joint", i, "rad") for i in range(6))

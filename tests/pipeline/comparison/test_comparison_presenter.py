@@ -19,8 +19,8 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES
 from urmpipe_pipeline.comparison.scene import LEAST_SEEN
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.figure import Figure, SpaceFigure
+from urmpipe_pipeline.presentation.palette import run_colour
 from urmpipe_pipeline.presentation.section import Check, Place, Ref, Section
 from urmpipe_pipeline.results import present
 
@@ -81,7 +81,7 @@ def test_the_first_fact_is_what_decided(arms: Compared) -> None:
     result = arms({"a": noisy(1), "b": noisy(2, 0.01)}, tolerance={"joint": 0.002})
     for one in result.runs:
         section = log_section(result, one.name)
-        held, value = one.furthest, cast(Any, section.facts[0].value)
+        held, value = one.furthest, cast("Any", section.facts[0].value)
         assert (value.number, value.unit, value.limit) == (held.max, held.unit, held.tolerance)
         assert (value.used, value.verdict) == (held.used, held.verdict)
         found = facts(section)
@@ -283,7 +283,7 @@ def test_no_array_of_a_motion_is_looked_into_before_it_is_shown(arms: Compared) 
     result = arms({"a": noisy(1), "b": noisy(2)})
 
     def hidden(run: Any) -> Any:
-        untouched = {name: cast(Any, Untouched(len(run.q))) for name in ("q", "qd", "qdd")}
+        untouched = {name: cast("Any", Untouched(len(run.q))) for name in ("q", "qd", "qdd")}
         tcp = replace(run.tcp, **dict.fromkeys(("position", "velocity", "acceleration"), untouched["q"]))
         return replace(run, tcp=tcp, **untouched)
 

@@ -17,7 +17,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.facts import decisive_facts
 from urmpipe_pipeline.comparison.mended import cause_marks
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, diagnosis_tables
-from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, MENDED_COLOUR
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR, MENDED_COLOUR
 from urmpipe_pipeline.presentation.scene import ArmMark
 from urmpipe_pipeline.presentation.section import Advice, Fact
 from urmpipe_pipeline.results import present

@@ -20,9 +20,9 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.palette import VALUE_SCALE, rgb, value_colours
 from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.figure import Figure, SpaceFigure
+from urmpipe_pipeline.presentation.palette import VALUE_SCALE, rgb, value_colours
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.results import present, read_recording, write_recording

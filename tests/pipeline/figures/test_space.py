@@ -13,8 +13,8 @@ from toys import shown
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.figures.plot import plot
 from urmpipe_pipeline.figures.sheet import Sheet
-from urmpipe_pipeline.palette import BEYOND_SCALE, VALUE_SCALE, WITHIN_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
+from urmpipe_pipeline.presentation.palette import BEYOND_SCALE, VALUE_SCALE, WITHIN_SCALE
 from urmpipe_pipeline.presentation.scene import Path, Sheets, Solid, Spot
 
 ANGLE = np.linspace(0.0, 6.0, 60)

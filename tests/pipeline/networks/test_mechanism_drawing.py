@@ -9,15 +9,24 @@ import pytest
 
 from asserting import there
 from made_networks import NAMES, found
-from urmpipe_pipeline.lettering import Box, box_about, freest
 from urmpipe_pipeline.networks.drawing import network_svg
 from urmpipe_pipeline.networks.gallery import gallery_svg
 from urmpipe_pipeline.networks.parts_in_space import body_colour
 from urmpipe_pipeline.networks.scene import motion_plane
 from urmpipe_pipeline.networks.sketch import JOINT_EDGE, mechanism_svg
-from urmpipe_pipeline.outlines import Piece, outline
+from urmpipe_pipeline.presentation.projections import (
+    ABOVE,
+    FRONT,
+    SIDEWAYS,
+    Box,
+    Piece,
+    Sketch,
+    box_about,
+    freest,
+    outline,
+    projected,
+)
 from urmpipe_pipeline.presentation.scene import Spot
-from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
 
 SVG = "{http://www.w3.org/2000/svg}"
 

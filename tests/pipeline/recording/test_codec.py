@@ -24,8 +24,7 @@ from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.toml import robot_toml
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording.array_form import CodecError
-from urmpipe_pipeline.recording.codec import decode, encode
+from urmpipe_pipeline.recording.codec import CodecError, decode, encode
 from urmpipe_pipeline.runs.results import Run
 
 

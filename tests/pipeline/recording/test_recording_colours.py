@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from made_plans import CONTOUR, planned
 from recorded import static
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.palette import VALUE_SCALE, rgb, value_colours
+from urmpipe_pipeline.presentation.palette import VALUE_SCALE, rgb, value_colours
 from urmpipe_pipeline.presentation.scene import Path
 from urmpipe_pipeline.recording.views.geometry import drawn_path
 from urmpipe_pipeline.recording.views.tracks import COLOURED, LEVELS, MOST, SEEN

@@ -24,8 +24,8 @@ from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.math3d import to_matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
-from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.presentation.figure import Figure
+from urmpipe_pipeline.presentation.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.presentation.scene import Arm
 from urmpipe_pipeline.recording.store import ROW, TIME, Store
 from urmpipe_pipeline.recording.views.geometry import (

@@ -22,7 +22,7 @@ from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.palette import (
+from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
     JOINT_COLOURS,

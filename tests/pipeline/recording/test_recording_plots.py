@@ -14,8 +14,8 @@ from rerun.chunk import RrdReader
 
 from recorded import columns, entities, packed, rows_of, static, times_of, views
 from toys import COLOURS, PLOT, STEP_NS, Toy, figure, line, panel, recorded, root_of, shown, toy
-from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Mark, Over, Panel, Shape, View
+from urmpipe_pipeline.presentation.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.recording import writer
 from urmpipe_pipeline.recording.views.axes import LOW, MARGIN, TALL, span_with_numbers
 from urmpipe_pipeline.recording.views.plots import COPIED, LONG, ROWS, SHARED_AXIS

@@ -22,7 +22,7 @@ from urmpipe_models.math3d import from_offset, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
+from urmpipe_pipeline.presentation.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.scene import ArmMark, Balls, Scene, Spot
 from urmpipe_pipeline.presentation.scene import Path as Way
 from urmpipe_pipeline.recording.store import Store

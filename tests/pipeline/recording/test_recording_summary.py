@@ -8,7 +8,7 @@ import numpy as np
 
 from toys import shown
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.palette import DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
+from urmpipe_pipeline.presentation.palette import DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.scene import Path, Scene
 from urmpipe_pipeline.presentation.section import (
     Column,

@@ -14,8 +14,8 @@ from solved import solved
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.presentation import scene as presentation
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.recording.views.geometry import NEAR, ball, drawn_arm, drawn_targets, extent
 from urmpipe_pipeline.results import present, write_recording
 from urmpipe_pipeline.solved_targets.result import SolvedTargets

@@ -111,10 +111,10 @@ def test_the_motion_is_that_of_the_kinematics(run: Run, shown: Presentation) -> 
 def test_a_page_shows_the_playback(run: Run, shown: Presentation) -> None:
     played = there(play_back(run))
     blocks = {one.title: one for one in shown.body.blocks()}
-    before = cast(Figure, blocks["Tool centre point before and after repolarization"]).views[0].panels
+    before = cast("Figure", blocks["Tool centre point before and after repolarization"]).views[0].panels
     np.testing.assert_array_equal(before[0].lines[0].values, played.position)
     np.testing.assert_array_equal(before[2].lines[0].values, np.linalg.norm(played.velocity, axis=1))
-    space = cast(SpaceFigure, blocks["Path in space before and after repolarization"])
+    space = cast("SpaceFigure", blocks["Path in space before and after repolarization"])
     np.testing.assert_array_equal(space.paths[0].position, played.position)
     assert space.spots[-1].position == tuple(played.position[there(played.worst)].tolist())
     assert {"Path in space", "Input files", "How the log was read"} < set(blocks)
@@ -165,7 +165,7 @@ def test_a_log_of_one_row_is_shown(tmp_path: Path) -> None:
 
 
 def test_no_array_is_looked_into_before_it_is_shown(run: Run) -> None:
-    untouched = cast(Any, Untouched(len(run.q)))
+    untouched = cast("Any", Untouched(len(run.q)))
     names = ("position", "velocity", "acceleration", "euler_zyx", "singular")
     tcp = replace(there(run.tcp), **dict.fromkeys(names, untouched))
     hidden = replace(run, q=untouched, qd=untouched, qdd=untouched, tcp=tcp)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR
+from urmpipe_pipeline.presentation.palette import JOINT_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.simulations.signal_groups import ANSWERS, answers_of
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS
 from urmpipe_pipeline.simulations.signal_groups import groups_of
 from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simulation
 from urmpipe_pipeline.text import display_unit

@@ -33,7 +33,7 @@ def test_a_delta_meter_is_a_check_and_a_judged_section(make_simulation: MakeSimu
     assert (end.name, end.verdict) == ("reaches its end", "pass")
     assert (check.name, check.verdict, check.about) == ("within tolerance", "fail", "meter")
     assert f"{meter.out_of_tolerance} of {meter.samples}" in check.words
-    value = cast(Value, section.facts[0].value)
+    value = cast("Value", section.facts[0].value)
     assert (value.number, value.limit, value.used) == (meter.worst, meter.allowed, meter.used)
     table = cells(shown.body.tables[0])
     for key in ("worst", "allowed", "t", "sample", "samples", "out_of_tolerance", "share_out"):
@@ -109,12 +109,12 @@ def test_the_extremes_are_those_of_the_json(make_simulation: MakeSimulation) -> 
     every = {one["name"]: one for one in simulation.to_dict()["signals"]}
     whole = next(one for one in shown.body.blocks() if one.title == f"Signals ({len(every)})")
     for table in (whole, shown.body.tables[1]):
-        found = cells(cast(Any, table))
+        found = cells(cast("Any", table))
         for i, name in enumerate(found["name"]):
             assert {key: found[key][i] for key in found if key not in ("name", "unit")} == {
                 key: every[name][key] for key in ("first", "min", "t_min", "max", "t_max", "last")
             }
-    assert cells(cast(Any, whole))["name"] == list(every)
+    assert cells(cast("Any", whole))["name"] == list(every)
     first = cells(shown.body.tables[1])["name"]
     assert len(first) == 12
     assert set(first) > {"meter.delta[1]", "meter.norm"}  # what no other block takes comes first

@@ -14,7 +14,7 @@ from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.math3d import to_matrices
-from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, rgb
+from urmpipe_pipeline.presentation.palette import REFERENCE_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.presentation.scene import (
     Arm,
     ArmMark,

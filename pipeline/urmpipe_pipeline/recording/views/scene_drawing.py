@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import compose
-from urmpipe_pipeline.palette import (
+from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
     MASS_COLOUR,

@@ -14,8 +14,8 @@ from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.meshes import MEDIA_TYPES, drawable
-from urmpipe_pipeline.palette import NEUTRAL_COLOUR, rgb
+from urmpipe_pipeline.presentation.meshes import MEDIA_TYPES, drawable
+from urmpipe_pipeline.presentation.palette import NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.sending import keys, shown_path
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.palette import rgb
+from urmpipe_pipeline.presentation.palette import rgb
 from urmpipe_pipeline.presentation.scene import Motion, MovingLines, PlaneView, Scene, Solid
 from urmpipe_pipeline.recording.sending import keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import eye_axes

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.palette import colour_word
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
 from urmpipe_pipeline.presentation.digits import units_differ, written
+from urmpipe_pipeline.presentation.palette import colour_word
 from urmpipe_pipeline.presentation.scene import Path, Scene
 from urmpipe_pipeline.presentation.section import Cell, Fact, Judged, Presentation, Ref, Section, Table
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.palette import value_colours
+from urmpipe_pipeline.presentation.palette import value_colours
 from urmpipe_pipeline.presentation.scene import BoolArray
 
 POSE_PERIOD = 0.02

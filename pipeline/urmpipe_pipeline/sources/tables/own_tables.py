@@ -61,7 +61,7 @@ def roles_of(layout: Layout) -> dict[int, Role]:
             (field.metadata or {}).get(ROLE, b"").decode(errors="replace") for field in layout.held.schema
         )
         found = ((index, _TOLD_ROLE.fullmatch(text)) for index, text in enumerate(texts))
-        told = [(int(match["place"]), index, cast(Role, match["role"])) for index, match in found if match]
+        told = [(int(match["place"]), index, cast("Role", match["role"])) for index, match in found if match]
         if told:
             return {index: role for _, index, role in sorted(told)}
     return grid_roles(head_of(layout)) if layout.header is not None and layout.form is None else {}

@@ -1,10 +1,11 @@
-"""Arms, a path and solids seen along the axes of the world, as SVG: views of one scale, aligned."""
+"""Words in a drawing: how much room they take, and where they stand beside others."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,11 +13,137 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import escape_html
-from urmpipe_pipeline.lettering import Box, box_about, freest, width_of
-from urmpipe_pipeline.outlines import Piece, drawn_pieces, polyline
-from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR
+from urmpipe_pipeline.presentation.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import PlaneView, Spot, ball_sizes
+
+WIDE, HIGH = 0.58, 1.2
+"""Width of a letter and height of a line, about, for a size of letters of 1."""
+
+
+class Box(NamedTuple):
+    """A rectangle in pixels: its left, top, right and bottom, y down."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def shared(self, other: Box) -> float:
+        """Return the area that it shares with another, in square pixels."""
+        wide = min(self.right, other.right) - max(self.left, other.left)
+        high = min(self.bottom, other.bottom) - max(self.top, other.top)
+        return wide * high if wide > 0.0 and high > 0.0 else 0.0
+
+    def grown(self, by: float) -> Box:
+        """Return it with so many more pixels at each side."""
+        return Box(self.left - by, self.top - by, self.right + by, self.bottom + by)
+
+    def shifted(self, right: float) -> Box:
+        """Return it so many pixels further to the right."""
+        return Box(self.left + right, self.top, self.right + right, self.bottom)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Its middle in pixels."""
+        return (self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0
+
+
+def width_of(words: str, size: float) -> float:
+    """Return how wide words are in pixels, about, in letters of a size in pixels."""
+    return WIDE * size * len(words)
+
+
+def box_about(x: float, y: float, words: str, size: float) -> Box:
+    """Return the room for words about a place in pixels, in letters of a size in pixels."""
+    wide, high = width_of(words, size) / 2.0, HIGH * size / 2.0
+    return Box(x - wide, y - high, x + wide, y + high)
+
+
+def freest(candidates: Sequence[Box], taken: Iterable[Box]) -> Box:
+    """Return the first of the boxes that share least with what is taken."""
+    others = list(taken)
+    return min(candidates, key=lambda one: round(sum(one.shared(other) for other in others), 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A convex solid by its outline, or a line.
+
+    Attributes:
+        points: Corners of the solid, or vertices of the line, in [m], shape (n, 3).
+        colour: Of the outline or the line, as #rrggbb.
+        width: Of the outline or the line in pixels.
+        fill: Of the solid, as #rrggbb; empty for a line.
+        opacity: Of the fill, 0..1.
+        dashed: Whether the line is.
+        front: Whether it is drawn before what is not, however near that is.
+        faint: Whether it is a further position: it is drawn behind all else, and its line is as transparent
+            as its fill.
+    """
+
+    points: FloatArray
+    colour: str
+    width: float = 1.5
+    fill: str = ""
+    opacity: float = 1.0
+    dashed: bool = False
+    front: bool = False
+    faint: bool = False
+
+
+def drawn_pieces(
+    pieces: Sequence[Piece], placed: Callable[[FloatArray], FloatArray], towards: FloatArray
+) -> Iterator[str]:
+    """Yield solids and lines, those behind first.
+
+    Args:
+        pieces: What is drawn.
+        placed: Returns points in [m], shape (n, 3), in pixels, shape (n, 2).
+        towards: The way to who looks at them [-], shape (3,).
+    """
+
+    def order(one: Piece) -> tuple[int, float]:
+        return one.front - one.faint, round(float((one.points @ towards).mean()), 9)
+
+    for one in sorted(pieces, key=order):
+        dashed = ' stroke-dasharray="6 4"' if one.dashed else ""
+        line = f'stroke="{one.colour}" stroke-width="{one.width:g}" stroke-linejoin="round"{dashed}'
+        line += f' stroke-opacity="{one.opacity:g}"' if one.faint else ""
+        if one.fill:
+            way = " ".join(f"{x:.1f},{y:.1f}" for x, y in outline(placed(one.points)))
+            yield f'<polygon points="{way}" fill="{one.fill}" fill-opacity="{one.opacity:g}" {line}/>'
+        else:
+            yield polyline(placed(one.points), line)
+
+
+def outline(points: FloatArray) -> list[tuple[float, float]]:
+    """Return the corners of the convex hull of points in pixels, shape (n, 2), around it.
+
+    Source: Andrew, 1979, the monotone chain.
+    """
+    every = sorted({(x, y) for x, y in np.round(points, 1).tolist()})
+    halves: list[list[tuple[float, float]]] = []
+    for some in (every, every[::-1]):
+        half: list[tuple[float, float]] = []
+        for x, y in some:
+            while len(half) > 1 and _left_turn(half[-2], half[-1], (x, y)) <= 0.0:
+                half.pop()
+            half.append((x, y))
+        halves.append(half[:-1])
+    return [*halves[0], *halves[1]] or every
+
+
+def _left_turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Return twice the area of a triangle in square pixels, negative if it is clockwise."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def polyline(points: FloatArray, style: str) -> str:
+    """Return a line through points in pixels, shape (n, 2)."""
+    way = " ".join(f"{x:.1f},{y:.1f}" for x, y in points[np.isfinite(points).all(axis=1)])
+    return f'<polyline points="{way}" fill="none" {style}/>'
+
 
 SIZE, LARGE = 420, 620
 """Longest side of a drawing in pixels: of each of several views, and of a single view."""
