@@ -15,11 +15,11 @@ from typing import TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.iso9283.approach import settling
 from urmpipe_pipeline.iso9283.command_path import CommandCorner, CommandPath
 from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path
+from urmpipe_pipeline.iso9283.criteria import accuracy, repeatability
 from urmpipe_pipeline.iso9283.motion import Rest, motion_of
-from urmpipe_pipeline.iso9283.spread import accuracy, repeatability
+from urmpipe_pipeline.iso9283.poses import settling
 
 Place: TypeAlias = Sequence[float] | FloatArray
 """Where something is, to the right and up, shape (2,); what follows counts for nothing."""

@@ -14,7 +14,7 @@ import urmpipe
 from asserting import there
 from pages import DOCS, command_lines, lay_files, snippets, text_of
 from urmpipe.main import run
-from urmpipe_pipeline.comparison.iso_cycles import ENOUGH, IsoOptions
+from urmpipe_pipeline.comparison.iso import ENOUGH, IsoOptions
 from urmpipe_pipeline.iso9283.criteria import UNITS
 
 PAGE = text_of("docs/iso.md")

@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe.keyword_checks import refuse_recording
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.comparison.iso_cycles import IsoOptions
+from urmpipe_pipeline.comparison.iso import IsoOptions
 from urmpipe_pipeline.iso9283.cycles import parse_cycles
 from urmpipe_pipeline.iso9283.poses import Poses
 from urmpipe_pipeline.planned_paths.command_marks import bends_of, stops_of

@@ -15,7 +15,7 @@ from urmpipe_pipeline.comparison.assumptions import assumptions
 from urmpipe_pipeline.comparison.clocks import clocks_differ, late, stamp_offset
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.iso_cycles import IsoOptions, judge_cycles
+from urmpipe_pipeline.comparison.iso import IsoOptions, judge_cycles
 from urmpipe_pipeline.comparison.matching import (
     JOINTS_ALONE,
     NO_ROBOT,

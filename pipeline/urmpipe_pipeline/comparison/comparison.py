@@ -14,7 +14,7 @@ from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, 
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.iso9283.result import IsoTest
-from urmpipe_pipeline.iso9283.wording import not_judged_findings
+from urmpipe_pipeline.iso9283.tables import not_judged_findings
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance

@@ -10,9 +10,8 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.iso9283.corners import CornerPath
+from urmpipe_pipeline.iso9283.corners import CornerPath, LegSpeed
 from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict
-from urmpipe_pipeline.iso9283.speeds import LegSpeed
 
 
 @dataclass(frozen=True, slots=True)

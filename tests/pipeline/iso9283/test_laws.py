@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from repeated import PLACE, along, logs, overall, still, told, value, values_of, written
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import to_matrices, to_quaternions
-from urmpipe_pipeline.iso9283.criteria import UNITS
+from urmpipe_pipeline.iso9283.criteria import UNITS, repeatability
 from urmpipe_pipeline.iso9283.result import IsoTest
-from urmpipe_pipeline.iso9283.spread import repeatability
 
 QUAT = (*PLACE, "qx", "qy", "qz", "qw")
 CORNERS = ((0.0, 0.0, 0.3), (0.15, 0.0, 0.3), (0.15, 0.1, 0.3), (0.0, 0.1, 0.325), (0.05, 0.05, 0.3))

@@ -22,10 +22,10 @@ from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.exports import exports
-from urmpipe_pipeline.comparison.iso_cycles import IsoOptions
+from urmpipe_pipeline.comparison.iso import IsoOptions
 from urmpipe_pipeline.iso9283.criteria import UNITS, judged
 from urmpipe_pipeline.iso9283.result import IsoTest
-from urmpipe_pipeline.iso9283.wording import meaning, tolerance_words, value_of, worst_first
+from urmpipe_pipeline.iso9283.tables import meaning, tolerance_words, value_of, worst_first
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Judged, Presentation, Section, Table
 from urmpipe_pipeline.report.render import render_report

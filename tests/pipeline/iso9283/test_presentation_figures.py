@@ -19,17 +19,19 @@ from repeated import along
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.iso_cycles import IsoOptions
-from urmpipe_pipeline.iso9283.drawings import MOST, corner_drawing, pose_drawing
+from urmpipe_pipeline.comparison.iso import IsoOptions
 from urmpipe_pipeline.iso9283.figures import (
     AROUND,
     FACTORS,
+    MOST,
     SEEN,
     circles,
+    corner_drawing,
     deviation_figure,
     enlarged,
     mean_of,
     path_figure,
+    pose_drawing,
     speed_figure,
     tube_of,
 )

@@ -9,18 +9,29 @@ from itertools import pairwise
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.iso9283.approach import settling
-from urmpipe_pipeline.iso9283.command_path import Bend, CommandPath, Stations, Stop
-from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path, mean_path
-from urmpipe_pipeline.iso9283.criteria import UNITS, Criterion, judged
-from urmpipe_pipeline.iso9283.crossings import Crossings, crossings
-from urmpipe_pipeline.iso9283.likeness import ALIKE, jumps
+from urmpipe_pipeline.iso9283.command_path import Bend, CommandPath, Crossings, Stations, Stop, crossings
+from urmpipe_pipeline.iso9283.corners import CornerPath, LegSpeed, corner_path, leg_speed, mean_path
+from urmpipe_pipeline.iso9283.criteria import (
+    UNITS,
+    Criterion,
+    accuracy,
+    angles,
+    judged,
+    repeatability,
+    turned,
+)
+from urmpipe_pipeline.iso9283.cycles import ALIKE, jumps
 from urmpipe_pipeline.iso9283.motion import Motion, Rest
-from urmpipe_pipeline.iso9283.pose_criteria import Found, angle_criteria, pose_criteria
-from urmpipe_pipeline.iso9283.poses import Poses, attained, poses_of
+from urmpipe_pipeline.iso9283.poses import (
+    Found,
+    Poses,
+    angle_criteria,
+    attained,
+    pose_criteria,
+    poses_of,
+    settling,
+)
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath
-from urmpipe_pipeline.iso9283.speeds import LegSpeed, leg_speed
-from urmpipe_pipeline.iso9283.spread import accuracy, angles, repeatability, turned
 
 DRAWN = 1000
 """Places along the path at which speeds are drawn."""

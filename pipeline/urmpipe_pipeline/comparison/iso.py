@@ -21,16 +21,14 @@ from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
 from urmpipe_pipeline.comparison.wording import share_words
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.iso9283.command_path import Bend, Stations, Stop
-from urmpipe_pipeline.iso9283.criteria import fewest_cycles
-from urmpipe_pipeline.iso9283.cycles import FoundCycles, check_cycles, find_cycles, first_cycle
-from urmpipe_pipeline.iso9283.likeness import alike
-from urmpipe_pipeline.iso9283.measure import Command, Followed, Marks, follow, marks_of
-from urmpipe_pipeline.iso9283.measure import measure as measure_criteria
+from urmpipe_pipeline.iso9283.criteria import angles, fewest_cycles
+from urmpipe_pipeline.iso9283.cycles import FoundCycles, alike, check_cycles, find_cycles, first_cycle
+from urmpipe_pipeline.iso9283.evaluate import Command, Followed, Marks, follow, marks_of
+from urmpipe_pipeline.iso9283.evaluate import measure as measure_criteria
 from urmpipe_pipeline.iso9283.motion import Motion, motion_of
 from urmpipe_pipeline.iso9283.poses import Poses
 from urmpipe_pipeline.iso9283.result import Cycle, FailedCycle, IsoTest
-from urmpipe_pipeline.iso9283.spread import angles
-from urmpipe_pipeline.iso9283.wording import failed_words
+from urmpipe_pipeline.iso9283.tables import failed_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR
 from urmpipe_pipeline.runs.part import part_of
