@@ -27,7 +27,7 @@ import urmpipe
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot, parse_offset
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 COUNT, SEED = 1000, 44

@@ -80,7 +80,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.networks.network_motion import NetworkMotion as NetworkMotion
     from urmpipe_pipeline.networks.result import NetworkResult as NetworkResult
     from urmpipe_pipeline.planned_paths.result import PlannedPath as PlannedPath
-    from urmpipe_pipeline.runs.results import Run as Run
+    from urmpipe_pipeline.runs.run import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
     from urmpipe_pipeline.solved_targets.result import SolvedTargets as SolvedTargets
     from urmpipe_pipeline.sources import LogMap as LogMap
@@ -119,7 +119,7 @@ _HOME = {
     "RecordingError": "urmpipe_models.errors",
     "Report": "urmpipe.api.report",
     "RobotError": "urmpipe_models.errors",
-    "Run": "urmpipe_pipeline.runs.results",
+    "Run": "urmpipe_pipeline.runs.run",
     "Simulation": "urmpipe_pipeline.simulations.simulation",
     "TableReading": "urmpipe.reading",
     "Targets": "urmpipe_models.ik.solutions",

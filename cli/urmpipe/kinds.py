@@ -71,7 +71,7 @@ def _is_map(value: Any) -> bool:
 
 
 def _is_run(value: Any) -> bool:
-    from urmpipe_pipeline.runs.results import Run
+    from urmpipe_pipeline.runs.run import Run
 
     return isinstance(value, Run)
 

@@ -499,6 +499,12 @@ MIN_SIMILARITY = 0.6  # ratio of `difflib.SequenceMatcher` from which a name is 
 MAX_COMPARED_LENGTH = 200  # longer names are not compared: the time grows with the square of the length
 
 
+def check_choice(parameter: str, value: str, allowed: Sequence[str]) -> None:
+    """Raise an `OptionError` if the value of a parameter is not one of the allowed words."""
+    if value not in allowed:
+        raise OptionError(Finding(parameter=parameter, found=value, allowed=", ".join(allowed)))
+
+
 def format_suggestion(name: str, allowed: Iterable[str]) -> str:
     """Return ` (did you mean NAME?)` with the most similar allowed name, or an empty string.
 

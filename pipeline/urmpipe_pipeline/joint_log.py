@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from urmpipe_models.display import Displayable, format_count, format_headline
-from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, Message, Voice
 from urmpipe_models.math3d import COLUMN_NAMES, RotationForm, to_quaternions
 from urmpipe_models.wraps import unwrap_orientations, unwrap_quaternions
 
 if TYPE_CHECKING:
     import pandas as pd
-
 
 ROW_NS = 1_000_000_000
 """How much of `t_ns` a row without a time counts: `t` is then the number of the row from 0, and no time."""
@@ -340,3 +339,29 @@ class JointLog(Displayable):
             "inferences": [one.to_dict(voice) for one in self.inferences],
             "warnings": [one.to_dict(voice) for one in self.warnings],
         }
+
+
+GAP = 3.0
+"""Two rows further apart than this many median periods have a gap between them, in which nothing is known."""
+
+MISSED_SAMPLE = 1.5
+"""Two values of a joint further apart than this many median periods lack one between them; a joint may turn
+unseen there."""
+
+
+def gaps_behind(t_ns: IntArray) -> BoolArray:
+    """Return which rows at integer times in [ns], shape (n,), have a gap behind them, shape (n - 1,)."""
+    step = np.diff(t_ns)
+    return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
+
+
+def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
+    """Return which times lie strictly inside a gap between two known ones, shape (n,).
+
+    Both are integer times in [ns], of shape (n,) and, rising, (k,).
+    """
+    if len(known_ns) < 2:
+        return np.zeros(len(at_ns), dtype=np.bool_)
+    after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
+    wide = gaps_behind(known_ns)[after - 1]
+    return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))

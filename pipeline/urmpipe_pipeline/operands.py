@@ -31,9 +31,8 @@ from urmpipe_pipeline.repolarization.audit import turning
 from urmpipe_pipeline.repolarization.interval import refuse_unknown
 from urmpipe_pipeline.results import kind_of, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.other_robot import on_robot
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.motion import run_of_block
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.result import SolvedTargets

@@ -1,9 +1,9 @@
-"""What is needed to repeat a run: inputs by hash, options, versions."""
+"""What a result rests on: inputs by hash, options, versions; and the assumptions of a verdict."""
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -55,3 +55,33 @@ def defaults_words(made: Provenance) -> str:
 def _versions() -> Mapping[str, str]:
     """Return the versions of Python and the libraries: reading them takes a tenth of a short log's time."""
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+
+
+NAMED = 3
+"""Logs that an assumption names; more are only counted."""
+
+
+def assumed(found: Iterable[tuple[str, str]], every: Collection[str] = ()) -> tuple[str, ...]:
+    """Return assumptions, each once, with the logs that it is about where these are not all of them.
+
+    Args:
+        found: Each with the name of its log: ("the joints are in deg", "matlab").
+        every: The names of all logs; without them each assumption has the names of its own.
+    """
+    names: dict[str, dict[str, None]] = {}
+    for said, name in found:
+        names.setdefault(said, {})[name] = None
+    return tuple(
+        said if set(about) == set(every) else f"{said} ({_named(list(about))})"
+        for said, about in names.items()
+    )
+
+
+def _named(names: Sequence[str]) -> str:
+    """Return some logs by their names, or how many they are."""
+    return ", ".join(names) if len(names) <= NAMED else f"{len(names)} logs"
+
+
+def assuming(assumptions: Sequence[str]) -> str:
+    """Return what a verdict's line ends with: ", assuming the joints are in deg"; perhaps nothing."""
+    return f", assuming {' and '.join(assumptions)}" if assumptions else ""

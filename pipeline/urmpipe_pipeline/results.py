@@ -31,7 +31,7 @@ from urmpipe_pipeline.recording.reader import read_result
 from urmpipe_pipeline.recording.writer import write_result
 from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs import presenter as runs
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations import exports as simulation_exports
 from urmpipe_pipeline.simulations import presenter as simulations
 from urmpipe_pipeline.simulations.simulation import Simulation

@@ -16,7 +16,7 @@ import pytest
 from thinned_logs import lay_thinned_logs
 from urmpipe_datasets import LOGS
 from urmpipe_pipeline.results import read_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 PATH, COPPELIA, MATLAB = LOGS / "path.csv", LOGS / "coppeliasim.csv", LOGS / "matlab.csv"
 FEW = pytest.mark.usefixtures("few")

@@ -18,7 +18,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.json_values import json_ready
+from urmpipe_pipeline.text import json_ready
 
 Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2], [-1.0, 0.5, -0.2, 1.0, -0.8, 2.0]])
 ARM = urmpipe.load_robot("arm6")

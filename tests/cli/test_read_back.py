@@ -20,7 +20,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 ROWS = 120

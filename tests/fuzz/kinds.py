@@ -76,8 +76,8 @@ def robot(path: Path, made: Path, rng: Random) -> None:
     from urmpipe.printing.robot import chain_at
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
-    from urmpipe_pipeline.masses import mass_notices
     from urmpipe_pipeline.presentation.meshes import missing_visuals
+    from urmpipe_pipeline.runs.torques import mass_notices
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     tip = "tool0" if path.suffix == ".urdf" and b"tool0" in path.read_bytes() else None

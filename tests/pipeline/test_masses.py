@@ -5,7 +5,7 @@ from __future__ import annotations
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.drives import PassiveJoint
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.masses import lost_in_urdf, mass_notices
+from urmpipe_pipeline.runs.torques import lost_in_urdf, mass_notices
 
 
 def test_links_whose_masses_are_left_out_are_named() -> None:

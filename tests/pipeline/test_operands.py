@@ -13,7 +13,7 @@ from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.errors import LogError, OptionError, UrmpipeError
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 TIMES = np.arange(6) / 100

@@ -10,7 +10,7 @@ from urmpipe_models.errors import shell_quote
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.comparison.wording import tolerance_words, used_words
-from urmpipe_pipeline.json_values import plain
+from urmpipe_pipeline.text import plain
 
 
 @pytest.mark.parametrize(

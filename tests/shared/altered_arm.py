@@ -25,7 +25,7 @@ from urmpipe_pipeline.diagnosis.explanations import SearchResult as Found
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, numbered
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.diagnosis.search import Search
-from urmpipe_pipeline.log_edits import Edit, Edits, robot_edits, sign_edits, swap_edits, unit_edits
+from urmpipe_pipeline.runs.reading_errors import Edit, Edits, robot_edits, sign_edits, swap_edits, unit_edits
 
 DURATION = 36.91
 """Of every motion in [s]: that of the bundled path."""

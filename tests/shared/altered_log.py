@@ -16,7 +16,7 @@ from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 TRACKER = Path(__file__).resolve().parents[3] / "shared/logs/ur10-laser-tracker/measurements_grid.csv"
 """Poses of a UR10 that a laser tracker measured; outside the repository."""

@@ -14,7 +14,7 @@ from urmpipe_models.math3d import RotationForm
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.derivatives import derivatives
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 TSP = 0.005
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)

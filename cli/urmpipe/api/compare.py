@@ -45,7 +45,7 @@ from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.given_targets import TargetsLike
 from urmpipe_pipeline.sources import Held, TableLike, held_of, is_table

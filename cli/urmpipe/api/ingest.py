@@ -28,7 +28,7 @@ from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.presenter import audit_rows
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import Held, TableLike, held_of, held_of_arrays, is_table
 from urmpipe_pipeline.tables.table_csv import write_table
 

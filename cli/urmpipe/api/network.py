@@ -28,7 +28,7 @@ from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import TableLike, held_of
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.tables.joint_file import write_joint_log

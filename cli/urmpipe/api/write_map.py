@@ -10,7 +10,7 @@ from urmpipe.arm_placing import offset_of
 from urmpipe.keyword_checks import PathLike, paths, public
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import map_of, read_map
 
 

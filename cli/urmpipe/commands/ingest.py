@@ -17,7 +17,7 @@ from urmpipe.options.types import ANY_FILE, FileType
 from urmpipe_models.errors import Finding, OptionError
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.runs.results import Run
+    from urmpipe_pipeline.runs.run import Run
 
 
 @click.command(cls=HeadedCommand, short_help="Turn one log into a recording.")

@@ -74,7 +74,6 @@ def show(
     """
     from urmpipe.printing.robot import chain_at, print_chain
     from urmpipe_models.files import EXPORT_MARK, write_export
-    from urmpipe_pipeline.masses import mass_notices
     from urmpipe_pipeline.presentation.projections import (
         FRONT,
         SIDEWAYS,
@@ -83,6 +82,7 @@ def show(
         chain_spots,
         projected,
     )
+    from urmpipe_pipeline.runs.torques import mass_notices
     from urmpipe_pipeline.solved_targets.request import joint_values
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
@@ -120,7 +120,7 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
     from urmpipe_models.files import write_export
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
-    from urmpipe_pipeline.masses import lost_in_urdf
+    from urmpipe_pipeline.runs.torques import lost_in_urdf
 
     target = output or Path(f"{Path(name).stem}.urdf")
     writers = {".urdf": urdf_text, ".toml": robot_toml}

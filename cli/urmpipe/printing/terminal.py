@@ -30,7 +30,7 @@ PIPE_WIDTH = 120
 
 def print_json(value: Any) -> None:
     """Print one JSON object, NaN as null."""
-    from urmpipe_pipeline.json_values import json_ready
+    from urmpipe_pipeline.text import json_ready
 
     echo_json(json_ready(value), indent=2)
 

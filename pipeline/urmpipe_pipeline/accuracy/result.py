@@ -20,7 +20,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.planned_paths.request import Law
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA
+from urmpipe_pipeline.runs.run import SCHEMA
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -24,7 +24,7 @@ from urmpipe_models.math3d import (
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, lacking
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 RESOLVED = 1e-4
 """Positions that leave a line by less than this, root mean square in [m], leave the rotation about it open: a

@@ -6,10 +6,10 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.assumptions import assumed
 from urmpipe_pipeline.comparison.matching import file_of
 from urmpipe_pipeline.joint_log import Role
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.provenance import assumed
+from urmpipe_pipeline.runs.run import Run
 
 
 def assumptions(sides: Sequence[tuple[Run, Collection[Role]]]) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from urmpipe_pipeline.comparison.matching import match
 from urmpipe_pipeline.comparison.sync import BY_HAND, BY_MOTION, synchronise
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources.cells.text_clock import DATE
 from urmpipe_pipeline.sources.checks import REBUILT, SPREAD
 from urmpipe_pipeline.sources.clocks.halves import EPOCH

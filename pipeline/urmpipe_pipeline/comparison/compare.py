@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, map_collecting_errors
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, check_choice, map_collecting_errors
 from urmpipe_pipeline import text
-from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.assumptions import assumptions
 from urmpipe_pipeline.comparison.clocks import clocks_differ, late, stamp_offset
@@ -49,7 +48,7 @@ from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
 from urmpipe_pipeline.presentation.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ
 
 Tcp = Literal["fk", "recorded"]

@@ -18,7 +18,7 @@ from urmpipe_pipeline.iso9283.tables import not_judged_findings
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA
+from urmpipe_pipeline.runs.run import SCHEMA
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,7 +15,7 @@ from urmpipe_models.errors import Voice
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import seconds
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -31,7 +31,7 @@ from urmpipe_pipeline.iso9283.result import Cycle, FailedCycle, IsoTest
 from urmpipe_pipeline.iso9283.tables import failed_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR
-from urmpipe_pipeline.runs.part import part_of
+from urmpipe_pipeline.runs.run import part_of
 
 FAILED = "failed-cycle"
 

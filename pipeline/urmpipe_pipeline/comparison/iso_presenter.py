@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.assumptions import assuming
 from urmpipe_pipeline.comparison.alignment import placed
 from urmpipe_pipeline.comparison.baseline_section import baseline_section, criterion_checks, worse_facts
 from urmpipe_pipeline.comparison.change import BaselineComparison
@@ -76,7 +75,7 @@ from urmpipe_pipeline.presentation.section import (
     Table,
     Value,
 )
-from urmpipe_pipeline.provenance import defaults_words
+from urmpipe_pipeline.provenance import assuming, defaults_words
 from urmpipe_pipeline.runs.figures import times_of
 
 

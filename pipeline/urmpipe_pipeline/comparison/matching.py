@@ -17,7 +17,7 @@ from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.joint_log import NETWORK
 from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 
 @dataclass(frozen=True, slots=True, eq=False)

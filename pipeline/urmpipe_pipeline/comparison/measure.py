@@ -17,10 +17,9 @@ from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, joints_apart
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
 from urmpipe_pipeline.comparison.trajectory import Trajectory
-from urmpipe_pipeline.gaps import gaps_behind
-from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.joint_log import gaps_behind, seconds
 from urmpipe_pipeline.runs.grid import interpolate
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 START_SAMPLES = 11
 """Samples by which the turns of the start are counted: as few as outvote a wild one."""

@@ -54,7 +54,7 @@ from urmpipe_pipeline.presentation.section import (
     Value,
 )
 from urmpipe_pipeline.runs.parts import log_events, log_tables
-from urmpipe_pipeline.runs.playback_figures import playback_figures
+from urmpipe_pipeline.runs.playback import playback_figures
 
 
 def present(result: Comparison) -> Presentation:

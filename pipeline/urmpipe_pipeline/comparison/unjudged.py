@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from urmpipe_models.errors import Finding, UrmpipeError
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 Made = TypeVar("Made")
 

@@ -19,7 +19,7 @@ from urmpipe_pipeline.diagnosis.sides import AT_REST, Side
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.recorded_tcp import distances_from_recorded
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 EXCHANGED = "path-as-log"
 """The kind of a doubt about the order of what was given: it says nothing against a log."""

@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.assumptions import assuming
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, Statistics, Stretch
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
 from urmpipe_pipeline.presentation.digits import held, written
 from urmpipe_pipeline.presentation.section import Value
-from urmpipe_pipeline.provenance import defaults_words
+from urmpipe_pipeline.provenance import assuming, defaults_words
 
 SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
 """The quantities of a deviation as people read them."""

@@ -18,7 +18,7 @@ from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.fit import Positions
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.motion import Clock, Joints, Motion
-from urmpipe_pipeline.log_edits import IDENTITY, Edits, Matrix
+from urmpipe_pipeline.runs.reading_errors import IDENTITY, Edits, Matrix
 
 FITTED = 100
 """Rows, spread evenly, on which unknown frames are put where they fit best; fits on all rows come after."""

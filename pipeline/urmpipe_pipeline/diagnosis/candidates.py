@@ -18,7 +18,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.fit import OUTLIER, Model, Rows, inliers
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 SETUP = ("base_shift", "base_rotation", "tool_shift", "tool_rotation", "time_lag", "joint_offset")
 """What a discrete cause may need besides to leave little; lengths and tilts are small."""

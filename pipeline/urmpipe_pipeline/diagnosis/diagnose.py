@@ -24,7 +24,7 @@ from urmpipe_pipeline.diagnosis.own_tcp import ask_both_sides
 from urmpipe_pipeline.diagnosis.result import STRUCTURE, Diagnosis, NotLookedFor, Remainder, rms
 from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, build_question
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 if TYPE_CHECKING:  # a comparison holds its diagnosis: no ring between the two
     from urmpipe_pipeline.comparison.deviation import Deviation

@@ -11,7 +11,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray, spread_rows
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.diagnosis.fit import Model
 from urmpipe_pipeline.diagnosis.hypotheses import State
-from urmpipe_pipeline.log_edits import Edit, EditKind, Edits
+from urmpipe_pipeline.runs.reading_errors import Edit, EditKind, Edits
 
 SPREAD = 400
 """Rows, spread evenly, on which it is looked for where a change begins; then all rows around are."""

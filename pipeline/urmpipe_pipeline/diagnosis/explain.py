@@ -29,7 +29,7 @@ from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Refused, rms
 from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.diagnosis.selection import TWIN
-from urmpipe_pipeline.log_edits import Edit, Edits
+from urmpipe_pipeline.runs.reading_errors import Edit, Edits
 
 ORDERED = 1_000  # rows, spread evenly, on which the order of causes is found
 PLACED = 4_000  # rows, spread evenly, on which what is always fitted follows

@@ -23,7 +23,7 @@ from urmpipe_pipeline.diagnosis.gate import find_unbelievable, leaves_noise
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 COARSE = 300  # rows, spread evenly, on which discrete causes are ranked
 MEDIUM = 600  # rows, spread evenly, on which starts are compared

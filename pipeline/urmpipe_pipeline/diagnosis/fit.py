@@ -12,7 +12,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, map_bloc
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.selection import Normal
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 OUTLIER = 6.0
 """A row is left out if it is further off than so many medians: of Gaussian noise none in a million is."""

@@ -25,7 +25,7 @@ from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.diagnosis.intervals import autocorrelation_time
 from urmpipe_pipeline.diagnosis.result import STRUCTURE
 from urmpipe_pipeline.diagnosis.selection import Subset
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 LARGEST: Mapping[str, float] = {
     "joint_scale": 0.5,  # a joint that is read in other steps is off by less

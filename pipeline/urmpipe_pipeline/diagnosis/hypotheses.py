@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.identification import Twist
 from urmpipe_pipeline.diagnosis.result import Kind
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 Axis: TypeAlias = tuple[float, float, float]
 

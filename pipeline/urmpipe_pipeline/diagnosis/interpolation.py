@@ -18,7 +18,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_pipeline.diagnosis.motion import STENCIL, Motion, five_point_rates
-from urmpipe_pipeline.gaps import gaps_behind
+from urmpipe_pipeline.joint_log import gaps_behind
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 
 if TYPE_CHECKING:  # a comparison contains its diagnosis: no ring between the two

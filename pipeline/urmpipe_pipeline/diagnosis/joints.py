@@ -14,7 +14,7 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.diagnosis.arm import edited
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.motion import Clock, Joints, Motion
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """The side that is modelled, at any time: its joints as an explanation has them.
 
 q + offset + scale q + compliance q'' + play / 2 sign(q') + sag times the torque of gravity, q being that of
-the log, changed by `log_edits`, at its own time: that of its clock and of its joint, behind a servo.
+the log, changed by `reading_errors`, at its own time: that of its clock and of its joint, behind a servo.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from urmpipe_models.dynamics.equations import inverse_dynamics
 from urmpipe_models.elementwise import BoolArray, Element, FloatArray, IntArray, dot, scale
 from urmpipe_models.kinematics.forward import jacobian
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.runs.reading_errors import Edits
 
 MOVING = 5.0
 """A joint moves if its rate exceeds its noise this many times: by chance less than once in a million."""

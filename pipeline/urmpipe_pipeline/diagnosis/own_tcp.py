@@ -21,8 +21,7 @@ import numpy as np
 from urmpipe_pipeline.diagnosis.result import Diagnosis, OwnTcp, rms
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.runs.grid import interpolate
-from urmpipe_pipeline.runs.recorded_poses import RecordedPoses
-from urmpipe_pipeline.runs.recorded_tcp import distances_from_recorded
+from urmpipe_pipeline.runs.recorded_tcp import RecordedPoses, distances_from_recorded
 from urmpipe_pipeline.sources.units.evidence import CLEARLY
 
 if TYPE_CHECKING:  # a comparison contains its diagnosis: no ring between the two

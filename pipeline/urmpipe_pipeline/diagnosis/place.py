@@ -23,7 +23,7 @@ from urmpipe_pipeline.diagnosis.arm import (
 from urmpipe_pipeline.diagnosis.fit import Positions
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
-from urmpipe_pipeline.log_edits import IDENTITY, Edits
+from urmpipe_pipeline.runs.reading_errors import IDENTITY, Edits
 
 TOOL = 1
 """The place of the tool; that of the base is 0."""

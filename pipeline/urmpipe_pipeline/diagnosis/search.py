@@ -41,7 +41,7 @@ from urmpipe_pipeline.diagnosis.formatting import NOT_CONSTANT
 from urmpipe_pipeline.diagnosis.gate import NOISE, find_changing
 from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.diagnosis.selection import Subset
-from urmpipe_pipeline.log_edits import Edit, Edits
+from urmpipe_pipeline.runs.reading_errors import Edit, Edits
 
 SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them

@@ -32,7 +32,7 @@ from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
 from urmpipe_pipeline.diagnosis.result import STRUCTURE, NotLookedFor
-from urmpipe_pipeline.log_edits import (
+from urmpipe_pipeline.runs.reading_errors import (
     Edits,
     axis_edits,
     coupling_edits,
@@ -42,7 +42,7 @@ from urmpipe_pipeline.log_edits import (
     swap_edits,
     unit_edits,
 )
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 if TYPE_CHECKING:  # a comparison holds its diagnosis: no ring between the two
     from urmpipe_pipeline.comparison.matching import Matched

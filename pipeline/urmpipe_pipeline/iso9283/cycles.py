@@ -15,8 +15,8 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_pipeline.gaps import GAP
 from urmpipe_pipeline.iso9283.motion import Motion, apart_rows
+from urmpipe_pipeline.joint_log import GAP
 
 AT_START = 0.1
 """A motion is at the start of a command within this share of its extent ..."""

@@ -64,7 +64,7 @@ from urmpipe_pipeline.networks.network_motion import (
     Transmission,
 )
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 DEFAULT_STEPS = 200
 MAX_ZERO_STEP = 0.5  # scaled step of a drive between rows, above which zeros between them are missed

@@ -61,7 +61,7 @@ from urmpipe_pipeline.presentation.section import (
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs.figures import joint_panels
-from urmpipe_pipeline.runs.results import SCHEMA, Run
+from urmpipe_pipeline.runs.run import SCHEMA, Run
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,7 +13,7 @@ from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import kinematics
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 
 def run_of_plan(

@@ -30,7 +30,8 @@ from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoint
 from urmpipe_pipeline.planned_paths.request import Request, Timing
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.runs.torques import MOVE_SLOWER, beyond_efforts, torque_summaries
+from urmpipe_pipeline.runs.run import torque_summaries
+from urmpipe_pipeline.runs.torques import MOVE_SLOWER, beyond_efforts
 from urmpipe_pipeline.text import NAMED, counted, rows_text
 from urmpipe_pipeline.text import seconds as in_seconds
 

@@ -24,7 +24,7 @@ from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.planned_paths.request import Law
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA, Run
+from urmpipe_pipeline.runs.run import SCHEMA, Run
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ from urllib.parse import unquote
 
 from urmpipe_models.arm.chain import FILE, PACKAGE_PATH, Chain, Mesh, Visual
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.json_values import parsed_json
+from urmpipe_pipeline.text import parsed_json
 
 MEDIA_TYPES = {
     ".stl": "model/stl",

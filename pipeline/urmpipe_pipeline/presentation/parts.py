@@ -11,11 +11,11 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SourceFile
-from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.presentation.palette import INK_COLOUR
 from urmpipe_pipeline.presentation.scene import Spot
 from urmpipe_pipeline.presentation.section import Cell, Column, Fact, Table, Value
 from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.text import plain
 
 Item = TypeVar("Item")
 

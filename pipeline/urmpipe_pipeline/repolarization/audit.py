@@ -1,10 +1,14 @@
-"""The repolarizer over a log, and its audit: what was undone, repaired, left, or could not be decided."""
+"""The repolarizer over a log, and its audit: what was undone, repaired, left, or is ambiguous.
+
+- `AuditEntry`: one finding.
+- `audit_log`: unwrap the joints that turn, and return the values with entries, warnings and inferences.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +25,58 @@ from urmpipe_models.wraps import (
     repolarize,
 )
 from urmpipe_pipeline import text
-from urmpipe_pipeline.gaps import MISSED_SAMPLE
-from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.joint_log import MISSED_SAMPLE, Inference, JointLog, LogWarning, seconds
 from urmpipe_pipeline.repolarization.interval import double_turns, given_periods, said_intervals
 from urmpipe_pipeline.sources.options import GivenInterval
+
+AuditKind = Literal["wrap", "in-between", "repaired", "unexplained", "ambiguous"]
+
+
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """One thing that the repolarizer did to a joint, or could not decide.
+
+    kind says which:
+        wrap: a jump of a period that was undone.
+        in-between: a sample that a linear resampling left on a wrap; it stands as it is.
+        repaired: such a sample, put on the line through its neighbours.
+        unexplained: a step above a quarter period that is no wrap; it stays.
+        ambiguous: a gap in which the joint can have turned more than half a period; the nearest is taken.
+
+    Attributes:
+        joint: Name of the joint.
+        row: Data row of the file, from 1: the first row after the step, or the sample itself.
+        t: Instant in [s]: of a step t_r, half way between its two samples; of a sample its time.
+        half_period: t is known to +- this, in [s].
+        step: The step as it stands in the file, in [rad]; of a sample how far it lies from the line
+            through its repolarized neighbours.
+        before: Turns k added before it.
+        after: Turns k added from it on.
+        kind: What it is.
+    """
+
+    joint: str
+    row: int
+    t: float
+    half_period: float
+    step: float
+    before: int
+    after: int
+    kind: AuditKind = "wrap"
+
+    @property
+    def sample(self) -> int:
+        """Index of the row, from 0."""
+        return self.row - 1
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the audit."""
+        return {
+            "kind": self.kind, "joint": self.joint, "row": self.row, "sample": self.sample,
+            "t": self.t, "half_period": self.half_period, "step": self.step,
+            "from": self.before, "to": self.after,
+        }  # fmt: skip
+
 
 ALL = (Hint("audit", None, "lists all", call="ingest"),)
 """Where those are of which a warning gives the number."""

@@ -16,11 +16,12 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.measure_units import compatible_units, quantity_to_si
 from urmpipe_models.wraps import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
-from urmpipe_pipeline.repolarization.joint_motion import over_rows
 from urmpipe_pipeline.sources.options import GivenInterval
 from urmpipe_pipeline.text import counted
 
 Interval = tuple[float, float]
+
+_SIDE_BY_SIDE = 64  # rows that NumPy folds at once: it is slow over rows as short as a log's
 
 SLIDING = math.inf
 """The period of a joint that slides: no step is near it."""
@@ -33,6 +34,19 @@ SLACK = 1e-5
 
 SHOWN_SLACK = 0.01
 """Values may pass the limits of an inferred interval by this share of P: noise, overshoot."""
+
+
+def over_rows(fold: np.ufunc, values: FloatArray) -> FloatArray:
+    """Fold the rows into one.
+
+    Values are in any unit, shape (n, columns), the row is of shape (columns,).
+    """
+    count, joints = values.shape
+    whole = count - count % _SIDE_BY_SIDE
+    if whole == 0:
+        return np.asarray(fold.reduce(values, axis=0))
+    wide = fold.reduce(values[:whole].reshape(-1, _SIDE_BY_SIDE * joints), axis=0)
+    return np.asarray(fold.reduce(np.vstack((wide.reshape(-1, joints), values[whole:])), axis=0))
 
 
 def _refuse_empty(name: str, low: float, high: float) -> None:

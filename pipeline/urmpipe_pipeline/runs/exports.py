@@ -26,7 +26,7 @@ from urmpipe_pipeline.presentation.exports import (
 )
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.file_columns import file_roles, file_table
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.text import encodable
 
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.gaps import inside_gaps
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.joint_log import JointLog, LogWarning, inside_gaps
 from urmpipe_pipeline.sources.clocks.quantised import Regular, behind_rounded
 
 REGULAR = 0.01

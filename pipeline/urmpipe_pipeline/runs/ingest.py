@@ -1,4 +1,10 @@
-"""Ingest: a log becomes a run - repolarized, on a uniform grid, with the arm's kinematics."""
+"""Ingest: a log becomes a run.
+
+- `ingest_log`: read the files, infer the robot where the log identifies it, then `run_of`.
+- `run_of`: repolarize on the rows of the file, resample to the grid, differentiate, compute kinematics and
+  torques, and collect the warnings.
+- `on_robot`: the same run with another robot; the joint motion is unchanged.
+"""
 
 from __future__ import annotations
 
@@ -12,22 +18,29 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, check_choice
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
-from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogWarning
-from urmpipe_pipeline.masses import mass_notices
-from urmpipe_pipeline.presentation.meshes import missing_visuals
+from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING, missing_visuals
 from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree, used_method
 from urmpipe_pipeline.runs.grid import Grid, make_grid
-from urmpipe_pipeline.runs.plausibility import beyond_limits, implausible
-from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
-from urmpipe_pipeline.runs.results import RowJoints, Run
-from urmpipe_pipeline.runs.robot_inference import infer_robot
-from urmpipe_pipeline.runs.torque_noise import SMOOTHED, noise_warnings
-from urmpipe_pipeline.runs.torques import CHECK_LOG, MOVE_SLOWER, beyond_efforts, torques_of_log
+from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, beyond_limits, implausible
+from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, RECORDED_START, far_from_recorded, infer_robot
+from urmpipe_pipeline.runs.run import RowJoints, Run
+from urmpipe_pipeline.runs.torques import (
+    CHECK_LOG,
+    EFFORT_LIMIT,
+    MASS_LEFT_OUT,
+    MOVE_SLOWER,
+    SMOOTHED,
+    TORQUE_NOISE,
+    beyond_efforts,
+    mass_notices,
+    noise_warnings,
+    torques_of_log,
+)
 from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
 from urmpipe_pipeline.sources.read import read_numbers
@@ -234,3 +247,66 @@ def kinematics(
     count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))
     said = "ry is +-90 deg: rz and rx are not separately defined, rx = 0 by convention"
     return tcp, [*notices, LogWarning(EULER_SINGULAR, f"at {count} samples from {first} on {said}")]
+
+
+BY_LIMITS = (JOINT_LIMIT, SPEED_LIMIT)
+OF_ROBOT = (
+    EULER_SINGULAR, VISUAL_MISSING, MASS_LEFT_OUT, FAR_RECORDED, RECORDED_START, *BY_LIMITS, EFFORT_LIMIT,
+    TORQUE_NOISE,
+)  # fmt: skip
+"""The kinds of the warnings that rest on the robot."""
+
+
+def on_robot(run: Run, robot: Chain | None) -> Run:
+    """Return a run with the kinematics of an arm; as it is without one.
+
+    Its joint values, their audit and their rates stay.
+
+    Raises:
+        LogError: If the joints of the run are not the robot's.
+    """
+    if robot is None or robot == run.robot:
+        return run
+    tcp, noticed = kinematics(robot, run.q, run.qd, run.qdd)
+    _refuse_other_kinds(run, robot)
+    others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
+    tau = torques_of_log(robot, run.q, run.qd, run.qdd) if run.timed else None
+    doubts = [*far_from_recorded(robot, run.log), *_beyond_limits(run, robot), *noticed]
+    made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
+    warnings = (*others, *doubts)
+    moved = replace(run, robot=robot, tcp=tcp, tau=tau, warnings=warnings, provenance=made)
+    return replace(moved, warnings=(*warnings, *torque_warnings(moved)))
+
+
+def _refuse_other_kinds(run: Run, robot: Chain) -> None:
+    """Raise a `LogError` with every joint that turns in the log and slides in the arm, or the other way."""
+    if not run.log.joints:
+        return
+    before, now = turning(run.log, run.robot), turning(run.log, robot)
+    wrong = [
+        f"{run.name}, joint {run.log.joints[j]}: found {_unit(before[j])}, allowed: {_unit(now[j])},"
+        f" as robot {robot.name} has"
+        for j in np.flatnonzero(before != now).tolist()
+    ]
+    if wrong:
+        raise LogError(*wrong)
+
+
+def _unit(turns: np.bool_) -> str:
+    """Return the SI unit of a joint that turns, or slides."""
+    return "rad" if turns else "m"
+
+
+def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
+    """Return what the log says against the arm's limits of place and speed."""
+    if not run.log.joints:
+        return []
+    if not run.timed:
+        return beyond_limits(run.log, run.q, robot)
+    read = run.provenance.options.get("read") or {}
+    repaired = bool(read.get("repair"))
+    found = audit_log(run.log, robot, interval=read.get("interval"), repaired=repaired)
+    timed = not run.log.period_assumed
+    turns = turning(run.log, robot)
+    doubts = implausible(run.log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=run.tsp)
+    return [warning for warning in doubts if warning.kind in BY_LIMITS]

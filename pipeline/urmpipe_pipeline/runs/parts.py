@@ -20,9 +20,9 @@ from urmpipe_pipeline.presentation.parts import (
     table_of,
 )
 from urmpipe_pipeline.presentation.section import Advice, Cell, Event, Fact, Level, Table, Value
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.repolarization.audit import AuditEntry, AuditKind
 from urmpipe_pipeline.runs.derivatives import acceleration_words
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED
 
 AUDIT_NOTES: dict[AuditKind, str] = {

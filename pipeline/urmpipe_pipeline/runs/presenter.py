@@ -19,8 +19,8 @@ from urmpipe_pipeline.runs.parts import (
     log_facts,
     torque_table,
 )
-from urmpipe_pipeline.runs.playback_figures import playback_figures
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.playback import playback_figures
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.runs.scene import mass_drawing, path_figure, run_scene
 
 

@@ -1,27 +1,242 @@
-"""Forward kinematics against the tool centre point that the log recorded: where they do not meet."""
+"""The tool centre point that a log recorded, compared with forward kinematics.
+
+- `RecordedPoses`: rows with joint values and a recorded pose; how far the kinematics of an arm are from them.
+- `outlying_start`: outliers in the first rows, before the controller applies tool and pose.
+- `far_from_recorded`, `lacking_tool`: warnings, with what would explain the distance: another robot of the
+  catalogue, a reversed joint, exchanged joints, another base or tool.
+- `infer_robot`: the only robot of the catalogue that fits a log.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.elementwise import FloatArray, IntArray, Vector
 from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
-from urmpipe_models.math3d import Transform, from_offset
-from urmpipe_models.robots.catalogue import load_robot, robot_names
+from urmpipe_models.math3d import (
+    Transform,
+    fit_rotation,
+    from_offset,
+    matrix_to_rpy,
+    to_matrices,
+    to_quaternions,
+)
+from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot, robot_names
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.log_edits import Edit, robot_edits, sign_edits, swap_edits
-from urmpipe_pipeline.runs.recorded_poses import FINEST, FINEST_TURN, Apart, RecordedPoses
-from urmpipe_pipeline.runs.recorded_start import outlying_start, start_warning
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, Fit, extent
-from urmpipe_pipeline.sources.vocabulary import split_unit
+from urmpipe_pipeline.joint_log import OWN, Inference, JointLog, LogWarning
+from urmpipe_pipeline.runs.reading_errors import Edit, robot_edits, sign_edits, swap_edits
+from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.sources.units.evidence import (
+    CLEARLY,
+    CLOSE_WITH_TOOL,
+    SAMPLES,
+    Fit,
+    extent,
+    has_both,
+    mean_turn,
+    single_out,
+    spread,
+    tool_fit,
+    turned_apart,
+)
+from urmpipe_pipeline.sources.units.kinematic_units import Recorded, fits
+from urmpipe_pipeline.sources.vocabulary import key, split_unit
+
+FINEST = 1e-4
+"""Options are told to a tenth of a millimetre: where kinematics are nearer than this in [m], none helps."""
+
+FINEST_TURN = 1e-3
+"""The same of an angle in [rad], which moves what is a tool's length away by that."""
+
+
+@dataclass(frozen=True, slots=True)
+class Apart:
+    """How far an arm stays from recorded poses.
+
+    Attributes:
+        distance: Root mean square distance in [m].
+        angle: The same of the angle in [rad]; 0 where no orientation was recorded.
+    """
+
+    distance: float
+    angle: float
+
+    def clearly_nearer(self, other: Apart) -> bool:
+        """Tell whether it is clearly less in place or in angle than another, and clearly more in neither."""
+        nearer = CLEARLY * self.distance <= other.distance and other.distance > FINEST
+        straighter = CLEARLY * self.angle <= other.angle and other.angle > FINEST_TURN
+        no_further = self.distance <= CLEARLY * max(other.distance, FINEST)
+        no_more_turned = self.angle <= CLEARLY * max(other.angle, FINEST_TURN)
+        return (nearer and no_more_turned) or (straighter and no_further)
+
+    def said(self, *, turned: bool) -> str:
+        """Return it as people read it, with the angle if that matters."""
+        angle = f" and {text.quantity(self.angle, 'rad')}" if turned else ""
+        return f"{self.distance * 1e3:.2f} mm{angle}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedPoses:
+    """Rows of a log that have joint values and a recorded tool centre point.
+
+    Attributes:
+        q: Joint values in [rad] or [m], shape (n, joints).
+        position: Recorded positions in [m], shape (n, 3).
+        quat: Recorded orientations as unit quaternions x, y, z, w [-], shape (n, 4); NaN where one is
+            missing, None without any.
+    """
+
+    q: FloatArray
+    position: FloatArray
+    quat: FloatArray | None
+
+    @classmethod
+    def of(cls, robot: Chain | None, log: JointLog) -> RecordedPoses | None:
+        """Return some rows that are spread over a log; None if it has none that an arm can be held against.
+
+        Those at its start that are outliers are left out.
+        """
+        if robot is None or log.tcp_position is None or log.measured or log.q.shape[1] != len(robot.moving):
+            return None
+        start, _ = outlying_start(robot, log)
+        rows = np.arange(start, log.rows)[spread(log.rows - start)]
+        q, position = log.q[rows], log.tcp_position[rows]
+        known = has_both(q, position)
+        quat = None
+        if log.tcp_rotation is not None and log.rotation_form is not None:
+            quat = to_quaternions(log.tcp_rotation[rows], log.rotation_form)[known]
+        told = quat is not None and bool(np.isfinite(quat).all(axis=1).any())
+        return cls(q[known], position[known], quat if told else None) if known.any() else None
+
+    def fit(self, robot: Chain, q: FloatArray | None = None) -> Fit:
+        """Return how near an arm comes to the points.
+
+        Args:
+            robot: The arm.
+            q: Other joint values in [rad] or [m], shape (n, joints).
+        """
+        return self.fits(robot, [self.q if q is None else q])[0]
+
+    def fits(self, robot: Chain, every: Sequence[FloatArray]) -> list[Fit]:
+        """Return the fits of several joint values in [rad] or [m], shape (n, joints) each, all at once."""
+        position, rotation = poses_over_log(robot, np.concatenate(every))
+        parts = zip(np.split(position, len(every)), np.split(rotation, len(every)), strict=True)
+        return [tool_fit(*part, self.position) for part in parts]
+
+    def apart(self, robot: Chain, q: FloatArray | None = None, *, tool: bool) -> Apart:
+        """Return how far an arm stays from the poses, perhaps but for the constant tool that fits best.
+
+        Where a log hardly moves, any tool would fit: its points are then held as the arm has them.
+
+        Args:
+            robot: The arm.
+            q: Other joint values in [rad] or [m], shape (n, joints).
+            tool: Whether a tool is allowed for.
+        """
+        found = self.fit(robot, q)
+        distance = found.with_tool if tool and np.isfinite(found.with_tool) else found.distance
+        return Apart(distance, self._angle(robot, self.q if q is None else q, tool=tool))
+
+    def tool_turn(self, robot: Chain) -> tuple[float, float, float]:
+        """Return rx, ry, rz in [rad] of the tool that fits the orientations best; zeros without them."""
+        if self.quat is None:
+            return 0.0, 0.0, 0.0
+        (turn,) = to_matrices(mean_turn(*self._orientations(robot, self.q))[np.newaxis])
+        return matrix_to_rpy(_rows_of(turn))
+
+    def base(self, robot: Chain) -> tuple[float, ...]:
+        """Return x, y, z in [m] and rx, ry, rz in [rad] of the base with which the points agree best."""
+        computed = positions_over_log(replace(robot, base=Transform()), self.q)
+        middle, target = computed.mean(axis=0), self.position.mean(axis=0)
+        turn, _ = fit_rotation((self.position - target).T @ (computed - middle))
+        return (*(target - turn @ middle).tolist(), *matrix_to_rpy(_rows_of(turn)))
+
+    def _angle(self, robot: Chain, q: FloatArray, *, tool: bool) -> float:
+        return 0.0 if self.quat is None else turned_apart(*self._orientations(robot, q), tool=tool)
+
+    def _orientations(self, robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return computed and recorded orientations where both are, each of shape (n, 4) [-]."""
+        assert self.quat is not None  # asked before
+        known = np.isfinite(self.quat).all(axis=1)
+        _, rotation = poses_over_log(robot, q[known])
+        return to_quaternions(rotation.reshape(-1, 9), "matrix"), self.quat[known]
+
+
+def _rows_of(matrix: FloatArray) -> tuple[Vector, Vector, Vector]:
+    """Return the rows of a rotation matrix as a transform has them."""
+    x, y, z = (tuple(row) for row in matrix.tolist())
+    return x, y, z
+
+
+RECORDED_START = "recorded-tcp-start"
+
+LEAST_ROWS = 10
+"""A log of fewer rows tells too little of what is usual in it."""
+
+
+def outlying_start(robot: Chain | None, log: JointLog) -> tuple[int, float]:
+    """Return how many rows at the start have the tool centre point elsewhere than the others, and how far.
+
+    Elsewhere is in the frame of the tip, where a tool stays: the offset from the kinematics is there
+    `CLEARLY` times further from the usual one than in any row that follows, and further than a calibration
+    makes. It is told in [m] as the median of these rows; inf of points of three zeros, which are none
+    but in a plan.
+    """
+    if log.tcp_position is None or log.measured or log.rows < LEAST_ROWS:
+        return 0, 0.0
+    first = log.tcp_position[0]
+    zeros = 0 if first.any() or log.source == OWN else int(np.argmax(log.tcp_position.any(axis=1)))
+    if robot is None or log.q.shape[1] != len(robot.moving):
+        return zeros, np.inf
+    rows, apart = _by_tool(robot, log, zeros)
+    return (zeros + rows, apart) if rows else (zeros, np.inf)
+
+
+def start_warning(robot: Chain | None, log: JointLog) -> list[LogWarning]:
+    """Return a warning if the first rows recorded the tool centre point elsewhere than the others."""
+    rows, apart = outlying_start(robot, log)
+    if not rows:
+        return []
+    first = "the first row" if rows == 1 else f"the first {rows} rows"
+    where = "as 0, 0, 0" if np.isinf(apart) else f"{text.quantity(apart, 'm')} from where the others have it"
+    said = f"{first} of {log.rows} recorded the TCP {where}: no tool or pose known yet?"
+    return [LogWarning(RECORDED_START, f"{said} They are kept and judged with the others", row=1)]
+
+
+def _by_tool(robot: Chain, log: JointLog, start: int) -> tuple[int, float]:
+    """Return how many rows from a first one on have another tool than the others, and by how much in [m]."""
+    every = np.arange(start, log.rows)
+    rows = np.union1d(every[:SAMPLES], every[spread(len(every))])
+    offset = _offsets(robot, log, rows)
+    known = np.isfinite(offset).all(axis=1)
+    rows, offset = rows[known], offset[known]
+    even = np.isin(rows, every[spread(len(every))])
+    if np.count_nonzero(even) < LEAST_ROWS:
+        return 0, 0.0
+    usual = np.median(offset[even], axis=0)
+    apart = np.linalg.norm(offset - usual, axis=1)
+    least, most = np.minimum.accumulate(apart)[:-1], np.maximum.accumulate(apart[::-1])[::-1][1:]
+    splits = np.flatnonzero(least > np.maximum(CLEARLY * most, CLOSE_WITH_TOOL))
+    if not len(splits):
+        return 0, 0.0
+    last = int(splits[-1])
+    between = np.arange(rows[last], rows[last + 1])  # rows that were not looked at
+    beyond = np.linalg.norm(_offsets(robot, log, between) - usual, axis=1) > CLEARLY * most[last]
+    return int(between[beyond][-1]) + 1 - start, float(np.median(apart[: last + 1]))
+
+
+def _offsets(robot: Chain, log: JointLog, rows: IntArray) -> FloatArray:
+    """Return the recorded points in the frame that the kinematics give the tool, shape (n, 3), in [m]."""
+    assert log.tcp_position is not None  # asked before
+    position, rotation = poses_over_log(robot, log.q[rows])
+    return np.asarray(np.einsum("nji,nj->ni", rotation, log.tcp_position[rows] - position))
+
 
 LACKING_TOOL = "recorded-tcp-tool"
 """The kind of a hint beside a verdict of fail: it says nothing against the log."""
@@ -252,3 +467,70 @@ def _frame(numbers: Sequence[float]) -> list[float]:
     """Return X,Y,Z[,RX,RY,RZ] with tenths of a millimetre or of a milliradian; no turn if it is none."""
     told = [round(float(value), 4) + 0.0 for value in numbers]  # + 0.0: no -0.0
     return told if any(told[3:]) else told[:3]
+
+
+def infer_robot(recorded: Recorded) -> tuple[Chain, Inference] | None:
+    """Return the only robot of the catalogue that fits a log, and why; None if none or several do.
+
+    A robot's name in the name of every joint column singles it out (as in /ur5e/elbow_joint/position); so
+    do its kinematics, if they come out at the recorded tool centre point and those of no other robot do, in
+    the units that are told or in others.
+    """
+    words = _shared_words(recorded.names)
+    if not recorded.names or (not recorded.lengths and not words & set(kinematically_distinct_names())):
+        return None
+    robots = [
+        robot
+        for robot in map(load_robot, kinematically_distinct_names())
+        if len(robot.moving) == len(recorded.names)
+    ]
+    named = [robot for robot in robots if robot.name in words]
+    if len(named) == 1:
+        why = "its name in the names of the joint columns"
+        return named[0], Inference("robot", named[0].name, why, hints=(Hint("robot"),))
+    return _by_kinematics(recorded, named or robots)
+
+
+def _shared_words(names: Sequence[str]) -> frozenset[str]:
+    """Return the words that stand in every name."""
+    words = [frozenset(key(name).split("_")) for name in names]
+    return frozenset.intersection(*words) if words else frozenset()
+
+
+def _by_kinematics(recorded: Recorded, robots: Sequence[Chain]) -> tuple[Chain, Inference] | None:
+    """Return the robot whose forward kinematics come out at the recorded points."""
+    judged = [robot for robot in robots if recorded.judges(robot)]
+    found = {
+        (robot.name, reading): one
+        for robot in judged
+        for reading, one in fits(robot, recorded, recorded.usual).items()
+    }
+    told = {(robot.name, reading) for robot in judged for reading in recorded.told}
+    best = single_out(found, told) if found else None
+    if best is None:
+        return None
+    (name, reading), needs_tool = best
+    nearest = {
+        robot.name: min(
+            (found[robot.name, one] for one in recorded.usual), key=lambda one: one.of(tool=needs_tool)
+        )
+        for robot in judged
+    }
+    said = _said(name, nearest | {name: found[name, reading]}, needs_tool)
+    return next(robot for robot in robots if robot.name == name), said
+
+
+def _said(name: str, near: Mapping[str, Fit], needs_tool: bool) -> Inference:
+    """Say by how much a robot beats the next one."""
+    distance = {robot: one.of(tool=needs_tool) for robot, one in near.items()}
+    others = {robot: value for robot, value in distance.items() if robot != name}
+    said = f"its kinematics come within {distance[name] * 1e3:.2f} mm (rms) of the recorded TCP"
+    hints = [Hint("robot")]
+    if needs_tool:
+        x, y, z = tool = [round(value, 4) + 0.0 for value in near[name].tool]  # + 0.0: no -0.0
+        said += f" with the tool {x:.4f},{y:.4f},{z:.4f}, which is not applied"
+        hints.append(Hint("tool", tool, "applies it", robot=name))
+    if others:
+        second = min(others, key=others.__getitem__)
+        said += f", those of {second} within {others[second] * 1e3:.2f} mm"
+    return Inference("robot", name, said, hints=tuple(hints))

@@ -20,7 +20,7 @@ from urmpipe_pipeline.presentation.projections import (
 )
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
 from urmpipe_pipeline.runs.figures import times_of
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 
 def run_scene(run: Run) -> Scene | None:

@@ -18,7 +18,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.runs.ingest import run_of
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import SLOW, Signal, Simulation
 from urmpipe_pipeline.sources import ReadOptions
 

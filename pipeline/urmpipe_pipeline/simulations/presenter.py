@@ -8,7 +8,6 @@ from functools import partial
 from itertools import groupby
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.assumptions import assuming
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
@@ -26,6 +25,7 @@ from urmpipe_pipeline.presentation.section import (
     Section,
     Value,
 )
+from urmpipe_pipeline.provenance import assuming
 from urmpipe_pipeline.simulations.energy import EnergyBalance
 from urmpipe_pipeline.simulations.figures import RESIDUAL_CAUSES, energy_figure, path_figure, signal_figures
 from urmpipe_pipeline.simulations.scene import simulation_scene

@@ -15,13 +15,12 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import CosimulationError, Voice
-from urmpipe_pipeline.assumptions import assumed
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
-from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA
+from urmpipe_pipeline.provenance import Provenance, assumed
+from urmpipe_pipeline.runs.run import SCHEMA
 from urmpipe_pipeline.simulations.energy import ENERGIES, EnergyBalance, energy_balance
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.joint_log import ROW_NS, SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import run_of
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 

@@ -20,7 +20,7 @@ from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA, Run
+from urmpipe_pipeline.runs.run import SCHEMA, Run
 from urmpipe_pipeline.solved_targets.motion import run_of_solutions
 from urmpipe_pipeline.solved_targets.solution_warnings import path_warnings, unreached_warnings
 

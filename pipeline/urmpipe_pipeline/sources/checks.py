@@ -9,8 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.gaps import GAP, gaps_behind
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import GAP, Inference, LogWarning, gaps_behind
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.chunks import Spread, spread_over_chunks

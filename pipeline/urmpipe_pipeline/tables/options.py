@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from urmpipe_models.errors import Finding, Hint, OptionError
-from urmpipe_pipeline.choices import check_choice
+from urmpipe_models.errors import Finding, Hint, OptionError, check_choice
 from urmpipe_pipeline.presentation.exports import Exports
 
 Format = Literal["csv", "parquet", "mat", "tum"]

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.errors import Finding, OutputError, Voice, map_collecting_errors
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.json_values import json_ready
 from urmpipe_pipeline.outputs import EXPORT_HEADER, all_or_none, guarded_output, know_own, refuse_output
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
 from urmpipe_pipeline.tables.options import ExportOptions, Format
 from urmpipe_pipeline.tables.parquet_file import is_ours, write_parquet
-from urmpipe_pipeline.text import unique
+from urmpipe_pipeline.text import json_ready, unique
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -22,7 +22,7 @@ from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.ingest import run_of
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 AXES = ["x [m]", "y [m]", "z [m]"]

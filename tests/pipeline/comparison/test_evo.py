@@ -25,7 +25,7 @@ from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.ingest import ingest_log, run_of
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
 

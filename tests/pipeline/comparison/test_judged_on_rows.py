@@ -19,7 +19,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.ingest import run_of
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 UR5E = load_robot("ur5e")

@@ -24,7 +24,7 @@ from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.statistics import UNCHANGING, correlation
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 LOGS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"

@@ -26,7 +26,7 @@ from urmpipe_pipeline.presentation.palette import VALUE_SCALE, rgb, value_colour
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.results import present, read_recording, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.tables import ExportOptions
 
 UR5E = load_robot("ur5e")

@@ -25,7 +25,7 @@ from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered, zero
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, gravity_torques, motion_of
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
-from urmpipe_pipeline.log_edits import (
+from urmpipe_pipeline.runs.reading_errors import (
     Edit,
     Edits,
     axis_edits,

@@ -35,7 +35,7 @@ from urmpipe_pipeline.diagnosis.hypotheses import Group, State, numbered
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
-from urmpipe_pipeline.log_edits import Edit, axis_edits
+from urmpipe_pipeline.runs.reading_errors import Edit, axis_edits
 
 ARMS = (load_robot("urm6"), load_robot("ur5e"), load_robot("panda"), rail_arm(), sliding_arm())
 T = times(40)

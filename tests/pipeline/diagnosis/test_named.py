@@ -34,7 +34,7 @@ from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
 from urmpipe_pipeline.diagnosis.explanations import SearchResult
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
 from urmpipe_pipeline.diagnosis.search import Search
-from urmpipe_pipeline.log_edits import Edit, Edits
+from urmpipe_pipeline.runs.reading_errors import Edit, Edits
 
 URM6 = load_robot("urm6")
 SHORT, LONG = 50, 2000

@@ -21,8 +21,8 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.repolarization.audit import AuditEntry
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)

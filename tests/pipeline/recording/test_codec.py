@@ -25,7 +25,7 @@ from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.toml import robot_toml
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording.codec import CodecError, decode, encode
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 
 @dataclass(frozen=True)

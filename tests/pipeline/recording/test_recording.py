@@ -25,7 +25,7 @@ from urmpipe_pipeline.joint_log import Inference, LogColumn, LogWarning, SourceF
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import read_recording, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

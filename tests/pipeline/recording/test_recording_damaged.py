@@ -15,7 +15,7 @@ from same_results import assert_same
 from urmpipe_models.errors import RecordingError
 from urmpipe_models.processes import module_command, module_environment
 from urmpipe_pipeline.results import read_recording, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 MakeRun = Callable[..., Run]
 

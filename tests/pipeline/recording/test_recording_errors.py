@@ -21,7 +21,7 @@ from urmpipe_pipeline.recording.codec import encode
 from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store, checksum, document
 from urmpipe_pipeline.recording.verify import verify
 from urmpipe_pipeline.results import read_recording, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

@@ -23,7 +23,7 @@ from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.store import SLICE
 from urmpipe_pipeline.results import Kind, read_recording, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 ROWS = SLICE + 3

@@ -34,7 +34,7 @@ from urmpipe_pipeline.presentation.palette import (
 from urmpipe_pipeline.recording.viewer import open_window, openings, run_viewer
 from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW
 from urmpipe_pipeline.results import present, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 

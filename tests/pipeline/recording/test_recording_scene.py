@@ -31,7 +31,7 @@ from urmpipe_pipeline.recording.views.geometry import drawn_arm, drawn_path, ext
 from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH, bodies_over_log, own_shapes
 from urmpipe_pipeline.recording.views.tracks import DASHES, LEAST_DASH, MOST, POSE_PERIOD
 from urmpipe_pipeline.results import present, read_recording, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

@@ -13,7 +13,7 @@ from rerun.chunk import RrdReader
 
 from urmpipe_pipeline.recording.sink import Sink, write_into
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 MakeRun = Callable[..., Run]
 

@@ -11,7 +11,7 @@ import pytest
 from urmpipe_models.errors import ViewerError
 from urmpipe_pipeline.recording import viewer
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 MakeRun = Callable[..., Run]
 

@@ -18,7 +18,7 @@ from urmpipe_pipeline.repolarization.audit import Audited, audit_log
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 MS = 1_000_000

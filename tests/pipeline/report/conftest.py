@@ -16,9 +16,9 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.repolarization.audit import AuditEntry
 from urmpipe_pipeline.runs.derivatives import derivatives
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
 TSP = 0.005

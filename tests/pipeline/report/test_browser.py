@@ -24,7 +24,7 @@ from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.report import render_report, spec
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.results import present
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from urmpipe_pipeline.report.page import Page, lay_out
 from urmpipe_pipeline.report.render import data_address
 from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.results import present
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 RED, BLUE = "#c25000", "#21c3ff"

@@ -24,7 +24,7 @@ from urmpipe_pipeline.report import render_report, write_report
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.render import asset, script_json
 from urmpipe_pipeline.results import present, read_recording, write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 VOID = {"meta", "br", "img", "link", "input", "hr", "path"}
 

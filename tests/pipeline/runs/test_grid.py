@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 
 from asserting import refusal
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.gaps import inside_gaps
-from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.joint_log import JointLog, inside_gaps
 from urmpipe_pipeline.runs.grid import interpolate, make_grid
 
 MS = 1_000_000

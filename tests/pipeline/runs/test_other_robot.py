@@ -16,9 +16,8 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.results import read_recording, write_recording
-from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.other_robot import on_robot
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.run import Run
 
 ARM = replace(load_robot("ur5e"), tool=Transform(translation=(0.3, 0.0, 0.15)))
 OTHER = load_robot("urm6")

@@ -14,8 +14,8 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Hint
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.repolarization.joint_motion import format_steps, largest_steps
 from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.plausibility import format_steps, largest_steps
 from urmpipe_pipeline.sources import ReadOptions
 
 SHARED = Path(__file__).parents[4] / "shared" / "logs"

@@ -12,10 +12,10 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.repolarization.audit import AuditEntry
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.playback import MOST, PARTS, Playback, play_back
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
 

@@ -14,7 +14,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import COLUMN_NAMES, RotationForm, column_count
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
 

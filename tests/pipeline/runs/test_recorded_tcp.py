@@ -18,9 +18,7 @@ from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.recorded_start import outlying_start
-from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded, lacking_tool
-from urmpipe_pipeline.runs.robot_inference import infer_robot
+from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded, infer_robot, lacking_tool, outlying_start
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded
 from urmpipe_pipeline.sources.vocabulary import vocabulary

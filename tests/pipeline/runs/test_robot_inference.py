@@ -12,7 +12,7 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 ROWS = 60
 ARMS = [name for name in kinematically_distinct_names() if len(load_robot(name).moving) in {4, 6, 7}]

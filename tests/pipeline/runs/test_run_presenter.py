@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.playback import play_back
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 
 @pytest.fixture(scope="module")

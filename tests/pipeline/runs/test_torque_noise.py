@@ -20,9 +20,8 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Table
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
-from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.other_robot import on_robot
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 UR10 = load_robot("ur10")

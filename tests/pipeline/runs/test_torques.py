@@ -24,15 +24,14 @@ from urmpipe_models.dynamics.equations import energies_over_log, torques_over_lo
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.json_values import json_ready
 from urmpipe_pipeline.presentation.figure import Drawing, Figure
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.other_robot import on_robot
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
+from urmpipe_pipeline.text import json_ready
 
 SAME = 1e-10
 """Of the largest torque: two ways to compute the same; found are 1e-13."""
@@ -421,7 +420,7 @@ def test_no_term_is_computed_before_it_is_shown(run: Run, monkeypatch: pytest.Mo
         raise AssertionError("computed")
 
     for name in ("torque_terms_over_log", "energies_over_log"):
-        monkeypatch.setattr(f"urmpipe_pipeline.runs.torque_figures.{name}", refused)
+        monkeypatch.setattr(f"urmpipe_pipeline.runs.figures.{name}", refused)
     assert len(figures(present(run).body)) == 6
 
 

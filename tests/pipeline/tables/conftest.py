@@ -12,7 +12,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 
 START_NS = 1_700_000_000_123_456_789
 """A clock of our years, to the nanosecond."""

@@ -17,7 +17,7 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.tables import Format
 
 Made: TypeAlias = Callable[[str], Run]

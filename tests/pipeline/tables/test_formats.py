@@ -18,7 +18,7 @@ from asserting import there
 from exported import export_result
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.tables import FORMATS, ExportOptions, Format
 from urmpipe_pipeline.tables import RowNames as Rows
 

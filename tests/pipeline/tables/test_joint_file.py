@@ -17,7 +17,7 @@ from urmpipe_models.errors import LogError, OutputError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions, read_log
 from urmpipe_pipeline.tables.joint_file import write_joint_log
 

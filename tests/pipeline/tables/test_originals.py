@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from urmpipe_pipeline.joint_log import LogColumn
-from urmpipe_pipeline.runs.originals import originals, to_si
+from urmpipe_pipeline.runs.file_columns import originals, to_si
 
 FACTORS = {"deg": 0.017453292519943295, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 

@@ -17,7 +17,7 @@ from exported import export_result
 from urmpipe_models.errors import OptionError, OutputError, RecordingError, UrmpipeError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.exports import Times
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.tables import FORMATS, ExportOptions, Format, format_of, lines, mat_file, parquet_file
 from urmpipe_pipeline.tables.lines import differences, texts, write_lines
 from urmpipe_pipeline.tables.write import is_export, write_all

@@ -11,7 +11,7 @@ from exported import export_result
 from solved import solved
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline import results
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.tables import ExportOptions, Format
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.gaps import GAP
+from urmpipe_pipeline.joint_log import GAP
 
 LEAST_CHUNKS = 6
 """Fewer tell nothing about the time of a row."""

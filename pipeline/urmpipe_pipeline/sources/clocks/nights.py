@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_pipeline.gaps import GAP
-from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.joint_log import GAP, LogWarning
 from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.text_times import MIDNIGHT_NS, add_nights

@@ -1,8 +1,10 @@
-"""What `ingest` returns: plain arrays, a table (`to_frame`) and JSON (`to_dict`)."""
+"""A run: an ingested log as plain arrays, a table (`to_frame`) and JSON (`to_dict`); and a slice of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,14 +19,96 @@ from urmpipe_models.math3d import COLUMN_NAMES, is_angular
 from urmpipe_pipeline.joint_log import OWN, JointLog, LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.repolarization.audit import AuditEntry
 from urmpipe_pipeline.runs.grid import RESAMPLED, interpolate
-from urmpipe_pipeline.runs.torques import TorqueSummary, torque_summaries
 
 if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueSummary:
+    """The torque of a joint over a motion, in [N.m], or the force in [N] of one that slides.
+
+    Attributes:
+        joint: Its name.
+        unit: N.m or N.
+        max: Largest absolute value; NaN where no sample has one.
+        t_max: When, in [s]; NaN likewise.
+        sample_max: In which sample, from 0.
+        rms: Root of its mean square.
+        effort: Its limit either way; None without one, and where the period of the rows is assumed.
+        beyond: Row numbers of the samples beyond the limit, from 0, shape (k,).
+        samples: How many samples have a value.
+    """
+
+    joint: str
+    unit: str
+    max: float
+    t_max: float
+    sample_max: int
+    rms: float
+    effort: float | None
+    beyond: IntArray
+    samples: int
+
+    @property
+    def effort_share(self) -> float | None:
+        """The largest share of its limit that it takes, above 1 beyond it; None without limit or samples."""
+        return None if self.effort is None or not self.samples else self.max / self.effort
+
+    @property
+    def share_out(self) -> float | None:
+        """Share of the samples beyond the limit, 0 to 1; None without limit or samples."""
+        return None if self.effort is None or not self.samples else len(self.beyond) / self.samples
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as `urmpipe ingest --json` prints it."""
+        keys = ("joint", "unit", "max", "t_max", "rms", "effort", "effort_share", "share_out")
+        return {key: getattr(self, key) for key in keys}
+
+
+def torque_summaries(
+    names: Sequence[str],
+    robot: Chain | None,
+    t_ns: IntArray,
+    tau: FloatArray | None,
+    *,
+    limited: bool = True,
+) -> list[TorqueSummary]:
+    """Return the torque of each joint in short; none where torques are not known.
+
+    Args:
+        names: Of the joints.
+        robot: The arm, with its limits.
+        t_ns: Times in integer [ns], shape (n,).
+        tau: Torques in [N.m] or [N], shape (n, joints); None where they are not known.
+        limited: Whether they are held against the efforts of the joints.
+    """
+    if robot is None or tau is None or not len(tau):
+        return []
+    found = []
+    for name, joint, column in zip(names, robot.moving, np.asarray(tau).T, strict=True):
+        size = np.abs(column)
+        known = size[np.isfinite(size)]
+        at = int(np.nanargmax(size)) if len(known) else 0
+        effort = joint.effort if limited else math.inf
+        found.append(
+            TorqueSummary(
+                joint=name,
+                unit="N.m" if joint.kind == "revolute" else "N",
+                max=float(size[at]) if len(known) else math.nan,
+                t_max=float(t_ns[at]) / 1e9 if len(known) else math.nan,
+                sample_max=at,
+                rms=float(np.sqrt(np.mean(known**2))) if len(known) else math.nan,
+                effort=effort if math.isfinite(effort) else None,
+                beyond=np.flatnonzero(size > effort),
+                samples=len(known),
+            )
+        )
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,3 +320,50 @@ class Run(Result):
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
+
+
+def part_of(run: Run, first: int, last: int, name: str) -> Run:
+    """Return some rows of a run, both ends included, on their own clock, with the joints' turns as they are.
+
+    The warnings stay with the whole.
+
+    Args:
+        run: The run.
+        first: The first row, from 0.
+        last: The last row, from 0.
+        name: What the part is called.
+    """
+    rows = slice(first, last + 1)
+    log, begins = _log(run.log, rows, name), int(run.rows_ns[first])
+    grid = rows
+    if run.rows is not None:  # the grid has samples of its own
+        ends = int(run.rows_ns[last])
+        grid = slice(*np.searchsorted(run.t_ns, [begins, ends + 1]).tolist())
+    tcp = run.tcp
+    if tcp is not None:
+        tcp = PointLog(**{one.name: getattr(tcp, one.name)[grid] for one in fields(tcp)})
+    audit = (
+        replace(one, row=one.row - first, t=one.t - begins / 1e9)
+        for one in run.audit
+        if first < one.sample <= last
+    )
+    return replace(
+        run, name=name, log=log, t_ns=run.t_ns[grid] - begins, q=run.q[grid], qd=run.qd[grid],
+        qdd=run.qdd[grid], tcp=tcp,
+        tcp_recorded=None if run.tcp_recorded is None else run.tcp_recorded[grid],
+        tau=None if run.tau is None else run.tau[grid], audit=tuple(audit), warnings=(), recording=None,
+        rows=None if run.rows is None else RowJoints(run.rows.t_ns[rows] - begins, run.rows.q[rows]),
+    )  # fmt: skip
+
+
+def _log(log: JointLog, rows: slice, name: str) -> JointLog:
+    """Return some rows of a log, on their own clock."""
+    begins = int(log.t_ns[rows.start])
+    arrays: dict[str, Any] = {
+        one: None if (values := getattr(log, one)) is None else values[rows]
+        for one in ("q", "qd", "qdd", "tcp_position", "tcp_rotation")
+    }
+    return replace(
+        log, name=name, t_ns=log.t_ns[rows] - begins, clock_start_ns=log.clock_start_ns + begins,
+        first_line=log.first_line + rows.start, **arrays,
+    )  # fmt: skip
