@@ -44,7 +44,8 @@ from scipy.spatial.transform import Rotation
 
 import urmpipe
 import urmpipe_pipeline
-from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
+from urmpipe_pipeline.diagnosis.causes import Cause
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 
 LOST_IN_NOISE = 30.0  # chi-square of two explanations below which these samples do not separate them
 SAME = 3e-3  # share of the effect, likewise: interpolation between samples

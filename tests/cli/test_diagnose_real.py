@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import urmpipe
-from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
+from urmpipe_pipeline.diagnosis.causes import Cause
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 
 LOGS = Path(__file__).resolve().parents[3] / "shared" / "logs"
 

@@ -17,12 +17,11 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.wraps import repolarize
-from urmpipe_pipeline.diagnosis.arm import ArmModel
-from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
-from urmpipe_pipeline.diagnosis.edits import later_edits
+from urmpipe_pipeline.diagnosis.candidates import later_edits
 from urmpipe_pipeline.diagnosis.explanations import Explanation
 from urmpipe_pipeline.diagnosis.explanations import SearchResult as Found
-from urmpipe_pipeline.diagnosis.hypotheses import Group, State, numbered
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, cause_groups, numbered
+from urmpipe_pipeline.diagnosis.models import ArmModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.runs.reading_errors import Edit, Edits, robot_edits, sign_edits, swap_edits, unit_edits

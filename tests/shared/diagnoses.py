@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.diagnosis.result import (
+from urmpipe_pipeline.diagnosis.causes import (
     Alternative,
     Cause,
-    Diagnosis,
     NotLookedFor,
     OwnTcp,
     Refused,
     Remainder,
     rms,
 )
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import LogWarning
 
 SIGN = Cause(

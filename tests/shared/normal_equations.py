@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.diagnosis.selection import Normal
+from urmpipe_pipeline.diagnosis.fit import Normal
 
 
 def normal_of(jacobian: FloatArray, y: FloatArray) -> Normal:

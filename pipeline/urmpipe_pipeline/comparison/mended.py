@@ -12,8 +12,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.diagnosis.cause_texts import format_cause, joint_names
-from urmpipe_pipeline.diagnosis.formatting import format_residual
-from urmpipe_pipeline.diagnosis.result import Diagnosis
+from urmpipe_pipeline.diagnosis.result import Diagnosis, format_residual
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_pipeline import text
-
-if TYPE_CHECKING:
-    from urmpipe_pipeline.diagnosis.result import Cause
+from urmpipe_pipeline.diagnosis.causes import Cause
 
 MODULE = re.compile(r"phi([1-9]\d*)")  # joints of URM arms, one per module
 DEGREES = 57.29577951308232

@@ -13,15 +13,16 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.elementwise import FloatArray, spread_rows
 from urmpipe_pipeline import text
-from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits
+from urmpipe_pipeline.diagnosis.candidates import later_edits, turn_edits
+from urmpipe_pipeline.diagnosis.causes import STRUCTURE, NotLookedFor, Remainder, rms
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
 from urmpipe_pipeline.diagnosis.explanations import SearchResult
 from urmpipe_pipeline.diagnosis.fit import Model, residual
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
-from urmpipe_pipeline.diagnosis.joints import JointsModel
+from urmpipe_pipeline.diagnosis.models import JointsModel
 from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
 from urmpipe_pipeline.diagnosis.own_tcp import ask_both_sides
-from urmpipe_pipeline.diagnosis.result import STRUCTURE, Diagnosis, NotLookedFor, Remainder, rms
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, build_question
 from urmpipe_pipeline.runs.reading_errors import Edits

@@ -17,12 +17,27 @@ from urmpipe_models.elementwise import FloatArray, IntArray, spread_rows
 from urmpipe_pipeline.diagnosis.candidates import (
     residual_after_fit,
 )
-from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
-from urmpipe_pipeline.diagnosis.formatting import CANCELLING
-from urmpipe_pipeline.diagnosis.gate import find_unbelievable, leaves_noise
+from urmpipe_pipeline.diagnosis.causes import CANCELLING
+from urmpipe_pipeline.diagnosis.fit import (
+    LONGEST,
+    Model,
+    Rows,
+    autocorrelation_time,
+    cost,
+    fitted,
+    inliers,
+    normal_equations,
+    residual,
+)
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
-from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
-from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
+from urmpipe_pipeline.diagnosis.selection import (
+    Normal,
+    Selection,
+    Subset,
+    find_unbelievable,
+    leaves_noise,
+    without_twins,
+)
 from urmpipe_pipeline.runs.reading_errors import Edits
 
 COARSE = 300  # rows, spread evenly, on which discrete causes are ranked

@@ -17,7 +17,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import inverse_dynamics
 from urmpipe_models.elementwise import BoolArray, Element, FloatArray, IntArray, dot, scale
 from urmpipe_models.kinematics.forward import jacobian
-from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, has_masses
 from urmpipe_pipeline.runs.reading_errors import Edits
 
 MOVING = 5.0
@@ -328,11 +328,6 @@ def first_order_lag(t: FloatArray, values: FloatArray, constant: float) -> Float
         fade = np.append(fade[:reach], fade[reach:] * fade[:-reach])
         reach *= 2
     return gain
-
-
-def has_masses(chain: Chain) -> bool:
-    """Return whether gravity pulls at an arm itself; else it is taken to pull at its tool centre point."""
-    return any(inertial.mass != 0.0 for inertial in chain.inertials)
 
 
 def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:

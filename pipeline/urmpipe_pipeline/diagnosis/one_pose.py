@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
+from urmpipe_pipeline.diagnosis.causes import Alternative, Cause, Kind, rms
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, fitted
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
-from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Kind, rms
 
 
 def tool_hypotheses(model: Model, held: float) -> tuple[tuple[Alternative, ...], FloatArray]:

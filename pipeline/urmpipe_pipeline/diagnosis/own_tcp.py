@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_pipeline.diagnosis.result import Diagnosis, OwnTcp, rms
+from urmpipe_pipeline.diagnosis.causes import OwnTcp, rms
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.recorded_tcp import RecordedPoses, distances_from_recorded

@@ -16,15 +16,16 @@ from urmpipe_pipeline.diagnosis.cause_texts import (
     format_value,
     short_name,
 )
-from urmpipe_pipeline.diagnosis.formatting import (
+from urmpipe_pipeline.diagnosis.causes import Alternative, Cause, Refused
+from urmpipe_pipeline.diagnosis.result import (
     PASSES,
+    Diagnosis,
     format_explanation,
     format_own_tcp,
     format_residual,
     format_undecided,
     select_causes,
 )
-from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Diagnosis, Refused
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
 from urmpipe_pipeline.presentation.section import Advice, Fact, Presentation, Section, Table, Value
 

@@ -1,17 +1,30 @@
-"""What a diagnosis finds: causes, what stays undecided, what was not looked for, and what remains."""
+"""What a diagnosis finds, and its summary: the same in the terminal, the recording and the report.
+
+The summary: a passed log, causes in order with what each takes away, what is undecided or not determined.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Voice
-from urmpipe_pipeline.diagnosis.formatting import format_summary
+from urmpipe_pipeline import text
+from urmpipe_pipeline.diagnosis.cause_texts import build_remedy, format_amount, format_cause, format_change
+from urmpipe_pipeline.diagnosis.causes import (
+    CLOCKS,
+    NOT_CONSTANT,
+    Alternative,
+    Cause,
+    NotLookedFor,
+    OwnTcp,
+    Refused,
+    Remainder,
+)
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 
@@ -19,177 +32,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA = 1
-
-Kind = Literal[
-    "time_lag", "clock_drift", "servo_lag", "joint_lag",
-    "base_shift", "base_rotation", "base_mirrored", "tool_shift", "tool_rotation", "path_unit",
-    "joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored", "turns",
-    "joint_offset", "joint_scale", "compliance", "backlash", "sag",
-    "link_length", "link_shift", "tilt", "own_geometry",
-    "other_robot", "outliers",
-]  # fmt: skip
-"""What may make two sides deviate."""
-
-STRUCTURE = ("link_length", "link_shift", "tilt")
-
-
-@dataclass(frozen=True, slots=True)
-class Cause:
-    """One cause: what is added to the robot or to the reading of the log so that the sides agree.
-
-    Attributes:
-        kind: What it is.
-        name: What it is of: a joint as the arm calls it, two with " and " between them, a parameter or
-            segment of the chain, base or tool, the side and unit of a path, the axes of a mirrored base
-            ("(x, y, -z)"), the clock, all joints, another robot, rows.
-        joints: The joints it is of, as the log calls them; none of other causes.
-        segment: The point p1..pn that ends the segment it is of; None of other causes.
-        axis: Unit vector along or about which it acts, in the frame of segment, base or tool [-]; None of
-            other causes, and of a base or tool with three numbers.
-        value: One number, three of base and tool, none of signs and exchanges, in `unit`. Of a backlash the
-            whole play, of a sag 1 / stiffness, of a coupling -1 if the first joint includes the second, of
-            outliers their least and their largest distance, or one of about both.
-        unit: m, rad, s, s2 (of q'' in q), s/s, turns, rad/(N m), m/N, rad/kg, m/kg (of a sag without masses:
-            of each kg at the tool centre point), or empty of a factor.
-        low: Lower end of the 95 % interval of each number; none where nothing was fitted.
-        high: Upper end.
-        from_sample: Row of the log, from 0, from which on it holds; None for all of them.
-        rows: Rows of the log, from 0, that are outliers; none of other causes.
-        twins: Short names of what would move the tool centre point in the very same way.
-        rms_before: Root mean square of the deviation in the unit of the diagnosis, without the causes that
-            stand before this one.
-        rms_after: The same without this one, too.
-        rms_alone: Root mean square without this cause alone.
-        effect: Largest deviation that this cause alone makes, in the unit of the diagnosis.
-        breaks: Whether that is out of tolerance.
-    """
-
-    kind: Kind
-    name: str
-    joints: tuple[str, ...] = ()
-    segment: str | None = None
-    axis: tuple[float, float, float] | None = None
-    value: tuple[float, ...] = ()
-    unit: str = ""
-    low: tuple[float, ...] = ()
-    high: tuple[float, ...] = ()
-    from_sample: int | None = None
-    rows: tuple[int, ...] = ()
-    twins: tuple[str, ...] = ()
-    rms_before: float = 0.0
-    rms_after: float = 0.0
-    rms_alone: float = 0.0
-    effect: float = 0.0
-    breaks: bool = False
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object: null where a key does not apply, lists of three of base and tool."""
-        interval = [_one_or_three(end) for end in (self.low, self.high)] if self.low else None
-        if interval and len(self.low) > 1:
-            interval = [list(pair) for pair in zip(self.low, self.high, strict=True)]
-        return {
-            "kind": self.kind,
-            "name": self.name,
-            "joint": _joint(self.joints),
-            "segment": self.segment,
-            "axis": None if self.axis is None else list(self.axis),
-            "value": _one_or_three(self.value),
-            "unit": self.unit or None,
-            "interval": interval,
-            "from_sample": self.from_sample,
-            "rows": list(self.rows),
-            "twins": list(self.twins),
-            "rms_before": self.rms_before,
-            "rms_after": self.rms_after,
-            "rms_alone": self.rms_alone,
-            "effect": self.effect,
-            "breaks_tolerance": self.breaks,
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class Alternative:
-    """One of several explanations between which the log does not decide.
-
-    Attributes:
-        causes: What it takes; none for the explanation that nothing of the kind is there.
-        needs: The joint whose motion would decide; empty if none would.
-    """
-
-    causes: tuple[Cause, ...]
-    needs: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {"causes": [one.to_dict() for one in self.causes], "needs": self.needs or None}
-
-
-@dataclass(frozen=True, slots=True)
-class Refused:
-    """Causes that leave less, but that this motion does not determine.
-
-    Attributes:
-        causes: What was fitted.
-        reason: Why it is not believed.
-        needs: The joint whose motion would determine it; empty if none would.
-    """
-
-    causes: tuple[Cause, ...]
-    reason: str
-    needs: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        causes = [one.to_dict() for one in self.causes]
-        return {"causes": causes, "reason": self.reason, "needs": self.needs or None}
-
-
-@dataclass(frozen=True, slots=True)
-class OwnTcp:
-    """How far the kinematics of a side are from the tool centre point that it recorded itself.
-
-    Attributes:
-        name: What the side is called.
-        rms: Root mean square distance in [m].
-        largest: Largest distance in [m].
-        agrees: Whether that is within the tolerance, with the tool as it is given.
-        rms_with_tool: Root mean square distance with the constant tool that fits best in [m]; `rms` where the
-            motion does not determine one.
-    """
-
-    name: str
-    rms: float
-    largest: float
-    agrees: bool
-    rms_with_tool: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class NotLookedFor:
-    """Causes that these sides cannot tell.
-
-    Attributes:
-        kinds: Which.
-        reason: Why not.
-    """
-
-    kinds: tuple[str, ...]
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Remainder:
-    """What no named cause explains.
-
-    Attributes:
-        rms: Root mean square of what stays, in the unit of the diagnosis.
-        words: What it is taken for, where that is known; else empty.
-        different: Whether it is so large that the two sides are probably different motions.
-    """
-
-    rms: float
-    words: str = ""
-    different: bool = False
+MAX_CAUSES = 3  # in a summary, with all that break the tolerance; a table has the others
+MAX_LISTED = 2  # undecided explanations in a summary, or one if two have too many causes; a table has all
+MAX_UNDECIDED = 4  # causes of two such explanations together
+MIN_EXPLAINED = 1.0 / 3.0  # fraction of the rms; with less, the summary says that it explains little
+NOTHING = 0.01  # fraction of an rms; less would go unnoticed
+UNMOVED = 1e-6  # m; a cause that moves no position by more is not one of the rms
+PASSES = "passes; "
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -279,20 +128,185 @@ class Diagnosis(Result):
         }
 
 
-def rms(deviation: FloatArray) -> float:
-    """Return the root mean square length of deviations in any unit, shape (m, k); 0 without any."""
-    known = deviation[np.isfinite(deviation).all(axis=1)]
-    return float(np.sqrt((known**2).sum(axis=1).mean())) if len(known) else 0.0
-
-
-def _joint(joints: tuple[str, ...]) -> str | list[str] | None:
-    """Return one joint by its name, two as a list."""
-    return (joints[0] if len(joints) == 1 else list(joints)) if joints else None
-
-
-def _one_or_three(numbers: tuple[float, ...]) -> float | list[float] | None:
-    """Return one number as it is, several as a list."""
-    return (numbers[0] if len(numbers) == 1 else list(numbers)) if numbers else None
-
-
 _NO_CAUSE = Cause("joint_sign", "")
+
+
+def format_summary(diagnosis: Diagnosis) -> str:
+    """Return the answer in one sentence."""
+    causes, alternatives, residual = diagnosis.causes, diagnosis.undecided, diagnosis.remainder
+    before, after = (format_amount(rms, diagnosis.unit) for rms in (diagnosis.rms, residual.rms))
+    if residual.different:
+        fitted = f"the causes found leave {after} of it" if causes or alternatives else "no cause found"
+        return f"probably different motions: rms {before}, {fitted}"
+    if not causes and not alternatives:
+        few = bool(diagnosis.refused) and len(diagnosis.refused[0].causes) <= MAX_LISTED
+        if diagnosis.refused and (few or diagnosis.verdict != "pass"):
+            passes = PASSES if diagnosis.verdict == "pass" else ""
+            return f"{passes}{format_refusal(diagnosis.refused[0])}; rms {after} remains"
+        return f"no cause found: rms {before} remains{f' ({residual.words})' if residual.words else ''}"
+    unseen = [cause for cause in causes if _moves_nothing(cause, diagnosis.unit)]
+    if unseen:
+        seen = tuple(cause for cause in causes if cause not in unseen)
+        rest = format_summary(replace(diagnosis, causes=seen)) if seen or alternatives else ""
+        start = f"{rest}; " if rest else PASSES if diagnosis.verdict == "pass" else ""
+        only_turns = all(cause.kind == "turns" for cause in unseen)
+        effect = "does not move the TCP" if only_turns else "turns the TCP, but does not move it"
+        return f"{start}{text.enumerated(list(map(format_cause, unseen)))} (this {effect})"
+    if diagnosis.verdict == "pass":
+        return f"{PASSES}{_format_avoidable(diagnosis)}"
+    little = diagnosis.rms - residual.rms < MIN_EXPLAINED * diagnosis.rms
+    return f"{'explains little: ' if little else ''}{_format_chain(diagnosis)}{_format_origin(diagnosis)}"
+
+
+def _moves_nothing(cause: Cause, unit: str) -> bool:
+    """Tell whether a cause leaves all positions: a turn about the tool centre point, whole turns."""
+    still = cause.effect < UNMOVED and abs(cause.rms_after - cause.rms_before) < UNMOVED
+    return unit == "m" and still and cause.kind not in ("outliers", "own_geometry")
+
+
+def select_causes(causes: Sequence[Cause]) -> list[Cause]:
+    """Return the causes of a summary in their order: all that break the tolerance, others up to three.
+
+    With them those that they partly cancel.
+    """
+    listed = [cause for cause in causes if cause.breaks]
+    listed += [cause for cause in causes if not cause.breaks][: max(MAX_CAUSES - len(listed), 0)]
+    return [cause for step in _split_steps(causes) if any(one in listed for one in step) for cause in step]
+
+
+def _split_steps(causes: Sequence[Cause]) -> list[list[Cause]]:
+    """Return causes in steps that each lower the rms: those that partly cancel each other stand in one."""
+    steps: list[list[Cause]] = []
+    for cause in causes:
+        if steps and _is_joinable(steps[-1], cause) and not _lowers(steps[-1]):
+            steps[-1].append(cause)
+        else:
+            steps.append([cause])
+    while len(steps) > 1 and _is_joinable(steps[-2], *steps[-1]) and not _lowers(steps[-1]):
+        steps[-2:] = [[*steps[-2], *steps[-1]]]
+    return steps
+
+
+def _is_joinable(step: Sequence[Cause], *causes: Cause) -> bool:
+    return not any(cause.kind in (*CLOCKS, "outliers") for cause in (*step, *causes))
+
+
+def _lowers(step: Sequence[Cause]) -> bool:
+    return step[-1].rms_after < (1.0 - NOTHING) * step[0].rms_before
+
+
+def _format_avoidable(diagnosis: Diagnosis) -> str:
+    """Return how much of the deviation of a passed log would go, and under which condition."""
+    unit, listed = diagnosis.unit, select_causes(diagnosis.causes)
+    some, all_of_it = diagnosis.rms - diagnosis.remainder.rms, diagnosis.rms
+    little = "only " if some < MIN_EXPLAINED * all_of_it else ""
+    amount = "next to nothing" if some < NOTHING * all_of_it else f"{little}{format_amount(some, unit)}"
+    amounts = f"{amount} of {format_amount(all_of_it, unit)} rms"
+    undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
+    if not listed:
+        return f"{amounts} is explained: {undecided}"
+    conditions = text.enumerated([build_remedy(cause).conditional() for cause in listed])
+    return "; ".join(
+        filter(None, (f"{amounts} would go if {conditions}", _format_more(diagnosis, listed), undecided))
+    )
+
+
+def _format_chain(diagnosis: Diagnosis) -> str:
+    """Return the causes in order, each with the rms before and after it: "A: rms 9 -> 2 mm; then B: ..."."""
+    unit, listed = diagnosis.unit, select_causes(diagnosis.causes)
+    clocks = list(takewhile(lambda cause: cause.kind in CLOCKS, listed))
+    parts = []
+    if clocks:
+        clauses = text.enumerated([format_cause(cause) for cause in clocks])
+        if len(clocks) < len(listed):
+            parts.append(f"{clauses}; after that {format_amount(clocks[-1].rms_after, unit)} rms")
+        else:
+            parts.append(f"{clauses}: {format_change(clocks[0].rms_before, clocks[-1].rms_after, unit)}")
+    steps = [step for step in _split_steps(diagnosis.causes) if step[0] in listed[len(clocks) :]]
+    for step in steps:
+        if step[0].kind == "outliers":
+            change = f"; {_format_others(step[0], diagnosis, is_last=step[0] is diagnosis.causes[-1])}"
+        else:
+            change = format_change(step[0].rms_before, step[-1].rms_after, unit)
+            is_alone = len(step) == len(diagnosis.causes) and not diagnosis.undecided
+            change = f": {change if is_alone else _in_chain(change, is_first=not parts)}"
+        clauses = text.enumerated([format_cause(cause) for cause in step])
+        parts.append(f"{'then ' if parts else ''}{clauses}{change}")
+    more = _format_more(diagnosis, listed)
+    parts += [more] if more else []
+    if diagnosis.undecided:
+        change = format_change(diagnosis.rms, diagnosis.remainder.rms, unit)
+        stays = f"; rms {format_amount(diagnosis.remainder.rms, unit)} remains" if parts else f": {change}"
+        parts.append(f"{'then ' if parts else ''}{format_undecided(diagnosis.undecided)}{stays}")
+    return "; ".join(parts)
+
+
+def _in_chain(change: str, *, is_first: bool) -> str:
+    """Return a change with its unit once, and with "rms" only before the first of a chain."""
+    before, after = change.removeprefix("rms ").split(" -> ")
+    return f"{'rms ' if is_first else ''}{before.split()[0]} -> {after}"
+
+
+def _format_others(cause: Cause, diagnosis: Diagnosis, *, is_last: bool) -> str:
+    """Return what the rows show that are no outliers."""
+    rms = format_amount(cause.rms_after, diagnosis.unit)
+    if not is_last:
+        return f"without {'them' if len(cause.rows) > 1 else 'it'} {rms} rms"
+    agrees = cause.rms_after < MIN_EXPLAINED * cause.rms_before
+    rest = f"the other {diagnosis.samples - len(cause.rows)}"
+    return f"{rest} agree within {rms} rms" if agrees else f"{rest} are off by {rms} rms"
+
+
+def _format_more(diagnosis: Diagnosis, listed: Sequence[Cause]) -> str:
+    more = len(diagnosis.causes) - len(listed)
+    return f"{more} more in the table" if more else ""
+
+
+def _format_origin(diagnosis: Diagnosis) -> str:
+    """Return which side has the causes, as the other side's own tool centre point shows."""
+    names = [side for side in diagnosis.own_tcp if side.agrees and side.name != diagnosis.origin]
+    if not diagnosis.origin:
+        return ""
+    causes = "that is" if len(diagnosis.causes) < 2 else "these are"
+    follows = f"the TCP that {diagnosis.origin} recorded follows the other side"
+    return f"; {format_own_tcp(names[0]) if names else follows}, so {causes} in {diagnosis.origin}"
+
+
+def format_own_tcp(side: OwnTcp) -> str:
+    """Return how far a side is from its own recorded tool centre point."""
+    largest = format_amount(side.largest, "m")
+    if side.agrees:
+        return f"{side.name} agrees with its own TCP within {largest}"
+    return f"{side.name} is {format_amount(side.rms, 'm')} rms from its own TCP, {largest} at most"
+
+
+def format_undecided(alternatives: Sequence[Alternative]) -> str:
+    """Return what a log does not decide between: "either A or B (more motion of phi5 would decide)"."""
+    listed = alternatives[:MAX_LISTED]
+    listed = listed[:1] if sum(len(one.causes) for one in listed) > MAX_UNDECIDED else listed
+    clauses = [format_explanation(alternative) for alternative in listed]
+    more = len(alternatives) - len(listed)
+    clauses += [f"{more} more" if more > 1 else "another"] if more > 0 else []
+    needs = list(dict.fromkeys(alternative.needs for alternative in alternatives if alternative.needs))
+    decides = f"more motion of {text.enumerated(needs)} would decide" if needs else "this log cannot decide"
+    return f"either {' or '.join(clauses)} ({decides})"
+
+
+def format_explanation(explanation: Alternative | Refused) -> str:
+    """Return the causes of one explanation."""
+    return text.enumerated([format_cause(cause) for cause in explanation.causes]) or "none of these"
+
+
+def format_refusal(refused: Refused) -> str:
+    """Return why causes are not believed, and which motion would determine them."""
+    if len(refused.causes) > 1 and refused.reason == NOT_CONSTANT:
+        return f"not determined by this motion: {refused.reason}"
+    if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines so many
+        return f"not determined by this motion: {len(refused.causes)} causes ({refused.reason})"
+    needs = f"; more motion of {refused.needs} would determine it" if refused.needs else ""
+    return f"not determined by this motion: {format_explanation(refused)} ({refused.reason}){needs}"
+
+
+def format_residual(residual: Remainder, unit: str) -> str:
+    """Return what remains, and its interpretation."""
+    return f"rms {format_amount(residual.rms, unit)}{f': {residual.words}' if residual.words else ''}"

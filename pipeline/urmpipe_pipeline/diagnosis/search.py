@@ -19,12 +19,12 @@ from itertools import product
 
 import numpy as np
 
-from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.candidates import (
     add_discrete_cause,
     find_large_causes,
     rank_discrete_causes,
 )
+from urmpipe_pipeline.diagnosis.causes import NOT_CONSTANT
 from urmpipe_pipeline.diagnosis.explanations import (
     COARSE,
     HOPELESS,
@@ -37,10 +37,9 @@ from urmpipe_pipeline.diagnosis.explanations import (
     SelfConsistentFit,
 )
 from urmpipe_pipeline.diagnosis.fit import Rows, cost
-from urmpipe_pipeline.diagnosis.formatting import NOT_CONSTANT
-from urmpipe_pipeline.diagnosis.gate import NOISE, find_changing
 from urmpipe_pipeline.diagnosis.hypotheses import State
-from urmpipe_pipeline.diagnosis.selection import Subset
+from urmpipe_pipeline.diagnosis.models import ArmModel
+from urmpipe_pipeline.diagnosis.selection import NOISE, Subset, find_changing
 from urmpipe_pipeline.runs.reading_errors import Edit, Edits
 
 SOME = 2_000  # rows, spread evenly, that select before more of them settle it

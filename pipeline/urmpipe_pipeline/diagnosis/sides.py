@@ -12,15 +12,16 @@ from urmpipe_models.elementwise import FloatArray, spread_rows
 from urmpipe_models.kinematics.forward import jacobian, positions_over_log
 from urmpipe_models.math3d import Transform, to_matrices
 from urmpipe_pipeline import text
-from urmpipe_pipeline.diagnosis.arm import ArmModel
-from urmpipe_pipeline.diagnosis.arm_groups import (
+from urmpipe_pipeline.diagnosis.causes import STRUCTURE, NotLookedFor
+from urmpipe_pipeline.diagnosis.hypotheses import (
+    Group,
     base_groups,
     cause_groups,
     joint_groups,
+    numbered,
     time_groups,
     tool_groups,
 )
-from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered
 from urmpipe_pipeline.diagnosis.interpolation import (
     Cubics,
     Interpolated,
@@ -28,10 +29,8 @@ from urmpipe_pipeline.diagnosis.interpolation import (
     interpolated,
     with_cubics,
 )
-from urmpipe_pipeline.diagnosis.joints import JointsModel
+from urmpipe_pipeline.diagnosis.models import TOOL, ArmModel, JointsModel, PlaceModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
-from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
-from urmpipe_pipeline.diagnosis.result import STRUCTURE, NotLookedFor
 from urmpipe_pipeline.runs.reading_errors import (
     Edits,
     axis_edits,

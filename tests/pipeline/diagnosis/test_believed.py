@@ -14,7 +14,8 @@ from urmpipe_models.arm.chain import MAX_COORDINATE, Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
+from urmpipe_pipeline.diagnosis.causes import Cause
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 
 PERIOD = 0.02  # [s]
 ARM = "{d = 0.12, alpha = 1.4}, {a = 0.22, alpha = 0.3}, {a = 0.19, d = 0.05}"

@@ -19,12 +19,17 @@ from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import Transform, from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_pipeline.diagnosis.arm import ArmModel
-from urmpipe_pipeline.diagnosis.arm_groups import base_groups, cause_groups, joint_groups, tool_groups
-from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered, zero
-from urmpipe_pipeline.diagnosis.joints import JointsModel
+from urmpipe_pipeline.diagnosis.hypotheses import (
+    Group,
+    base_groups,
+    cause_groups,
+    joint_groups,
+    numbered,
+    tool_groups,
+    zero,
+)
+from urmpipe_pipeline.diagnosis.models import TOOL, ArmModel, JointsModel, PlaceModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, gravity_torques, motion_of
-from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
 from urmpipe_pipeline.runs.reading_errors import (
     Edit,
     Edits,

@@ -12,9 +12,9 @@ from altered_arm import altered, arm_model, called, nominal, rich_motion, spoilt
 from normal_equations import normal_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.fit import Rows, cost, fitted, inliers, normal_equations, residual
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.models import ArmModel
 
 URM6 = load_robot("urm6")
 SAMPLES = 400

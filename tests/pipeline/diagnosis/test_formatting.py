@@ -20,17 +20,17 @@ from urmpipe_pipeline.diagnosis.cause_texts import (
     format_rows,
     short_name,
 )
-from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, present
-from urmpipe_pipeline.diagnosis.result import (
+from urmpipe_pipeline.diagnosis.causes import (
     Alternative,
     Cause,
-    Diagnosis,
     Kind,
     NotLookedFor,
     OwnTcp,
     Refused,
     Remainder,
 )
+from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, present
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.presentation.section import Advice
 
 DEG = np.pi / 180.0

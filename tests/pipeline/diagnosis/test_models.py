@@ -28,13 +28,18 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.diagnosis.arm import ArmModel
-from urmpipe_pipeline.diagnosis.arm_groups import base_groups, joint_groups, time_groups, tool_groups
 from urmpipe_pipeline.diagnosis.fit import Model
-from urmpipe_pipeline.diagnosis.hypotheses import Group, State, numbered
-from urmpipe_pipeline.diagnosis.joints import JointsModel
+from urmpipe_pipeline.diagnosis.hypotheses import (
+    Group,
+    State,
+    base_groups,
+    joint_groups,
+    numbered,
+    time_groups,
+    tool_groups,
+)
+from urmpipe_pipeline.diagnosis.models import TOOL, ArmModel, JointsModel, PlaceModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
-from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
 from urmpipe_pipeline.runs.reading_errors import Edit, axis_edits
 
 ARMS = (load_robot("urm6"), load_robot("ur5e"), load_robot("panda"), rail_arm(), sliding_arm())

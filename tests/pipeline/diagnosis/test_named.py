@@ -30,9 +30,9 @@ from rail_arm import rail_arm
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.diagnosis.causes import Alternative, Cause, rms
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
 from urmpipe_pipeline.diagnosis.explanations import SearchResult
-from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
 from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.runs.reading_errors import Edit, Edits
 

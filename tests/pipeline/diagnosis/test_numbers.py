@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 import urmpipe
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
+from urmpipe_pipeline.diagnosis.causes import Cause
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 
 D, A = (0.3, 0.0, 0.0, 0.35, 0.0, 0.09), (0.05, 0.4, 0.03, 0.0, 0.0, 0.0)  # [m]
 ALPHA = (-1.5, 0.1, -1.6, 1.5, -1.5, 0.2)  # [rad]

@@ -12,9 +12,8 @@ from altered_arm import called, nominal, rich_motion, times
 from normal_equations import normal_of
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.diagnosis.fit import Rows, normal_equations
+from urmpipe_pipeline.diagnosis.fit import Rows, autocorrelation_time, normal_equations
 from urmpipe_pipeline.diagnosis.hypotheses import State
-from urmpipe_pipeline.diagnosis.intervals import autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import MOST, Selection, Subset, without_twins
 
 ROWS, GROUPS = 90, 7

@@ -11,8 +11,8 @@ from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.diagnosis.formatting import select_causes
-from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
+from urmpipe_pipeline.diagnosis.causes import Cause
+from urmpipe_pipeline.diagnosis.result import Diagnosis, select_causes
 
 ARM = load_robot("urm6")
 NAMES = ARM.coordinates

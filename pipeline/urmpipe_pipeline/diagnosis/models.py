@@ -5,23 +5,78 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import BoolArray, Element, FloatArray, IntArray, Vector, scale, spread_rows
+from urmpipe_models.elementwise import (
+    BoolArray,
+    Element,
+    FloatArray,
+    IntArray,
+    Vector,
+    add,
+    cross,
+    scale,
+    spread_rows,
+)
 from urmpipe_models.hand_eye import solve_hand_eye
-from urmpipe_models.kinematics.forward import jacobian, poses_over_log, tip_pose
-from urmpipe_models.kinematics.identification import Twist, apply_twists, sensitivities
+from urmpipe_models.kinematics.forward import jacobian, poses_over_log, positions_over_log, tip_pose
+from urmpipe_models.kinematics.identification import (
+    Twist,
+    apply_twists,
+    apply_twists_to_frames,
+    sensitivities,
+    sensitivity_columns,
+)
 from urmpipe_models.math3d import Transform
-from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
-from urmpipe_pipeline.diagnosis.fit import Positions
-from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, cause_groups, zero
 from urmpipe_pipeline.diagnosis.motion import Clock, Joints, Motion
 from urmpipe_pipeline.runs.reading_errors import IDENTITY, Edits, Matrix
 
 FITTED = 100
 """Rows, spread evenly, on which unknown frames are put where they fit best; fits on all rows come after."""
+
+
+class Positions:
+    """What models have in common whose tool centre point is judged.
+
+    Attributes:
+        sample: Rows of the log, shape (n,).
+        position: Where the tool centre point should be in [m], shape (3, n).
+        rotation: Its orientation as matrices [-], shape (3, 3, n); None without any.
+        judged: Where it should be as a comparison has it in [m], shape (3, n); None if that is `position`.
+    """
+
+    sample: IntArray
+    position: FloatArray
+    rotation: FloatArray | None
+    judged: FloatArray | None
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of what is judged."""
+        return "m"
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether the joints themselves are judged, not positions."""
+        return False
+
+    @property
+    def rows(self) -> int:
+        """How many rows are compared."""
+        return len(self.sample)
+
+    @property
+    def blocks(self) -> IntArray:
+        """Which components share a noise: positions 0, orientations 1, shape (c,)."""
+        return np.repeat([0, 1], 3)[: 3 if self.rotation is None else 6]
+
+    def wanted(self, rows: IntArray) -> FloatArray:
+        """Return where the tool centre point should be as it is judged in [m], shape (3, n)."""
+        return (self.position if self.judged is None else self.judged)[:, rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,3 +439,226 @@ def turn_between(pose: Transform, rotation: FloatArray) -> FloatArray:
         crossed += np.array(np.broadcast_arrays(y * w - z * v, z * u - x * w, x * v - y * u))
         trace += x * u + y * v + z * w
     return np.asarray(crossed / np.sqrt(np.maximum(1.0 + trace, 1e-12)))
+
+
+TOOL = 1
+"""The place of the tool; that of the base is 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceModel(Positions):
+    """Where a log recorded its tool centre point, beside where the reference has it: base @ pose @ tool.
+
+    Residuals are in the unit that the reference was read in, whatever the unit of either side is.
+
+    Attributes:
+        groups: What may differ by some amount.
+        motion: The log's positions in [m].
+        turns: Its orientations as matrices [-], shape (3, 3, m), as the motion's samples; None without any.
+        clock: The log's times.
+        sample: Rows of the log, shape (n,).
+        position: Where the tool centre point should be in [m], shape (3, n).
+        rotation: Its orientation [-], shape (3, 3, n); None unless both sides have one.
+        judged: Where it should be as a comparison has it in [m], shape (3, n); None if that is `position`.
+    """
+
+    groups: tuple[Group, ...]
+    motion: Motion
+    turns: FloatArray | None
+    clock: Clock
+    sample: IntArray
+    position: FloatArray
+    rotation: FloatArray | None
+    judged: FloatArray | None = None
+
+    @cached_property
+    def _spin(self) -> FloatArray:
+        """How fast the log turns in the world in [rad/s], shape (3, m); 0 where that is not known."""
+        if self.turns is None or self.turns.shape[2] < 3:
+            return np.zeros_like(self.motion.value)
+        before, after = self.turns[:, :, :-2], self.turns[:, :, 2:]
+        turned = turn_between(_transform(before), after) / (self.motion.t[2:] - self.motion.t[:-2])
+        return np.nan_to_num(np.pad(turned, ((0, 0), (1, 1)), mode="edge"))
+
+    def residual(self, state: State, rows: IntArray) -> FloatArray:
+        """Return data - model of an explanation in [m] as the data were read and [rad], shape (c, n)."""
+        return self.linear(state, rows, ())[0]
+
+    def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
+        """Return the residual of explanations without numbers in [m] and [rad], shape (len(every), c, n)."""
+        nothing = zero(self.groups)
+        lefts = [self.residual(replace(nothing, edits=edits), rows) for edits in every]
+        return np.array(lefts).reshape(-1, len(self.blocks), len(rows))
+
+    def deviation(self, state: State, rows: IntArray) -> FloatArray:
+        """Return what an explanation leaves of what is judged: positions in true [m], shape (3, n)."""
+        left = self.residual(state, rows)[:3]
+        if self.judged is not None:
+            left = left + (self.judged - self.position)[:, rows]
+        return unit_of(state.edits, "reference") * left
+
+    def linear(
+        self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what an explanation leaves, and how each number of some groups changes the model.
+
+        Args:
+            state: The explanation.
+            rows: Rows, by index, shape (n,).
+            groups: Whose numbers; all by default.
+
+        Returns:
+            The residual as `residual` has it, shape (c, n), and the Jacobian of the model per unit of each
+            number, in order of the groups, shape (p, c, n).
+        """
+        taken = self.groups if groups is None else groups
+        pose, velocity, spin, inside = self._looked_up(state, rows)
+        ordered = ordered_twists(self.groups)
+        changes = [(twist, float(state.values[c])) for twist, c in ordered]
+        turned = Transform(axes_of(state.edits, "base_rotation") or IDENTITY)
+        (base, tool), located = apply_twists_to_frames((turned, Transform()), changes)
+        before = base @ pose
+        there = before @ tool
+        rotation = None if self.rotation is None else self.rotation[:, :, rows]
+        left = pose_residual(there, state.edits, self.position[:, rows], rotation, inside, "reference")
+        wanted = {c for group in taken for c in group.columns}
+        twists = [(twist, c) for twist, (_, c) in zip(located, ordered, strict=True) if c in wanted]
+        found = sensitivity_columns((Transform(), before), there.translation, [twist for twist, _ in twists])
+        moved = {c: column for (_, c), column in zip(twists, found, strict=True)}
+        columns = np.zeros((len(wanted), *left.shape))
+        turning = base.rotate(spin)
+        moving = add(base.rotate(velocity), cross(turning, before.rotate(tool.translation)))
+        flow = (*moving, *turning)
+        add_columns(columns, taken, moved, lambda group: [(flow, self.clock.flow(group, rows))])
+        return left, as_read(columns, state.edits, "reference")
+
+    def _looked_up(self, state: State, rows: IntArray) -> tuple[Transform, Vector, Vector, BoolArray]:
+        """Return the log's poses, velocities and spins at the times of rows, and which lie within its own."""
+        at = self.clock.at(state, self.groups, rows)
+        position, velocity, _, inside = self.motion.at(at)
+        factor = unit_of(state.edits, "log")
+        pose = Transform(translation=_vector(factor * position))
+        spin = np.zeros_like(velocity)
+        if self.turns is not None:
+            nearest = self.motion.nearest(at)
+            turns, spin = self.turns[:, :, nearest], self._spin[:, nearest]
+            on = (at - self.motion.t[nearest]) * spin
+            pose = Transform(
+                _transform(turns + np.cross(on, turns, axisa=0, axisb=0, axisc=0)).rotation, pose.translation
+            )
+        return pose, _vector(factor * velocity), _vector(spin), inside
+
+
+def _vector(values: FloatArray) -> Vector:
+    """Return an array of shape (3, n) as a vector of elements."""
+    x, y, z = values
+    return x, y, z
+
+
+def _transform(matrices: FloatArray) -> Transform:
+    """Return matrices of shape (3, 3, n) as a transform of elements."""
+    x, y, z = ((row[0], row[1], row[2]) for row in matrices)
+    return Transform((x, y, z))
+
+
+@dataclass(frozen=True, eq=False)
+class JointsModel:
+    """The joints of a log beside those of the reference.
+
+    Attributes:
+        groups: What may differ by some amount.
+        motion: The log's joints.
+        clock: The log's times.
+        sample: Rows of the log, shape (n,).
+        q: The reference's joints in [rad] or [m], shape (joints, n).
+        sliding: Which joints are in [m], shape (joints,).
+        chain: The arm; None for the joints alone.
+        judged: Where the reference is as a comparison has it: positions in [m], shape (3, n), without an arm
+            joints, shape (joints, n); None if that is where `q` leads.
+    """
+
+    groups: tuple[Group, ...]
+    motion: Motion
+    clock: Clock
+    sample: IntArray
+    q: FloatArray
+    sliding: tuple[bool, ...]
+    chain: Chain | None = None
+    judged: FloatArray | None = None
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of what is judged: of joints that turn and slide all are taken as rad."""
+        return "rad" if self.of_joints and not all(self.sliding) else "m"
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether the joints themselves are judged, not positions."""
+        return self.chain is None
+
+    @property
+    def rows(self) -> int:
+        """How many rows are held against each other."""
+        return len(self.sample)
+
+    @property
+    def blocks(self) -> IntArray:
+        """Which components share a noise: those that turn 0, those that slide 1, shape (joints,)."""
+        return np.array(self.sliding, dtype=np.int64)
+
+    def residual(self, state: State, rows: IntArray) -> FloatArray:
+        """Return what an explanation leaves: reference - log in [rad] or [m], shape (joints, n)."""
+        joints = self._joints(state, rows)
+        return np.asarray(np.where(joints.inside, self.q[:, rows] - joints.q, np.nan))
+
+    def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
+        """Return residuals of explanations without numbers in [rad] or [m], shape (len(every), joints, n)."""
+        joints = self._joints(zero(self.groups), rows)
+        left = [self.q[:, rows] - edited(edits, self.sample[rows], joints.q) for edits in every]
+        return np.where(joints.inside, np.array(left).reshape(-1, *joints.q.shape), np.nan)
+
+    def _joints(self, state: State, rows: IntArray) -> Joints:
+        return self.motion.joints(state, self.groups, self.clock, self.sample, rows, self.chain)
+
+    def linear(
+        self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what an explanation leaves, and how each number of some groups changes the joints.
+
+        Args:
+            state: The explanation.
+            rows: Rows, by index, shape (n,).
+            groups: Whose numbers; all by default.
+
+        Returns:
+            The residual in [m] and [rad], shape (c, n), and the Jacobian per unit of each number, in order
+            of the groups, shape (p, c, n).
+        """
+        taken = self.groups if groups is None else groups
+        joints = self._joints(state, rows)
+        columns = np.zeros((len(taken), *joints.q.shape))
+        for column, group in zip(columns, taken, strict=True):
+            for j, factor in joints.factors(group, self.clock, rows):
+                column[j] = factor
+        return np.where(joints.inside, self.q[:, rows] - joints.q, np.nan), columns
+
+    def deviation(self, state: State, rows: IntArray) -> FloatArray:
+        """Return what an explanation leaves of the tool centre point in [m], shape (3, n).
+
+        Without an arm it is what it leaves of the joints in [rad] or [m], shape (joints, n).
+
+        Args:
+            state: The explanation.
+            rows: Rows, by index, shape (n,).
+        """
+        joints = self._joints(state, rows)
+        is_at = joints.q if self.chain is None else positions_over_log(self.chain, joints.q.T).T
+        left = self.wanted(rows) - is_at
+        return np.asarray(np.where(joints.inside, left, np.nan))
+
+    def wanted(self, rows: IntArray) -> FloatArray:
+        """Return where the reference is: positions in [m], shape (3, n); without an arm its joints."""
+        if self.judged is not None:
+            return self.judged[:, rows]
+        q = self.q[:, rows]
+        return q if self.chain is None else positions_over_log(self.chain, q.T).T
