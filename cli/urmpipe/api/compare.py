@@ -29,7 +29,6 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_rec
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import parse_tolerance
-from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.unjudged import Unjudged, judge_others
 from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import (
@@ -51,6 +50,7 @@ from urmpipe_pipeline.solved_targets.given_targets import TargetsLike
 from urmpipe_pipeline.sources import Held, TableLike, held_of, is_table
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 from urmpipe_pipeline.tables.table_csv import write_table
+from urmpipe_pipeline.trajectories import AlignMode
 
 Operand = PathLike | TableLike | MadeRun | Simulation
 

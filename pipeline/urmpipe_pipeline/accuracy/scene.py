@@ -11,12 +11,12 @@ from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.parts import at_velocity, shown_motion
 from urmpipe_pipeline.accuracy.result import Accuracy
 from urmpipe_pipeline.comparison.scene import drawn_larger
-from urmpipe_pipeline.comparison.trajectory import extent
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import ends, spot_at
 from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Spot
+from urmpipe_pipeline.trajectories import extent
 
 ARMS = 8
 """Poses of the arm in a drawing, at most."""

@@ -22,9 +22,8 @@ from urmpipe_models.math3d import (
     to_quaternions,
 )
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, lacking
-from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.trajectories import ORIENTED, Alignment, AlignMode, Matched, run_finding
 
 RESOLVED = 1e-4
 """Positions that leave a line by less than this, root mean square in [m], leave the rotation about it open: a
@@ -113,7 +112,7 @@ def _rigid(matched: Matched, run: Run) -> Alignment:
     rotation, common = fit_rotation(wanted.T @ done / len(done))
     size, breadth = zip(*map(_extent, (wanted, done)), strict=True)
     if min(breadth) < RESOLVED or common[1] + common[2] <= IN_COMMON * breadth[0] * breadth[1]:
-        raise LogError(lacking(run, _open_rotation(min(size), min(breadth)), parameter="align"))
+        raise LogError(run_finding(run, _open_rotation(min(size), min(breadth)), parameter="align"))
     shift = matched.reference.mean(axis=0) - rotation @ matched.actual.mean(axis=0)
     return _alignment("rigid", rotation, shift)
 
@@ -154,7 +153,7 @@ def _moved(matched: Matched, alignment: Alignment) -> Matched:
     quat = matched.actual_quat
     if quat is not None:
         quat = quaternion_product(to_quaternions(rotation.reshape(1, 9), "matrix"), quat)
-    return replace(matched, actual=done, actual_quat=quat, alignment=alignment)
+    return matched._replace(actual=done, actual_quat=quat, alignment=alignment)
 
 
 def _with_tool(matched: Matched, run: Run) -> Matched:
@@ -164,11 +163,11 @@ def _with_tool(matched: Matched, run: Run) -> Matched:
     if turned < TURNED:
         found = f"tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
         said = "which an offset of the base explains as well, allowed: a log that turns it; start, none"
-        raise LogError(lacking(run, f"{found}, {said}", parameter="align"))
+        raise LogError(run_finding(run, f"{found}, {said}", parameter="align"))
     rotation = to_matrices(quat)
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()
     moved = posed.actual + rotation @ np.array((x, y, z))
-    return replace(posed, actual=moved, alignment=Alignment("tool", tool=(x, y, z)))
+    return posed._replace(actual=moved, alignment=Alignment("tool", tool=(x, y, z)))
 
 
 def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
@@ -177,7 +176,7 @@ def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
     if len(quat) < LEAST_POSES:
         few = text.counted(len(quat), "compared pose")
         said = f"base+tool: found {few}, which some base and tool fit, allowed: {LEAST_POSES} or more"
-        raise LogError(lacking(run, said, parameter="align"))
+        raise LogError(run_finding(run, said, parameter="align"))
     rotation, wanted = to_matrices(quat), posed.reference_quat
     found = solve_hand_eye(
         posed.actual, rotation, posed.reference, None if wanted is None else to_matrices(wanted)
@@ -188,8 +187,7 @@ def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
         moved, tool=(x, y, z), tool_rotation=_rows(found.tool_rotation), unobservable=found.unobservable
     )
     tool = np.broadcast_to(found.tool_rotation.reshape(1, 9), (len(quat), 9))
-    with_tool = replace(
-        posed,
+    with_tool = posed._replace(
         actual=posed.actual + rotation @ found.tool_position,
         actual_quat=quaternion_product(quat, to_quaternions(tool, "matrix")),
     )
@@ -206,5 +204,5 @@ def _oriented(matched: Matched, mode: AlignMode, run: Run) -> tuple[Matched, Flo
     known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
     if quat is None or not len(known):
         said = f"{mode}: found no orientation of the log, allowed: {ORIENTED}"
-        raise LogError(lacking(run, said, parameter="align"))
+        raise LogError(run_finding(run, said, parameter="align"))
     return matched if len(known) == len(quat) else matched.at(known), quat[known]

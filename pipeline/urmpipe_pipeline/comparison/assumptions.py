@@ -6,10 +6,10 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.comparison.matching import file_of
 from urmpipe_pipeline.joint_log import Role
 from urmpipe_pipeline.provenance import assumed
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.trajectories import run_label
 
 
 def assumptions(sides: Sequence[tuple[Run, Collection[Role]]]) -> tuple[str, ...]:
@@ -24,6 +24,6 @@ def assumptions(sides: Sequence[tuple[Run, Collection[Role]]]) -> tuple[str, ...
     rests_on = [(run, one) for run, roles in sides for one in run.warnings if one.role in roles]
     asked = [(run, one) for run, one in rests_on if one.asks]
     if asked:
-        raise LogError(*(replace(one.as_finding(), file=file_of(run)) for run, one in asked))
+        raise LogError(*(replace(one.as_finding(), file=run_label(run)) for run, one in asked))
     found = [(one.assumption, run.name) for run, one in rests_on if one.assumption]
     return assumed(found, {run.name for run, _ in sides})

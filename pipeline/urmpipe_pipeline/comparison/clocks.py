@@ -14,15 +14,14 @@ from urmpipe_models.errors import Hint, LogError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.matching import match
 from urmpipe_pipeline.comparison.sync import BY_HAND, BY_MOTION, synchronise
-from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources.cells.text_clock import DATE
 from urmpipe_pipeline.sources.checks import REBUILT, SPREAD
 from urmpipe_pipeline.sources.clocks.halves import EPOCH
 from urmpipe_pipeline.sources.clocks.text_times import ZONED
+from urmpipe_pipeline.trajectories import Trajectory, match
 
 CLOCKS_DIFFER = "clocks-differ"
 

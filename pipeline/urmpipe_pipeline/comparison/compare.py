@@ -15,24 +15,9 @@ from urmpipe_pipeline.comparison.clocks import clocks_differ, late, stamp_offset
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.iso import IsoOptions, judge_cycles
-from urmpipe_pipeline.comparison.matching import (
-    JOINTS_ALONE,
-    NO_ROBOT,
-    NO_ROBOT_FITS,
-    as_recorded,
-    by_joints_alone,
-    by_kinematics,
-    file_of,
-    lacking,
-    match,
-    traces_point,
-    wanted_rows,
-    without_robot,
-)
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
 from urmpipe_pipeline.comparison.tolerance import check_tolerance, complete_tolerance, deviations_of
-from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.comparison.warnings import (
     exchanged,
     large_tolerances,
@@ -42,14 +27,31 @@ from urmpipe_pipeline.comparison.warnings import (
     same_data,
     thin_evidence,
 )
-from urmpipe_pipeline.diagnosis.diagnose import diagnose
-from urmpipe_pipeline.diagnosis.sides import Side
+from urmpipe_pipeline.diagnosis.diagnose import Compared, Limit, diagnose
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
 from urmpipe_pipeline.presentation.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ
+from urmpipe_pipeline.trajectories import (
+    JOINTS_ALONE,
+    NO_ROBOT,
+    NO_ROBOT_FITS,
+    AlignMode,
+    Side,
+    Sync,
+    Trajectory,
+    fk_trajectory,
+    joint_trajectory,
+    kinematics_missing,
+    match,
+    recorded_trajectory,
+    reference_rows,
+    run_finding,
+    run_label,
+    traces_point,
+)
 
 Tcp = Literal["fk", "recorded"]
 
@@ -129,8 +131,8 @@ def trajectory(run: Run, tcp: Tcp = "fk", *, alone: bool = False) -> Trajectory:
         LogError: If the run has neither kinematics nor a recorded position to go by.
     """
     if _goes_by_record(run, tcp):
-        return as_recorded(run)
-    return by_joints_alone(run) if alone else by_kinematics(run)
+        return recorded_trajectory(run)
+    return joint_trajectory(run) if alone else fk_trajectory(run)
 
 
 def _goes_by_record(run: Run, tcp: Tcp) -> bool:
@@ -229,7 +231,7 @@ def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) 
     if options.align == "none" and set(deviations_of(options.tolerance)) == {"joint"}:
         return True
     hints = (JOINTS_ALONE,) if options.align == "none" else ()
-    raise LogError(*dict.fromkeys(without_robot(run, *hints) for run in lacks))
+    raise LogError(*dict.fromkeys(kinematics_missing(run, *hints) for run in lacks))
 
 
 def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:
@@ -268,7 +270,9 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], options: Compar
     wanted = reference.log.rows
     if others := [run for run in runs if run.log.rows != wanted]:
         allowed = f"{wanted}, as {reference.name} has: still poses are compared row by row"
-        raise LogError(*(lacking(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in others))
+        raise LogError(
+            *(run_finding(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in others)
+        )
     if options.sync not in (None, "start") and not (options.iso and options.sync == "auto"):
         found = f"{options.sync} of still poses"
         raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
@@ -280,9 +284,9 @@ def _no_motion(run: Run) -> Finding:
         said = (
             "found targets without times, which are not a motion, allowed: a log or a path of its own times"
         )
-        return lacking(run, said, Hint("tsp", None, "sets their sample period", call="ik"))
+        return run_finding(run, said, Hint("tsp", None, "sets their sample period", call="ik"))
     said = "found still poses beside a motion, allowed: still poses on both sides, or motions"
-    return lacking(run, said, Hint("poses", True, "takes the rows of every log as still poses"))
+    return run_finding(run, said, Hint("poses", True, "takes the rows of every log as still poses"))
 
 
 def _joined(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> CompareOptions:
@@ -305,7 +309,7 @@ def _joined(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> Compa
     for run in apart:
         names = ", ".join(column.name for column in run.log.columns if column.role == "position")
         found = f"a tool that was measured in a frame of its own ({names})"
-        finding = lacking(run, "", hint, parameter="align")
+        finding = run_finding(run, "", hint, parameter="align")
         findings.append(replace(finding, found=found, allowed="base+tool, rigid, start"))
     raise LogError(*findings)
 
@@ -336,16 +340,20 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     chosen = replace(chosen, sync="start")
     log = run.log
     if not log.joints:
-        raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to compare with it"))
+        raise LogError(
+            run_finding(run, "a path alone, which has no joints; allowed: a log to compare with it")
+        )
     if run.robot is None:
-        raise LogError(lacking(run, *(NO_ROBOT if log.tcp_position is None else NO_ROBOT_FITS)))
+        raise LogError(run_finding(run, *(NO_ROBOT if log.tcp_position is None else NO_ROBOT_FITS)))
     if log.tcp_position is None:
         said = "one log, which recorded no tool centre point; allowed: a reference before the log"
         doubts = [one.as_finding() for one in log.warnings if one.kind == TCP_NOT_READ]
-        raise LogError(lacking(run, said), *(replace(one, file=file_of(run)) for one in doubts))
+        raise LogError(run_finding(run, said), *(replace(one, file=run_label(run)) for one in doubts))
     chosen = _joined([(run, True), (run, False)], chosen)
-    recorded = replace(as_recorded(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None)
-    computed = replace(by_kinematics(run), joints=(), joint_units=(), q=None)
+    recorded = replace(
+        recorded_trajectory(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None
+    )
+    computed = replace(fk_trajectory(run), joints=(), joint_units=(), q=None)
     assumed = assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])  # others go by the joints'
     sides = Side(run, recorded, by_joints=False), Side(run, computed, by_joints=True)
     found = _comparison(recorded, [_deviation(*sides, chosen)], chosen, (), assumed)
@@ -400,18 +408,24 @@ def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
 
 def _deviation(asked: Side, done: Side, options: CompareOptions) -> Deviation:
     """Return the deviation of one trajectory, at its own samples; why it deviates, if asked for."""
-    run, reference, actual = done.run, wanted_rows(asked, done), done.trajectory
+    run, reference, actual = done.run, reference_rows(asked, done), done.trajectory
     stamped = stamp_offset(asked.run, run)
     sync = synchronise(reference, actual, options.sync, options.align, stamped)
     matched = match(reference, actual, sync)
     if not len(matched.sample):
         said = f"no sample in common with {reference.name} (time offset {sync.offset} s)"
-        raise LogError(lacking(run, said))
+        raise LogError(run_finding(run, said))
     found = measure(run, reference, actual, align(matched, options.align, run), options.tolerance)
     if not options.diagnose:
         return found
     lag = _moves_alike(asked, done, sync)
-    return replace(found, diagnosis=diagnose(found, matched, asked, done, lag))
+    compared = Compared(
+        found.name,
+        found.verdict,
+        tuple(Limit(one.quantity, one.kind, one.tolerance) for one in found.all_statistics),
+        {name: share.value for name, share in found.shares.items()},
+    )
+    return replace(found, diagnosis=diagnose(compared, matched, asked, done, lag))
 
 
 def _moves_alike(asked: Side, done: Side, sync: Sync) -> float | None:

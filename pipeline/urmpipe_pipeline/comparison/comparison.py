@@ -11,7 +11,6 @@ from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.errors import Finding, Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, Verdict
-from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.iso9283.tables import not_judged_findings
@@ -19,6 +18,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.run import SCHEMA
+from urmpipe_pipeline.trajectories import Trajectory
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -30,9 +30,8 @@ from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.math3d import rotation_angle, slerp
 from urmpipe_pipeline.comparison.deviation import Share, ShareKind, Stretch, Verdict
-from urmpipe_pipeline.comparison.matching import Matched, joint_order
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, allowed_for
-from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.trajectories import Matched, Trajectory, joint_order
 
 NEAR = 0.9  # of the log's period: rows that each shift by a third of it are up to 1.67 periods apart
 

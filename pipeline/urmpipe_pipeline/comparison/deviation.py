@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Voice
-from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.trajectories import Alignment, Sync
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,6 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
-from urmpipe_pipeline.comparison.matching import joint_order
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.iso9283.tables import COLUMNS
 from urmpipe_pipeline.joint_log import LogWarning
@@ -27,6 +26,7 @@ from urmpipe_pipeline.presentation.exports import (
 )
 from urmpipe_pipeline.runs.exports import provenance_of, stamps
 from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.trajectories import joint_order
 
 NO_ORIENTATION = LogWarning(
     "no-orientation",

@@ -15,7 +15,6 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import as_option, placed
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics
-from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.comparison.warnings import rests
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
 from urmpipe_pipeline.diagnosis.causes import Cause
@@ -23,6 +22,7 @@ from urmpipe_pipeline.diagnosis.diagnose import LEAST_SAMPLES
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
+from urmpipe_pipeline.trajectories import Alignment, Sync
 
 MEANING = {"coverage": "of the reference, shown by the log", "judged": "of the log's motion, judged"}
 """What a share is of."""

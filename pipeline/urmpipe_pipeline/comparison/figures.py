@@ -13,7 +13,6 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.mended import mended_figure, mended_path
 from urmpipe_pipeline.comparison.scene import allowed_norm, deviation_arrows
-from urmpipe_pipeline.comparison.trajectory import extent
 from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, peak_words, symbol, when
 from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel, SpaceFigure, View
@@ -28,6 +27,7 @@ from urmpipe_pipeline.presentation.parts import ends
 from urmpipe_pipeline.presentation.scene import Path, Spot
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.runs.figures import joints_figure, motion_figure, speed_figure
+from urmpipe_pipeline.trajectories import extent
 
 APART = 30.0
 """Largest values further apart than this factor need a logarithmic axis: else the small ones are flat."""

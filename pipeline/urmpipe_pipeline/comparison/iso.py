@@ -12,14 +12,11 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.coverage import measure_shares
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
-from urmpipe_pipeline.comparison.matching import lacking, match, wanted_rows
 from urmpipe_pipeline.comparison.measure import measure
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, deviations_of
-from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
 from urmpipe_pipeline.comparison.wording import share_words
-from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.iso9283.command_path import Bend, Stations, Stop
 from urmpipe_pipeline.iso9283.criteria import angles, fewest_cycles
 from urmpipe_pipeline.iso9283.cycles import FoundCycles, alike, check_cycles, find_cycles, first_cycle
@@ -32,6 +29,7 @@ from urmpipe_pipeline.iso9283.tables import failed_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR
 from urmpipe_pipeline.runs.run import part_of
+from urmpipe_pipeline.trajectories import Side, Sync, Trajectory, match, reference_rows, run_finding
 
 FAILED = "failed-cycle"
 
@@ -178,7 +176,7 @@ def _once(asked: Side) -> tuple[Side, tuple[int, int] | None]:
     if rows is None:
         return asked, None
     first, last = (int(whole.row[row]) for row in rows)
-    return replace(asked, trajectory=_cut(asked.trajectory, first, last, asked.trajectory.name)), (
+    return asked._replace(trajectory=_cut(asked.trajectory, first, last, asked.trajectory.name)), (
         first + 1,
         last + 1,
     )
@@ -209,10 +207,10 @@ def _candidates(
     seen = find_cycles(command, whole)
     if not seen.rows and not whole.timed:
         said = f"found {len(whole)} rows, allowed: {len(command)} for each cycle, as {command.name} has poses"
-        raise LogError(lacking(side.run, said))
+        raise LogError(run_finding(side.run, said))
     if not seen.rows:
         said = f"found no motion as in {command.name} that returns to its start, allowed: one that repeats it"
-        raise LogError(lacking(side.run, said))
+        raise LogError(run_finding(side.run, said))
     of_log = FoundCycles(
         *(tuple((int(whole.row[a]), int(whole.row[b])) for a, b in some)
           for some in (seen.rows, seen.cut, seen.returns))
@@ -286,14 +284,14 @@ def _shares(
     Samples are matched on the command's clock, and near each other on the cycle's: between two planes either
     goes on at its own speed.
     """
-    command, cycle = wanted_rows(asked, one.side), one.side.trajectory
+    command, cycle = reference_rows(asked, one.side), one.side.trajectory
     reference, on_command = command, cycle
     if planes is not None and followed.crossed is not None:
         crossed = np.maximum.accumulate(followed.crossed.t)
         reference = replace(command, t_ns=_other_clock(command.t, planes.t, crossed))
         on_command = replace(cycle, t_ns=_other_clock(cycle.t, crossed, planes.t))
     matched = match(command, on_command, Sync())
-    matched = replace(matched, t_ns=cycle.t_ns[matched.sample])
+    matched = matched._replace(t_ns=cycle.t_ns[matched.sample])
     if not len(matched.sample):
         return {}
     shares = measure_shares(reference, cycle, matched, least, timed=asked.run.timed)
@@ -330,11 +328,11 @@ def _sync(option: SyncOption, cycle: Followed, timed: bool) -> Sync:
 
 def _deviation(asked: Side, done: Side, sync: Sync) -> Deviation:
     """Return the deviation of a cycle at the same times; nothing of it is judged."""
-    reference = wanted_rows(asked, done)
+    reference = reference_rows(asked, done)
     matched = match(reference, done.trajectory, sync)
     if not len(matched.sample):
         said = f"no sample in common with {asked.run.name} (time offset {sync.offset} s)"
-        raise LogError(lacking(done.run, said))
+        raise LogError(run_finding(done.run, said))
     return measure(done.run, reference, done.trajectory, matched, {})
 
 

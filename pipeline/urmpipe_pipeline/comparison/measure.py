@@ -13,13 +13,12 @@ from urmpipe_models.math3d import rotation_angle
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.comparison.coverage import measure_shares
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Deviation
-from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, joints_apart, lacking
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
-from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import gaps_behind, seconds
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.trajectories import ORIENTED, Matched, Trajectory, joint_mismatch, run_finding
 
 START_SAMPLES = 11
 """Samples by which the turns of the start are counted: as few as outvote a wild one."""
@@ -143,7 +142,7 @@ def _of_joints(run: Run, joint_delta: FloatArray | None) -> list[Measured]:
 
 def unheld(reference: Trajectory, run: Run) -> str:
     """Return why no joint of a log is compared."""
-    apart = joints_apart(reference, run.log.joints, tuple(run.joint_units))
+    apart = joint_mismatch(reference, run.log.joints, tuple(run.joint_units))
     return apart or "a joint has no value at any compared sample"
 
 
@@ -161,7 +160,7 @@ def _refuse_unheld(
     if "joint" in tolerance and joint_delta is None:
         faults.append(f"joint: found that {unheld(reference, run)}, allowed: the same joints on both sides")
     if faults:
-        raise LogError(*(lacking(run, said, parameter="tolerance") for said in faults))
+        raise LogError(*(run_finding(run, said, parameter="tolerance") for said in faults))
 
 
 def _speed(run: Run, matched: Matched) -> FloatArray:

@@ -12,12 +12,12 @@ from urmpipe_pipeline.comparison.alignment import placed
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.mended import cause_marks, mended_path
-from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import amount_words, when
 from urmpipe_pipeline.presentation.palette import DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import Arm, Arrows, Path, Scene, Spot
 from urmpipe_pipeline.runs.figures import times_of
+from urmpipe_pipeline.trajectories import Trajectory
 
 FACTORS = (50, 20, 10, 5, 2)
 """How many times a deviation may be drawn, the usual one first."""

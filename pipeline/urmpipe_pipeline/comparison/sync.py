@@ -11,8 +11,8 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.sync_coarse import FLOOR, mean_rates, peaks
 from urmpipe_pipeline.comparison.sync_fine import Estimate, refine
 from urmpipe_pipeline.comparison.sync_views import View, views
-from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory, extent
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory, extent
 
 SyncOption: TypeAlias = Literal["stamps", "start", "auto"] | float
 

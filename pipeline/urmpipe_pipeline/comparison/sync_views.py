@@ -8,8 +8,7 @@ from typing import Literal
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.math3d import to_matrices
-from urmpipe_pipeline.comparison.matching import joint_order
-from urmpipe_pipeline.comparison.trajectory import AlignMode, Trajectory
+from urmpipe_pipeline.trajectories import AlignMode, Trajectory, joint_order
 
 
 @dataclass(frozen=True, slots=True, eq=False)

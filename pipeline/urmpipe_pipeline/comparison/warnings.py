@@ -11,15 +11,14 @@ from urmpipe_models.hand_eye import MIN_SENSITIVITY, Part, UnobservableDirection
 from urmpipe_models.measure_units import USUAL_UNITS
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
-from urmpipe_pipeline.comparison.matching import joint_order
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
-from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
 from urmpipe_pipeline.comparison.wording import unseen_words
-from urmpipe_pipeline.diagnosis.sides import AT_REST, Side
+from urmpipe_pipeline.diagnosis.sides import AT_REST
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.recorded_tcp import distances_from_recorded
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.trajectories import Side, Trajectory, extent, joint_order
 
 EXCHANGED = "path-as-log"
 """The kind of a doubt about the order of what was given: it says nothing against a log."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Literal, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
@@ -24,12 +24,9 @@ from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
 from urmpipe_pipeline.diagnosis.own_tcp import ask_both_sides
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.diagnosis.search import Search
-from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, build_question
+from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, build_question
 from urmpipe_pipeline.runs.reading_errors import Edits
-
-if TYPE_CHECKING:  # a comparison holds its diagnosis: no ring between the two
-    from urmpipe_pipeline.comparison.deviation import Deviation
-    from urmpipe_pipeline.comparison.matching import Matched
+from urmpipe_pipeline.trajectories import Matched, Side
 
 FLOOR = 0.01
 """Share of the tolerance below which nothing is named."""
@@ -80,36 +77,71 @@ LEAST_SAMPLES = 10
 """Of fewer samples nothing is named: a cause takes up to three numbers of three a sample."""
 
 
+class Limit(NamedTuple):
+    """One quantity of a comparison and its tolerance.
+
+    Attributes:
+        quantity: x, y, z, norm, path, angle, or a joint's name.
+        kind: What it is measured of: axis, norm, path, angle or joint.
+        tolerance: Largest absolute value allowed in [m] or [rad], or None.
+    """
+
+    quantity: str
+    kind: str
+    tolerance: float | None
+
+
+class Compared(NamedTuple):
+    """Result of the comparison that is diagnosed.
+
+    Attributes:
+        name: The log's name in the comparison.
+        verdict: pass or fail; None if nothing was judged.
+        limits: Of every quantity; the joints in the log's order.
+        shares: Shares 0..1 on which the verdict rests, by their names coverage and judged.
+    """
+
+    name: str
+    verdict: Literal["pass", "fail"] | None
+    limits: tuple[Limit, ...]
+    shares: Mapping[str, float]
+
+    def tolerance(self, kinds: tuple[str, ...], default: float) -> float:
+        """Return the least tolerance of some kinds in [m] or [rad]."""
+        limits = (limit.tolerance for limit in self.limits if limit.kind in kinds and limit.tolerance)
+        return min(limits, default=default)
+
+
 def diagnose(
-    deviation: Deviation, matched: Matched, reference: Side, log: Side, lag: float | None = None
+    compared: Compared, matched: Matched, reference: Side, log: Side, lag: float | None = None
 ) -> Diagnosis:
     """Return why a log deviates from its reference.
 
     Args:
-        deviation: Their comparison.
+        compared: The result of their comparison.
         matched: Both sides at the same times, not moved in space.
-        reference: What was asked for.
-        log: What was done.
-        lag: An offset of the clocks in [s], besides how they were put together, at which both move alike.
+        reference: The reference.
+        log: The log.
+        lag: An offset of the clocks in [s], added to their alignment, at which both motions are most similar.
     """
     with threadpool_limits(1, "blas"):  # blocks of rows run side by side already
         question = build_question(matched, reference, log)
-        length = _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
+        length = compared.tolerance(LENGTHS, DEFAULT_TOLERANCE)
         if reason := _tells_nothing(question):
-            diagnosis = _nothing(deviation, question, reason, length if reference.run is log.run else 0.0)
+            diagnosis = _nothing(compared, question, reason, length if reference.run is log.run else 0.0)
         else:
-            diagnosis = _diagnosed(deviation, question, lag)
+            diagnosis = _diagnosed(compared, question, lag, timed=log.run.timed)
         return ask_both_sides(diagnosis, matched, reference, log, length)
 
 
-def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> Diagnosis:
-    model, timed = question.model, deviation.run.timed
+def _diagnosed(compared: Compared, question: Question, lag: float | None, *, timed: bool) -> Diagnosis:
+    model = question.model
     edits = (*question.edits, *_later(question, timed=timed))
     starts = tuple(_late(model, lag))
     search, result = _found(
-        Search(model, edits, _floor(deviation, question), question.forced, starts, timed=timed)
+        Search(model, edits, _floor(compared, question), question.forced, starts, timed=timed)
     )
-    given = question.names, question.own_names, partial(_breaks, deviation)
+    given = question.names, question.own_names, partial(_breaks, compared)
     built = ExplanationBuilder(search, result, *given)
     while weak := built.insignificant():
         result = search.without(result, weak)
@@ -120,18 +152,18 @@ def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> D
     if left > WORSE * before or not built.explains(WORTH):  # what was fitted on some rows may leave more
         causes, undecided, state, after, left = (), (), search.zero, built.before, before
     turns = any(edit.kind == "turns" for edit in state.edits)  # these the joints alone tell
-    if isinstance(model, JointsModel) and model.chain is not None and not turns and not _judged(deviation):
-        least = FLOOR * _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
+    if isinstance(model, JointsModel) and model.chain is not None and not turns and not _judged(compared):
+        least = FLOOR * compared.tolerance(LENGTHS, DEFAULT_TOLERANCE)
         apart = residual(model, search.zero, np.arange(model.rows))
         equal = rms(apart.T) <= float(np.linalg.norm(question.rounding)) + EQUAL
         if before <= least or left > before + least or (equal and not causes):
             words = ELSEWHERE if before > least else SAME if equal else ALIKE
-            return _nothing(deviation, question, words, tested=True)
+            return _nothing(compared, question, words, tested=True)
     unnamed = search.usual and all(cause.kind != "own_geometry" for cause in causes)
     return Diagnosis(
-        name=deviation.name,
-        verdict=deviation.verdict,
-        seen={name: share.value for name, share in deviation.shares.items()},
+        name=compared.name,
+        verdict=compared.verdict,
+        seen=dict(compared.shares),
         samples=model.rows,
         unit=model.unit,
         rms=before,
@@ -139,13 +171,13 @@ def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> D
         undecided=undecided,
         refused=built.refused(),
         not_looked_for=question.not_looked_for,
-        remainder=_remainder(deviation, model, left, OWN if unnamed else ""),
+        remainder=_remainder(compared, model, left, OWN if unnamed else ""),
         sample=model.sample,
         mended=question.sign * after.T,
     )
 
 
-def _remainder(deviation: Deviation, model: Model, left: float, words: str) -> Remainder:
+def _remainder(compared: Compared, model: Model, left: float, words: str) -> Remainder:
     """Return what stays of a whole deviation, root mean squares in [m] or [rad].
 
     Where it is out of tolerance, and more than half of how far the reference moves about its mean, no cause
@@ -154,7 +186,7 @@ def _remainder(deviation: Deviation, model: Model, left: float, words: str) -> R
     wanted = model.wanted(np.arange(model.rows))
     moves = rms((wanted - np.nanmean(wanted, axis=1, keepdims=True)).T)
     kinds = ("joint",) if model.of_joints else LENGTHS
-    tolerance = _tolerance(deviation, kinds, DEFAULT_TOLERANCE)
+    tolerance = compared.tolerance(kinds, DEFAULT_TOLERANCE)
     different = left > max(tolerance, UNLIKE * moves)
     return Remainder(left, UNRELATED if different else words, different)
 
@@ -203,34 +235,28 @@ def _found(search: Search) -> tuple[Search, SearchResult]:
     return (own, own.find()) if len(taken) >= MANY and structure else (search, result)
 
 
-def _judged(deviation: Deviation) -> bool:
-    """Tell whether the joints themselves have a tolerance."""
-    return any(statistic.kind == "joint" and statistic.tolerance for statistic in deviation.all_statistics)
+def _judged(compared: Compared) -> bool:
+    """Return whether the joints have a tolerance."""
+    return any(limit.kind == "joint" and limit.tolerance for limit in compared.limits)
 
 
-def _floor(deviation: Deviation, question: Question) -> FloatArray:
+def _floor(compared: Compared, question: Question) -> FloatArray:
     """Return what means nothing, of each component in [m] or [rad]: a share of the tolerance, or rounding."""
-    length = _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
-    turn = _tolerance(deviation, ("angle",), length / ARM)
+    length = compared.tolerance(LENGTHS, DEFAULT_TOLERANCE)
+    turn = compared.tolerance(("angle",), length / ARM)
     if isinstance(question.model, JointsModel):
-        joint = _tolerance(deviation, ("joint",), length / ARM)
+        joint = compared.tolerance(("joint",), length / ARM)
         least = np.full(len(question.model.blocks), joint)
     else:
         least = np.where(question.model.blocks == 0, length, turn)
     return np.maximum(FLOOR * least, question.rounding)
 
 
-def _tolerance(deviation: Deviation, kinds: tuple[str, ...], otherwise: float) -> float:
-    """Return the least tolerance of some kinds in [m] or [rad]."""
-    every = deviation.all_statistics
-    return min((one.tolerance for one in every if one.kind in kinds and one.tolerance), default=otherwise)
-
-
-def _breaks(deviation: Deviation, made: FloatArray, joints: bool, along: bool) -> bool:
+def _breaks(compared: Compared, made: FloatArray, joints: bool, along: bool) -> bool:
     """Tell whether a deviation in [m] or [rad], shape (k, n), is out of tolerance.
 
     Args:
-        deviation: The comparison.
+        compared: The result of the comparison.
         made: What a cause makes.
         joints: Whether it is of joints; else of positions.
         along: Whether it is along the path, and no distance from it.
@@ -240,12 +266,14 @@ def _breaks(deviation: Deviation, made: FloatArray, joints: bool, along: bool) -
         return False
     largest = np.abs(known).max(axis=1).tolist()
     if joints:
-        sizes = dict(zip(deviation.joint_statistics, largest, strict=True))
+        names = (limit.quantity for limit in compared.limits if limit.kind == "joint")
+        sizes = dict(zip(names, largest, strict=True))
     else:
         norm = float(np.sqrt((known**2).sum(axis=0).max()))
         sizes = {**dict(zip("xyz", largest, strict=True)), "norm": norm, "path": 0.0 if along else norm}
-    every = deviation.all_statistics
-    return any(one.tolerance and sizes.get(one.quantity, 0.0) > one.tolerance for one in every)
+    return any(
+        limit.tolerance and sizes.get(limit.quantity, 0.0) > limit.tolerance for limit in compared.limits
+    )
 
 
 def _tells_nothing(question: Question) -> str:
@@ -262,12 +290,12 @@ def _tells_nothing(question: Question) -> str:
 
 
 def _nothing(
-    deviation: Deviation, question: Question, reason: str, tolerance: float = 0.0, *, tested: bool = False
+    compared: Compared, question: Question, reason: str, tolerance: float = 0.0, *, tested: bool = False
 ) -> Diagnosis:
     """Return a diagnosis that names nothing, and says why.
 
     Args:
-        deviation: The comparison.
+        compared: The result of the comparison.
         question: What was compared with what.
         reason: Why nothing can be told.
         tolerance: By how much the tool that a log recorded may be off in [m]; one that agrees is then a
@@ -282,9 +310,9 @@ def _nothing(
         dict.fromkeys([*(g.kind for g in model.groups), *(e.kind for edits in question.edits for e in edits)])
     )
     return Diagnosis(
-        name=deviation.name,
-        verdict=deviation.verdict,
-        seen={name: share.value for name, share in deviation.shares.items()},
+        name=compared.name,
+        verdict=compared.verdict,
+        seen=dict(compared.shares),
         samples=model.rows,
         unit=model.unit,
         rms=before,

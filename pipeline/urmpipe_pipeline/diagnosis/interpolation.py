@@ -12,7 +12,7 @@ part of a verdict, but it is no cause: causes are fitted to cubics through the s
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,10 +20,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_pipeline.diagnosis.motion import STENCIL, Motion, five_point_rates
 from urmpipe_pipeline.joint_log import gaps_behind
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
-
-if TYPE_CHECKING:  # a comparison contains its diagnosis: no ring between the two
-    from urmpipe_pipeline.comparison.matching import Matched
-    from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.trajectories import Matched, Trajectory
 
 MAX_NOISE_GAIN = 12.0  # rate times step: 0.95 at even times, 5.6 at an end; above, samples are too close
 REFINEMENT = 4.0  # error at twice the step / error: 16 if smooth, 4 where the acceleration jumps

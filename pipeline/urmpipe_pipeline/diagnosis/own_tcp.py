@@ -14,19 +14,15 @@ itself may have another zero than its controller assumes.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from urmpipe_pipeline.diagnosis.causes import OwnTcp, rms
 from urmpipe_pipeline.diagnosis.result import Diagnosis
-from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.recorded_tcp import RecordedPoses, distances_from_recorded
 from urmpipe_pipeline.sources.units.evidence import CLEARLY
-
-if TYPE_CHECKING:  # a comparison contains its diagnosis: no ring between the two
-    from urmpipe_pipeline.comparison.matching import Matched
+from urmpipe_pipeline.trajectories import Matched, Side
 
 NOT_SHOWN = (
     "time_lag", "clock_drift", "servo_lag", "joint_lag", "compliance", "backlash", "sag", "turns",

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,10 +41,7 @@ from urmpipe_pipeline.runs.reading_errors import (
     unit_edits,
 )
 from urmpipe_pipeline.runs.run import Run
-
-if TYPE_CHECKING:  # a comparison holds its diagnosis: no ring between the two
-    from urmpipe_pipeline.comparison.matching import Matched
-    from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.trajectories import Matched, Side, Trajectory
 
 AT_REST = 3e-4
 """What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
@@ -69,22 +65,6 @@ JOINTS = (
 )  # fmt: skip
 FRAMES = ("base_shift", "base_rotation", "tool_shift", "tool_rotation")
 TIME = ("time_lag", "clock_drift", "servo_lag", "joint_lag", "compliance", "backlash")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Side:
-    """One side of a comparison.
-
-    Attributes:
-        run: The log or the path.
-        trajectory: Where it was, as it was compared.
-        by_joints: Whether that is by its joints and a robot, or by their values alone; else it is
-            where the run recorded itself.
-    """
-
-    run: Run
-    trajectory: Trajectory
-    by_joints: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +97,7 @@ class Question:
 def build_question(matched: Matched, reference: Side, log: Side) -> Question:
     """Return what two sides, at the same times, allow to be asked."""
     if reference.run.timed and reference.run is not log.run:
-        reference = replace(reference, trajectory=reference.trajectory.rows_with_value())
+        reference = reference._replace(trajectory=reference.trajectory.rows_with_value())
     if reference.by_joints and log.by_joints and matched.reference_q is not None:
         return _of_joints(matched, reference, log)
     if log.by_joints or reference.by_joints:

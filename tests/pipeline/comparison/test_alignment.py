@@ -23,11 +23,11 @@ from urmpipe_pipeline.comparison.alignment import RESOLVED, as_option, placed
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import deviation_facts
-from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Advice
-from urmpipe_pipeline.runs.ingest import on_robot
+from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.trajectories import Alignment, AlignMode
 
 ROUNDING = 1e-12
 """Positions of some metres round at 1e-15, a fit over hundreds of them at some tens of that."""

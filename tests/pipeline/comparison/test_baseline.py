@@ -22,8 +22,8 @@ from urmpipe_pipeline.comparison.baseline import DEFAULT_NOISE, against_baseline
 from urmpipe_pipeline.comparison.baseline_section import worse_words
 from urmpipe_pipeline.comparison.change import Absent, Difference
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.text import json_ready
+from urmpipe_pipeline.json_values import json_ready
+from urmpipe_pipeline.trajectories import Sync
 
 Compared = Callable[..., Comparison]
 

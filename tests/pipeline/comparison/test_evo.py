@@ -21,13 +21,13 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.ingest import ingest_log, run_of
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
+from urmpipe_pipeline.trajectories import AlignMode
 
 METRES = 1e-12
 """Positions of some metres, turned and moved: some tens of rounding errors of 1e-15 m."""

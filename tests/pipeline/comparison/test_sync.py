@@ -21,9 +21,9 @@ from urmpipe_pipeline.comparison.sync import sync_doubts, synchronise
 from urmpipe_pipeline.comparison.sync_coarse import mean_rates, similarity
 from urmpipe_pipeline.comparison.sync_fine import line_at
 from urmpipe_pipeline.comparison.sync_views import views
-from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import load_runs
+from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory
 
 Motion = Callable[[FloatArray], FloatArray]
 

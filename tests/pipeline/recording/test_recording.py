@@ -20,12 +20,12 @@ from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.joint_log import Inference, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.trajectories import AlignMode
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
