@@ -41,7 +41,7 @@ def of_recording(
 
     It pictures it every second, until a function finds the picture done or the viewer has had its time.
     """
-    from urmpipe_pipeline.recording.store import TIME, Opening
+    from urmpipe_pipeline.recording.layout import TIME, Opening
     from urmpipe_pipeline.recording.viewer import open_window, openings
 
     draw_in_software()

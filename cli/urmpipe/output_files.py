@@ -20,7 +20,7 @@ from urmpipe_pipeline.outputs import (
     refuse_output,
 )
 from urmpipe_pipeline.presentation.result import Result
-from urmpipe_pipeline.recording import import_ahead
+from urmpipe_pipeline.recording import preload_writer
 from urmpipe_pipeline.results import write_recording
 
 Made = TypeVar("Made", bound=Result)
@@ -81,7 +81,7 @@ def guarded_outputs(named: Mapping[OutputKind, PathLike | None], inputs: Sequenc
     _refuse_shared(targets)
     map_collecting_errors(lambda one: refuse_output(one[1], inputs, one[0]), targets.items())
     if "recording" in targets:
-        import_ahead()
+        preload_writer()
     with all_or_none():
         yield Outputs(targets, inputs)
 

@@ -18,7 +18,7 @@ import pytest
 
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import ViewerError, shell_quote
-from urmpipe_pipeline.recording.viewer import refuse_without_display
+from urmpipe_pipeline.recording.viewer import check_display
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
@@ -44,7 +44,7 @@ def test_without_a_display_it_says_what_to_do(urmpipe: RunCommand, monkeypatch: 
 
 def test_the_commands_for_another_computer_can_be_pasted() -> None:
     with pytest.raises(ViewerError) as caught:
-        refuse_without_display([Path("a.rrd"), Path("joint 3.rrd")], {}, "linux")
+        check_display([Path("a.rrd"), Path("joint 3.rrd")], {}, "linux")
     files = f"a.rrd {shell_quote('joint 3.rrd')}"
     assert str(caught.value) == NO_DISPLAY.replace("run.rrd", files)
 
@@ -52,7 +52,7 @@ def test_the_commands_for_another_computer_can_be_pasted() -> None:
 def refused(environment: dict[str, str], platform: str) -> bool:
     """Tell whether there is no display to show a recording on."""
     try:
-        refuse_without_display([Path("run.rrd")], environment, platform)
+        check_display([Path("run.rrd")], environment, platform)
     except ViewerError:
         return True
     return False
@@ -74,7 +74,7 @@ def test_where_there_is_a_display_it_is_used(environment: dict[str, str], platfo
 
 def test_an_empty_variable_is_no_display() -> None:
     with pytest.raises(ViewerError) as caught:
-        refuse_without_display([Path("run.rrd")], {"DISPLAY": ""}, "linux")
+        check_display([Path("run.rrd")], {"DISPLAY": ""}, "linux")
     assert str(caught.value) == NO_DISPLAY
 
 

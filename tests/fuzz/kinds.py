@@ -181,7 +181,8 @@ def recording(path: Path, made: Path, rng: Random) -> None:
 @contextmanager
 def forged(path: Path, made: Path) -> Iterator[Path]:
     """Let a recording have other metadata with a checksum that fits, its arrays as they were."""
-    from urmpipe_pipeline.recording.store import Store, checksum
+    from urmpipe_pipeline.recording.layout import checksum
+    from urmpipe_pipeline.recording.reader import Store
 
     name, _, text = path.read_text("utf-8", "replace").partition("\n")
     opened = Store.__init__

@@ -11,7 +11,7 @@ from tests.fuzz.corpus import LOG, PATHS, TARGETS, fmus
 def make(folder: Path) -> None:
     """Make recordings, tables that are no text, a map, a URDF and an FMU in a folder."""
     import urmpipe
-    from urmpipe_pipeline.recording.store import Store
+    from urmpipe_pipeline.recording.reader import Store
 
     warnings.simplefilter("ignore")
     (folder / "path.csv").write_text(PATHS["contour.csv"])

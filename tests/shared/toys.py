@@ -12,7 +12,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS
 from urmpipe_pipeline.presentation.section import Presentation, Section
-from urmpipe_pipeline.recording.store import Opening
+from urmpipe_pipeline.recording.layout import Opening
 from urmpipe_pipeline.recording.views.blueprint import send_views
 from urmpipe_pipeline.recording.writer import write_result
 

@@ -1,6 +1,7 @@
 """Open recordings in the viewer that was installed with Rerun, each paused where its verdict was decided.
 
-One window a recording: within one, the viewer shows all recordings of a program in the layout of the first.
+Each recording has a window: in one window, the viewer shows all recordings of a program in the layout of the
+first. The viewer is started on a free port of the loopback address, and is asked over it to open the file.
 """
 
 from __future__ import annotations
@@ -18,21 +19,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urmpipe_models.errors import ViewerError, map_collecting_errors, shell_quote
-from urmpipe_pipeline.recording.store import TIME, Opening, Store
+from urmpipe_pipeline.recording.layout import TIME, Opening
+from urmpipe_pipeline.recording.reader import Store
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
-LOOPBACK = "127.0.0.1"
-"""The only address that the viewer listens on: a recording is nobody else's business."""
-
-PATIENCE = 60.0
-"""Time in [s] that the viewer has to start and to open a recording."""
-
-GRACE = 5.0
-"""Time in [s] that a window has to close when it is asked to."""
-
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+LOOPBACK = "127.0.0.1"  # the only address that the viewer listens on: no other computer sees the recording
+START_TIMEOUT = 60.0  # [s] for the viewer to start and to open a recording
+EXIT_TIMEOUT = 5.0  # [s] for a window to close
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # environment variables
 
 
 class _ClosedError(ViewerError):
@@ -48,14 +44,14 @@ def view_recordings(paths: Sequence[Path]) -> None:
         paths: Recordings (.rrd) that urmpipe wrote, at least one.
 
     Raises:
-        RecordingError: With every file that is none.
+        RecordingError: With every file that is no recording of urmpipe.
         ViewerError: If there is no display, or the viewer does not start.
     """
-    opened = openings(paths)
-    refuse_without_display(paths, os.environ)
+    at = openings(paths)
+    check_display(paths, os.environ)
     with ExitStack() as windows:
         processes = []
-        for path, opening in opened.items():
+        for path, opening in at.items():
             with suppress(_ClosedError):
                 processes.append(windows.enter_context(open_window(path, opening))[0])
         for process in processes:
@@ -63,23 +59,23 @@ def view_recordings(paths: Sequence[Path]) -> None:
 
 
 def openings(paths: Sequence[Path]) -> dict[Path, Opening]:
-    """Return at which time, or in which row, each recording opens.
+    """Return the time, or the row, at which each recording opens.
 
     Raises:
-        RecordingError: With every file that is no recording of urmpipe's.
+        RecordingError: With every file that is no recording of urmpipe.
     """
     return dict(zip(paths, map_collecting_errors(lambda path: Store(path).opening, paths), strict=True))
 
 
-def refuse_without_display(
+def check_display(
     paths: Sequence[Path], environment: Mapping[str, str], platform: str = sys.platform
 ) -> None:
     """Raise a `ViewerError` that says what to do if there is no display for a window.
 
     Args:
-        paths: What is to be opened.
-        environment: The environment's variables.
-        platform: As `sys.platform` tells it: others than Linux always have a display.
+        paths: Recordings to open.
+        environment: Environment variables.
+        platform: `sys.platform`; platforms other than Linux always have a display.
     """
     if not platform.startswith("linux") or any(environment.get(name) for name in DISPLAYS):
         return
@@ -98,22 +94,24 @@ def open_window(
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
     """Run the viewer with a recording open in it, paused at a time or a row; close it at the end.
 
-    Without a window (headless), such as to take a picture, it needs a Vulkan driver, be it in software.
+    Without a window (headless), such as to take a picture, it needs a Vulkan driver, at least in software.
 
     Yields:
-        The viewer's process, and what it is controlled by.
+        The process of the viewer, and the client that controls it.
 
     Raises:
         ViewerError: If it does not start.
     """
     with run_viewer(headless=headless) as (process, url):
-        yield process, _shown(process, url, path, opening)
+        yield process, _open_recording(process, url, path, opening)
 
 
 @contextmanager
 def run_viewer(*, headless: bool = False) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """Run the viewer, maybe without a window, and yield its process and the address it will listen on."""
-    port = _free_port()
+    """Run the viewer, with or without a window, and yield its process and its address."""
+    with socket.socket() as free:
+        free.bind((LOOPBACK, 0))
+        port = int(free.getsockname()[1])
     options = ["--bind", LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
     command = [str(_program()), *options, *(["--headless"] if headless else [])]
     quiet = subprocess.DEVNULL
@@ -122,17 +120,12 @@ def run_viewer(*, headless: bool = False) -> Iterator[tuple[subprocess.Popen[byt
     try:
         yield process, f"rerun+http://{LOOPBACK}:{port}/proxy"
     finally:
-        _end(process)
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the viewer, and wait until it is gone."""
-    process.terminate()
-    try:
-        process.wait(GRACE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+        process.terminate()
+        try:
+            process.wait(EXIT_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 def _program() -> Path:
@@ -142,23 +135,16 @@ def _program() -> Path:
     return Path(rerun_cli.__file__).parent / ("rerun.exe" if sys.platform == "win32" else "rerun")
 
 
-def _free_port() -> int:
-    """Return a port that nobody listens on."""
-    with socket.socket() as free:
-        free.bind((LOOPBACK, 0))
-        return int(free.getsockname()[1])
-
-
-def _shown(process: subprocess.Popen[bytes], url: str, path: Path, opening: Opening) -> ViewerClient:
-    """Wait until the viewer shows the recording where it opens, and return what it is controlled by."""
+def _open_recording(process: subprocess.Popen[bytes], url: str, path: Path, opening: Opening) -> ViewerClient:
+    """Wait until the viewer shows the recording where it opens, and return the client that controls it."""
     from rerun.experimental import ViewerClient
 
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + START_TIMEOUT
     while process.poll() is None and time.monotonic() < end:
         try:
             client = ViewerClient.connect(url)
             client.open(str(path.resolve()))
-            while not _stands(client, opening) and time.monotonic() < end:
+            while not _is_paused_at(client, opening) and time.monotonic() < end:
                 time.sleep(0.1)
             return client
         except OSError:  # it does not listen yet, or has just ended
@@ -166,19 +152,19 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, opening: Open
     code = process.poll()
     if code == 0:
         raise _ClosedError(f"the window was closed before it showed {path}")
-    how = f"did not answer within {PATIENCE:.0f} s" if code is None else f"ended with exit code {code}"
+    how = f"did not answer within {START_TIMEOUT:.0f} s" if code is None else f"ended with exit code {code}"
     raise ViewerError(
         f"the viewer {how}, allowed: a display and a graphics driver that it can use; to see its messages:"
         f" {shell_quote(_program())} {shell_quote(path)}"
     )
 
 
-def _stands(client: ViewerClient, opening: Opening) -> bool:
-    """Tell whether the viewer stands somewhere, and put it there if not: it must know the timeline first."""
+def _is_paused_at(client: ViewerClient, opening: Opening) -> bool:
+    """Return whether the viewer is paused there; if not, move it there, once it knows the timeline."""
     timeline, at = opening
-    for one in client.get_state().recordings:
-        if any(known.name == timeline for known in one.timelines):
-            if (one.current_timeline, one.current_time) == opening:
+    for recording in client.get_state().recordings:
+        if any(known.name == timeline for known in recording.timelines):
+            if (recording.current_timeline, recording.current_time) == opening:
                 return True
             if timeline == TIME:
                 client.set_time(timeline, duration=np.timedelta64(at, "ns"), play_state="paused")

@@ -135,11 +135,11 @@ TOY = st.builds(
 def round_trip(value: Any) -> Any:
     """Return a value that went through JSON and the bytes of its arrays."""
     found = encode(value)
-    paths = [one.at for one in found.columns]
+    paths = [one.path for one in found.arrays]
     assert len(set(paths)) == len(paths)
     stored = {
-        one.at: (one.values.shape, one.values.dtype, np.asarray(one.values).tobytes())
-        for one in found.columns
+        one.path: (one.values.shape, one.values.dtype, np.asarray(one.values).tobytes())
+        for one in found.arrays
     }
 
     def array_of(at: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -185,7 +185,7 @@ def one_part(name: str, n: int) -> Part:
 
 def test_an_array_stands_at_the_path_of_its_field_on_the_nearest_times() -> None:
     parts = one_part("matlab", 3), one_part("a b/c", 4), one_part("matlab", 5)
-    found = {one.at: one for one in encode(small_toy(parts=parts, poses=np.zeros((3, 2, 2)))).columns}
+    found = {one.path: one for one in encode(small_toy(parts=parts, poses=np.zeros((3, 2, 2)))).arrays}
     assert found["/parts/matlab/values"].t_ns is parts[0].t_ns
     assert found["/parts/a_b_c/flags"].t_ns is parts[1].t_ns
     assert found["/parts/matlab-2/values"].values is parts[2].values
@@ -197,8 +197,8 @@ def test_an_array_stands_at_the_path_of_its_field_on_the_nearest_times() -> None
 
 def test_a_field_may_say_where_its_array_stands() -> None:
     one = Placed(np.arange(3), np.ones((3, 2)))
-    assert [column.at for column in encode(one).columns] == ["/t_ns", "/deep/values"]
-    assert encode(one).columns[1].t_ns is one.t_ns
+    assert [column.path for column in encode(one).arrays] == ["/t_ns", "/deep/values"]
+    assert encode(one).arrays[1].t_ns is one.t_ns
     assert_same(round_trip(one), one)
 
 
@@ -206,14 +206,14 @@ def test_an_array_in_two_places_is_kept_once() -> None:
     both = np.zeros((3, 3))
     toy = small_toy(poses=both, lone=both)
     found = encode(toy)
-    assert [one.at for one in found.columns] == ["/poses", "/labels"]
-    assert (found.entity_of(both), found.entity_of(toy.labels)) == ("/poses", "")
+    assert [one.path for one in found.arrays] == ["/poses", "/labels"]
+    assert (found.path_of(both), found.path_of(toy.labels)) == ("/poses", "")
 
 
 def test_many_records_and_many_plain_values_stand_as_columns() -> None:
     rows = tuple(Row(f"r{i % 3}", "ab"[i % 2], i, i / 7, i % 2 == 0) for i in range(100))  # type: ignore[arg-type]
     found = encode(small_toy(rows=rows, notes={"n": tuple(map(str, range(100)))}))
-    columns = {one.at: one.values for one in found.columns}
+    columns = {one.path: one.values for one in found.arrays}
     assert columns["/rows/share"].tolist() == [one.share for one in rows]
     assert found.tree["rows"]["$columns"]["name"]["$text"] == ["r0", "r1", "r2"]
     assert found.tree["rows"]["$columns"]["mixed"] == [None] * 100
@@ -291,7 +291,7 @@ def test_what_the_types_do_not_allow_is_refused_in_one_line(
 ) -> None:
     rows = tuple(Row("r", "a", i, i / 7, True) for i in range(100))
     found = encode(small_toy(rows=rows))
-    arrays_of = {one.at: one.values for one in found.columns}
+    arrays_of = {one.path: one.values for one in found.arrays}
     tree = json.loads(json.dumps(found.tree))
     spoil(tree)
     with pytest.raises(CodecError) as caught:

@@ -18,8 +18,9 @@ from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_ours, is_recording
 from urmpipe_pipeline.recording.codec import encode
-from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store, checksum, document
-from urmpipe_pipeline.recording.verify import verify
+from urmpipe_pipeline.recording.layout import LAYOUT_VERSION, checksum, metadata_json
+from urmpipe_pipeline.recording.reader import Store
+from urmpipe_pipeline.recording.writer import verify
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.run import Run
 
@@ -94,7 +95,7 @@ def test_a_recording_to_replace_is_known_without_rerun(make_run: MakeRun, tmp_pa
     """Rerun takes long to import, which is done beside the work: not before it begins."""
     path = write_recording(make_run(), tmp_path / "run.rrd")
     script = (
-        "import sys; from pathlib import Path; from urmpipe_pipeline.recording.identity import is_ours;"
+        "import sys; from pathlib import Path; from urmpipe_pipeline.recording.file_check import is_ours;"
         "print(is_ours(Path(sys.argv[1])), 'rerun' in sys.modules)"
     )
     done = subprocess.run(
@@ -143,15 +144,15 @@ def test_a_recording_of_another_layout_says_how_to_make_it_again(
         ("{", "found damaged metadata (JSONDecodeError("),
         ("[]", "found damaged metadata (TypeError("),
         ("{}", "found damaged metadata (KeyError('layout_version'))"),
-        (document("", {}), "found a result of kind '', allowed: run, comparison, diagnosis, simulation"),
-        (document("run", None), "found damaged metadata, /: found None, allowed: Run"),
-        (document("run", {"name": 1}), "found damaged metadata, /name: found 1, allowed: str"),
+        (metadata_json("", {}), "found a result of kind '', allowed: run, comparison, diagnosis, simulation"),
+        (metadata_json("run", None), "found damaged metadata, /: found None, allowed: Run"),
+        (metadata_json("run", {"name": 1}), "found damaged metadata, /name: found 1, allowed: str"),
         (
-            document("run", {}, {"/q": "/q"}),
+            metadata_json("run", {}, {"/q": "/q"}),
             "found damaged metadata, /clocks: found {'/q': '/q'}, allowed: the paths of times",
         ),
         (
-            document("run", {"name": "a"}),
+            metadata_json("run", {"name": "a"}),
             "found damaged metadata, /: found None, allowed: the field log of Run",
         ),
     ],
@@ -171,7 +172,7 @@ def test_a_recording_with_damaged_metadata(tmp_path: Path, metadata: str, reason
 )
 def test_a_recording_without_an_array(make_run: MakeRun, rows: int, said: str, tmp_path: Path) -> None:
     """As `rerun rrd optimize` leaves it when the end of the data is lost."""
-    metadata = document("run", encode(make_run(rows=3)).tree)
+    metadata = metadata_json("run", encode(make_run(rows=3)).tree)
     path = foreign(tmp_path / "less.rrd", "urmpipe", told(metadata), rows=rows)
     assert trouble(path) == said
 
@@ -261,15 +262,15 @@ def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp
     metadata = Store(path).metadata
     verify(path, path, found, metadata)
     altered, rows = [], iter((0, 39_999, 20_000))
-    for column in found.columns:
+    for column in found.arrays:
         values = column.values.copy()
-        if column.at == "/runs/coppeliasim/run/log/q":
+        if column.path == "/runs/coppeliasim/run/log/q":
             values = values[:-1]
-        elif column.at.endswith(("/qd", "/tcp/position", "/coppeliasim/delta")):
+        elif column.path.endswith(("/qd", "/tcp/position", "/coppeliasim/delta")):
             values[next(rows), 0] += 1e-12
-        altered.append(replace(column, values=values))
+        altered.append(column._replace(values=values))
     with pytest.raises(OutputError) as caught:
-        verify(path, Path("name.rrd"), replace(found, columns=tuple(altered)), "{}")
+        verify(path, Path("name.rrd"), found._replace(arrays=tuple(altered)), "{}")
     assert str(caught.value).splitlines() == [
         f"name.rrd: differs when read back: {one}"
         for one in (
@@ -289,7 +290,7 @@ def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:-20])
     found = encode(run)
     with pytest.raises(OutputError) as caught:
-        verify(path, Path("name.rrd"), found, document("run", found.tree))
+        verify(path, Path("name.rrd"), found, metadata_json("run", found.tree))
     assert str(caught.value).startswith(
         "name.rrd: could not be read back: found a recording that was cut off"
     )

@@ -27,7 +27,8 @@ from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.presentation.scene import Arm
-from urmpipe_pipeline.recording.store import ROW, TIME, Store
+from urmpipe_pipeline.recording.layout import ROW, TIME
+from urmpipe_pipeline.recording.reader import Store
 from urmpipe_pipeline.recording.views.geometry import (
     POSES,
     ball,

@@ -21,7 +21,7 @@ from urmpipe_models.errors import Voice
 from urmpipe_pipeline import results
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation, Section
-from urmpipe_pipeline.recording.store import SLICE
+from urmpipe_pipeline.recording.layout import SLICE
 from urmpipe_pipeline.results import Kind, read_recording, write_recording
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -112,7 +112,7 @@ def test_arrays_are_read_when_they_are_used(tmp_path: Path) -> None:
             assert everything(rows[part]) == everything(array[part])
         columns = (slice(10, 20), *[slice(1, None)] * (array.ndim - 1))
         assert everything(rows[columns]) == everything(array[columns])
-        assert rows._whole is None
+        assert rows._loaded is None
         assert everything(rows[array > 0]) == everything(array[array > 0])
         assert everything(rows) == everything(array)
     assert_same(np.diff(back.t_ns), np.diff(wanted.t_ns))
@@ -140,5 +140,5 @@ def test_a_simulation_is_opened_without_its_signals(
 ) -> None:
     wanted = make_simulation(50)
     back: Any = read_recording(write_recording(wanted, tmp_path / "a.rrd"), lazy=True)
-    assert all(one.values._whole is None for one in back.signals)
+    assert all(one.values._loaded is None for one in back.signals)
     assert_same(back.to_dict() | {"recording": None}, wanted.to_dict())

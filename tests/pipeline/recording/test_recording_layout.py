@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.figure import Drawing, Figure, Text, View
 from urmpipe_pipeline.presentation.scene import Path as Way
 from urmpipe_pipeline.presentation.scene import Scene
 from urmpipe_pipeline.presentation.section import Column, Event, Presentation, Section, Table
-from urmpipe_pipeline.recording.store import Opening
+from urmpipe_pipeline.recording.layout import Opening
 from urmpipe_pipeline.recording.viewer import openings
 from urmpipe_pipeline.recording.views.blueprint import EVENTS_SHARE, LINE_SHARE, PEEK, SEEN_AT_ONCE
 from urmpipe_pipeline.results import write_recording

@@ -223,7 +223,7 @@ def test_of_very_many_rows_only_what_is_plotted_stands_by_itself(
     one = toy()
     rows, plotted = len(one.values), shown(figure(panel(one)))
     assert len(columns(recorded(shown(), tmp_path, one), "/values", SCALARS)) == rows
-    monkeypatch.setattr(writer, "MANY", rows - 1)
+    monkeypatch.setattr(writer, "MAX_PLOTTED_ROWS", rows - 1)
     assert len(columns(recorded(plotted, tmp_path, one), "/values", SCALARS)) == rows
     bare = recorded(shown(), tmp_path, one)
     assert len(columns(bare, "/values", PACKED)) == 1 and not columns(bare, "/values", SCALARS)

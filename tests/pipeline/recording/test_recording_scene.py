@@ -25,7 +25,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.scene import ArmMark, Balls, Scene, Spot
 from urmpipe_pipeline.presentation.scene import Path as Way
-from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.recording.reader import Store
 from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.recording.views.geometry import drawn_arm, drawn_path, extent
 from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH, bodies_over_log, own_shapes

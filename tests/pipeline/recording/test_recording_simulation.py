@@ -22,7 +22,7 @@ from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording.store import SLICE
+from urmpipe_pipeline.recording.layout import SLICE
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 

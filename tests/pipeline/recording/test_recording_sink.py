@@ -11,7 +11,7 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from urmpipe_pipeline.recording.sink import Sink, write_into
+from urmpipe_pipeline.recording.writer import Sink, write_into
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.run import Run
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from urmpipe_pipeline.recording.codec import schema
-from urmpipe_pipeline.recording.store import LAYOUT_VERSION
+from urmpipe_pipeline.recording.layout import LAYOUT_VERSION
 from urmpipe_pipeline.results import KINDS
 
 KEPT = Path(__file__).with_name("schema.txt")

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from urmpipe_pipeline.presentation.figure import Figure, Text
 from urmpipe_pipeline.presentation.section import Event, Presentation, Section
-from urmpipe_pipeline.recording.sending import keys, shown_path
-from urmpipe_pipeline.recording.store import ROW, TIME, Opening
+from urmpipe_pipeline.recording.layout import ROW, TIME, Opening, keys, shown_path
 from urmpipe_pipeline.recording.views.axes import LOW, TALL, whole_axis
 from urmpipe_pipeline.recording.views.events import events_view
 from urmpipe_pipeline.recording.views.plots import EntityOf, Plots

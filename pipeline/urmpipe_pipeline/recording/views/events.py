@@ -9,8 +9,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Event
-from urmpipe_pipeline.recording.sending import times_at
-from urmpipe_pipeline.recording.store import ROW, TIME
+from urmpipe_pipeline.recording.layout import ROW, TIME, times_at
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

@@ -14,7 +14,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.presentation.curves import decimate
 from urmpipe_pipeline.presentation.figure import Computed, Line, Mark, Panel, Shape, View
 from urmpipe_pipeline.presentation.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
-from urmpipe_pipeline.recording.sending import scalar_column, times_at
+from urmpipe_pipeline.recording.layout import scalar_column, times_at
 from urmpipe_pipeline.recording.views.axes import TALL, UNITLESS, factor_of, shown_unit, span_with_numbers
 from urmpipe_pipeline.text import encodable
 

@@ -20,7 +20,7 @@ from urmpipe_pipeline.presentation.palette import (
     value_colours,
 )
 from urmpipe_pipeline.presentation.scene import ArmMark, Arrows, Balls, Scene, Spot, ball_sizes
-from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
+from urmpipe_pipeline.recording.layout import VIEW_ROOT, keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import eye_axes, eye_distance, seen
 from urmpipe_pipeline.recording.views.geometry import (
     DrawnArm,
@@ -83,7 +83,7 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
         return None
     points = extent(arm, ghosts, paths, targets, scene.arrows, scene.balls, scene.solids, scene.moving_lines)
     size = ball(points)[1]
-    stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    stream.log(VIEW_ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     labelled = [one for one in scene.arms if one.label]
     row = opens_row(scene, opens_at_ns) if labelled else 0
     labels = drawn_labels(labelled, 2.0 * size, row)
@@ -144,7 +144,7 @@ def _view(scene: Scene, points: FloatArray, hidden: Sequence[str]) -> Spatial3DV
     position, up = centre + distance * eye_axes(plane)[:, 2], (0.0, 0.0, 1.0) if plane is None else plane.up
     eye = rrb.EyeControls3D(position=position, look_target=centre, eye_up=up)
     return rrb.Spatial3DView(
-        origin=ROOT,
+        origin=VIEW_ROOT,
         contents=shown_path("scene") + "/**",
         name=encodable(scene.title),
         eye_controls=eye,

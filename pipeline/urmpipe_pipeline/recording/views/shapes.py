@@ -16,7 +16,7 @@ from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.presentation.meshes import MEDIA_TYPES, drawable
 from urmpipe_pipeline.presentation.palette import NEUTRAL_COLOUR, rgb
-from urmpipe_pipeline.recording.sending import keys, shown_path
+from urmpipe_pipeline.recording.layout import keys, shown_path
 
 if TYPE_CHECKING:
     from rerun import AsComponents, RecordingStream, TimeColumn

@@ -15,7 +15,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.presentation.palette import rgb
 from urmpipe_pipeline.presentation.scene import Motion, MovingLines, PlaneView, Scene, Solid
-from urmpipe_pipeline.recording.sending import keys, shown_path, times_at
+from urmpipe_pipeline.recording.layout import keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import eye_axes
 from urmpipe_pipeline.recording.views.tracks import drawn_rows, whole_rows
 from urmpipe_pipeline.text import encodable
