@@ -166,9 +166,9 @@ def _page(result: Any) -> str | None:
 def _draw(result: Result, title: str | None, width: str | float, font: float) -> Any:
     """Return a figure of a result."""
     from urmpipe_pipeline.figures.plot import plot
-    from urmpipe_pipeline.results import present, whole
+    from urmpipe_pipeline.results import enclosing_result, present
 
-    return plot(present(whole(result)), title, width, font)
+    return plot(present(enclosing_result(result)), title, width, font)
 
 
 Displayable.page = staticmethod(_page)

@@ -21,7 +21,7 @@ ROW_NS = 1_000_000_000
 """How much of `t_ns` a row without a time counts: `t` is then the number of the row from 0, and no time."""
 
 
-OWN = "urmpipe"
+URMPIPE_SOURCE = "urmpipe"
 """The source of a file that urmpipe wrote: a joint log of inverse kinematics, or a plan."""
 
 
@@ -39,7 +39,7 @@ PASSED_OVER = "columns-passed-over"
 """The kind of the warning about columns that were not read because others were: `--strict` accepts it."""
 
 
-def seconds(nanoseconds: IntArray) -> FloatArray:
+def ns_to_seconds(nanoseconds: IntArray) -> FloatArray:
     """Return integer `nanoseconds` as [s], each rounded once, of the same shape."""
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)
 
@@ -231,7 +231,7 @@ class JointLog(Displayable):
     @property
     def t(self) -> FloatArray:
         """Time from the first row in [s], shape (n,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @property
     def clock_start(self) -> float:
@@ -308,7 +308,7 @@ class JointLog(Displayable):
                 roles |= {name: (role, i) for i, name in enumerate(names)}
                 units |= dict(zip(names, own, strict=True))
         frame = pd.DataFrame(columns)
-        frame.attrs[OWN] = {"columns": roles, "units": units}  # by which `ingest` reads it again
+        frame.attrs[URMPIPE_SOURCE] = {"columns": roles, "units": units}  # by which `ingest` reads it again
         return frame
 
     def _groups(self) -> Iterator[tuple[Role, Sequence[str], Sequence[str], FloatArray | None]]:
@@ -349,13 +349,13 @@ MISSED_SAMPLE = 1.5
 unseen there."""
 
 
-def gaps_behind(t_ns: IntArray) -> BoolArray:
+def has_gap_after(t_ns: IntArray) -> BoolArray:
     """Return which rows at integer times in [ns], shape (n,), have a gap behind them, shape (n - 1,)."""
     step = np.diff(t_ns)
     return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
 
 
-def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
+def is_inside_gap(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
     """Return which times lie strictly inside a gap between two known ones, shape (n,).
 
     Both are integer times in [ns], of shape (n,) and, rising, (k,).
@@ -363,5 +363,5 @@ def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
     if len(known_ns) < 2:
         return np.zeros(len(at_ns), dtype=np.bool_)
     after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
-    wide = gaps_behind(known_ns)[after - 1]
+    wide = has_gap_after(known_ns)[after - 1]
     return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))

@@ -27,11 +27,11 @@ from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.networks.network_motion import NetworkMotion
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
-from urmpipe_pipeline.repolarization.audit import turning
-from urmpipe_pipeline.repolarization.interval import refuse_unknown
-from urmpipe_pipeline.results import kind_of, read_recording
+from urmpipe_pipeline.repolarization.audit import is_revolute
+from urmpipe_pipeline.repolarization.interval import check_joint_names
+from urmpipe_pipeline.results import read_recording, result_kind
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.motion import run_of_block
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -42,18 +42,18 @@ from urmpipe_pipeline.text import counted
 
 JUDGED = "found the recording of {}, allowed: one that ingest wrote"
 
-OF_A_BLOCK = Hint("block", None, "takes the motion of a block", call="compare")
+BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
 
-WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
+BASELINE_HINT = Hint("baseline", None, "compares it, alone, with an earlier one")
 
-MadeRun: TypeAlias = Run | SolvedTargets | PlannedPath | NetworkMotion
-MADE_RUNS: tuple[type[MadeRun], ...] = (Run, SolvedTargets, PlannedPath, NetworkMotion)
+RunLike: TypeAlias = Run | SolvedTargets | PlannedPath | NetworkMotion
+RUN_LIKE: tuple[type[RunLike], ...] = (Run, SolvedTargets, PlannedPath, NetworkMotion)
 """Results that are a run, or have one."""
 
-Operand: TypeAlias = Path | Held | MadeRun | Simulation
+Operand: TypeAlias = Path | Held | RunLike | Simulation
 """What stands for a run, or is read as one."""
 
-LARGEST = 1e12
+MAX_VALUE = 1e12
 """In [m] or [rad]: the last digit of a double beyond is 0.1 mm, and powers of it overflow in a comparison."""
 
 Given = TypeVar("Given")
@@ -68,7 +68,7 @@ def load_runs(
     tsp: float | None = None,
     derivative: Method | None = None,
     block: str | Sequence[str] | None = None,
-    judged: Sequence[Hint] = (WITH_BASELINE,),
+    judged: Sequence[Hint] = (BASELINE_HINT,),
     unjudged: list[Unjudged] | None = None,
 ) -> list[Run]:
     """Return the runs of several operands, or both sides of one log; the reading options hold for every log.
@@ -102,7 +102,7 @@ def load_runs(
                 return _refuse_huge(_read(made, replace(read, side=side), robot, tsp, derivative))
             if isinstance(made, Simulation):
                 return _refuse_huge(run_of_block(made, blocks.next(), robot))
-            return _refuse_huge(on_robot(made.as_run(), robot))
+            return _refuse_huge(with_robot(made.as_run(), robot))
         except LogError as error:  # of several operands, each is named
             name = str(operand) if isinstance(operand, Path) else None
             raise LogError(*(replace(one, file=one.file or name) for one in error.findings)) from error
@@ -128,14 +128,14 @@ def load_runs(
 
 
 def _refuse_huge(run: Run) -> Run:
-    """Return a run; raise a `LogError` with each column of its log that has values beyond `LARGEST`."""
+    """Return a run; raise a `LogError` with each column of its log that has values beyond `MAX_VALUE`."""
     log = run.log
     positions = [] if log.tcp_position is None else [*zip(("x", "y", "z"), log.tcp_position.T, strict=True)]
     faults = []
     for name, values in (*zip(log.joints, log.q.T, strict=True), *positions):
-        rows = np.flatnonzero(np.abs(values) > LARGEST)
+        rows = np.flatnonzero(np.abs(values) > MAX_VALUE)
         if len(rows):
-            said = f"found {values[rows[0]]:g} (in SI) and {len(rows) - 1} more, allowed: up to {LARGEST:g}"
+            said = f"found {values[rows[0]]:g} (in SI) and {len(rows) - 1} more, allowed: up to {MAX_VALUE:g}"
             faults.append(Finding(said.replace(" and 0 more", ""), row=int(rows[0]) + 1, column=name))
     if faults:
         raise LogError(*faults)
@@ -217,7 +217,7 @@ def _refuse_sides(operands: Sequence[Operand], sides: tuple[str, str]) -> None:
 def _on_one_arm(runs: Sequence[Run]) -> list[Run]:
     """Return runs of which those without an arm have the one that another singles out."""
     arm = next((run.robot for run in runs if run.robot), None)
-    return [on_robot(run, arm) if run.log.joints and run.robot is None else run for run in runs]
+    return [with_robot(run, arm) if run.log.joints and run.robot is None else run for run in runs]
 
 
 def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
@@ -236,8 +236,8 @@ def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
 
 def _refuse_unturned(read: ReadOptions, runs: Sequence[Run]) -> None:
     """Raise an `OptionError` with each joint that is given an interval, and that turns in no run."""
-    turn = (name for run in runs for name in compress(run.log.joints, turning(run.log, run.robot)))
-    refuse_unknown(read.interval, turn)
+    turn = (name for run in runs for name in compress(run.log.joints, is_revolute(run.log, run.robot)))
+    check_joint_names(read.interval, turn)
 
 
 def _names(operands: Sequence[Operand], runs: Sequence[Run | UrmpipeError]) -> list[str]:
@@ -258,18 +258,18 @@ def _names(operands: Sequence[Operand], runs: Sequence[Run | UrmpipeError]) -> l
     return [named(*each) for each in zip(own, files, stems, strict=True)]
 
 
-def _recorded(operand: Path, judged: Sequence[Hint]) -> MadeRun | Simulation:
+def _recorded(operand: Path, judged: Sequence[Hint]) -> RunLike | Simulation:
     """Return the result of a recording that a run can be made of, or raise a `RecordingError`: what it is."""
     result = read_recording(operand)
-    if isinstance(result, (MADE_RUNS, Simulation)):
+    if isinstance(result, (RUN_LIKE, Simulation)):
         return result
     hints = judged if isinstance(result, Comparison) else ()
     raise RecordingError(
-        Finding(JUDGED.format(kind_of(result).with_article), str(operand), hints=tuple(hints))
+        Finding(JUDGED.format(result_kind(result).with_article), str(operand), hints=tuple(hints))
     )
 
 
-def run_of_recording(
+def recording_to_run(
     files: Sequence[Path | Held], robot: Chain | None, reading: Mapping[str, object]
 ) -> Run | None:
     """Return the run of a recording, on another arm if one is given; None of logs, which are to be read.
@@ -289,15 +289,15 @@ def run_of_recording(
     if len(files) > 1:
         said = "found a recording among files of one log, allowed: it alone, or the files"
         raise RecordingError(*(Finding(said, str(one)) for one in recordings))
-    refuse_reading(reading)
+    reject_reading_options(reading)
     made = _recorded(recordings[0], ())
     if isinstance(made, Simulation):
         said = JUDGED.format("a simulation")
-        raise RecordingError(Finding(said, str(recordings[0]), hints=(OF_A_BLOCK,)))
-    return on_robot(made.as_run(), robot)
+        raise RecordingError(Finding(said, str(recordings[0]), hints=(BLOCK_HINT,)))
+    return with_robot(made.as_run(), robot)
 
 
-def refuse_reading(reading: Mapping[str, object]) -> None:
+def reject_reading_options(reading: Mapping[str, object]) -> None:
     """Raise an `OptionError` with all keywords that say how a log is read, as there is none to be read."""
     unused = [name for name, value in reading.items() if value is not None and value is not False]
     if unused:

@@ -37,7 +37,7 @@ class Provenance:
     defaults: tuple[str, ...] = ()
 
 
-def provenance(
+def build_provenance(
     command: str, options: Mapping[str, Any], inputs: Sequence[SourceFile], defaults: tuple[str, ...] = ()
 ) -> Provenance:
     """Return the provenance of a result made now; options that were left at None are left out."""
@@ -46,7 +46,7 @@ def provenance(
     return Provenance(command, given, tuple(dict.fromkeys(inputs)), dict(_versions()), created, defaults)
 
 
-def defaults_words(made: Provenance) -> str:
+def format_defaults(made: Provenance) -> str:
     """Return what a verdict's line adds of options from files: "; sync=auto from ../urmpipe.toml"."""
     return "".join(f"; {one}" for one in made.defaults)
 
@@ -61,7 +61,7 @@ NAMED = 3
 """Logs that an assumption names; more are only counted."""
 
 
-def assumed(found: Iterable[tuple[str, str]], every: Collection[str] = ()) -> tuple[str, ...]:
+def list_assumptions(found: Iterable[tuple[str, str]], every: Collection[str] = ()) -> tuple[str, ...]:
     """Return assumptions, each once, with the logs that it is about where these are not all of them.
 
     Args:
@@ -82,6 +82,6 @@ def _named(names: Sequence[str]) -> str:
     return ", ".join(names) if len(names) <= NAMED else f"{len(names)} logs"
 
 
-def assuming(assumptions: Sequence[str]) -> str:
+def format_assumptions(assumptions: Sequence[str]) -> str:
     """Return what a verdict's line ends with: ", assuming the joints are in deg"; perhaps nothing."""
     return f", assuming {' and '.join(assumptions)}" if assumptions else ""

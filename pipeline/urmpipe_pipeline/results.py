@@ -80,12 +80,12 @@ def is_result(value: Any) -> TypeGuard[Result]:
     return any(kind.cls is type(value) for kind in KINDS)
 
 
-def kind_of(result: Result) -> Kind:
+def result_kind(result: Result) -> Kind:
     """Return the kind of a result."""
     return next(kind for kind in KINDS if kind.cls is type(result))
 
 
-def whole(result: Result) -> Result:
+def enclosing_result(result: Result) -> Result:
     """Return what is recorded and reported of a result: of a diagnosis the comparison that it stands in."""
     return (result.comparison if isinstance(result, Diagnosis) else None) or result
 
@@ -104,8 +104,8 @@ def write_recording(
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
-    shown = whole(result)
-    write_result(shown, kind_of(shown).name, present(shown), path, inputs, progress)
+    shown = enclosing_result(result)
+    write_result(shown, result_kind(shown).name, present(shown), path, inputs, progress)
     return path
 
 
@@ -125,7 +125,7 @@ def read_recording(path: Path, *, lazy: bool = False) -> Result:
 
 def present(result: Result) -> Presentation:
     """Return what a result shows."""
-    shown = kind_of(result).present(result)
+    shown = result_kind(result).present(result)
     return replace(shown, recording=result.recording.name) if result.recording else shown
 
 
@@ -135,7 +135,7 @@ def exports(result: Result) -> Exports:
     Raises:
         OptionError: If nothing can.
     """
-    kind = kind_of(result)
+    kind = result_kind(result)
     if kind.exports is None:
         raise OptionError(f"{kind.with_article} has no tables")
     return kind.exports(result)

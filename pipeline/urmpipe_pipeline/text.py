@@ -222,22 +222,22 @@ def without_apostrophe(cell: str) -> str:
     return cell[1:] if cell.startswith(tuple(f"'{sign}" for sign in _FORMULA)) else cell
 
 
-def json_ready(value: Any) -> Any:
+def to_json_value(value: Any) -> Any:
     """Return a value as JSON can hold it: arrays as lists, NaN and infinities as null."""
     if isinstance(value, Mapping):
-        return {str(key): json_ready(item) for key, item in value.items()}
+        return {str(key): to_json_value(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [json_ready(item) for item in value]
+        return [to_json_value(item) for item in value]
     if isinstance(value, np.ndarray):
-        return json_ready(value.tolist())
+        return to_json_value(value.tolist())
     if isinstance(value, np.generic):
-        return json_ready(value.item())
+        return to_json_value(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value
 
 
-def parsed_json(written: str | bytes) -> Any:
+def parse_json(written: str | bytes) -> Any:
     """Return the value that JSON holds.
 
     Raises:
@@ -249,6 +249,6 @@ def parsed_json(written: str | bytes) -> Any:
         raise ValueError("nested too deep") from None
 
 
-def plain(value: Any) -> str:
+def format_option_value(value: Any) -> str:
     """Return an option's value as one line: text as it is, the rest as JSON."""
-    return value if isinstance(value, str) else json.dumps(json_ready(value), ensure_ascii=False)
+    return value if isinstance(value, str) else json.dumps(to_json_value(value), ensure_ascii=False)

@@ -20,7 +20,7 @@ from urmpipe_models.hand_eye import UnobservableDirection
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.math3d import rotation_angle, slerp, to_quaternions
 from urmpipe_models.wraps import unwrap_quaternions
-from urmpipe_pipeline.joint_log import NETWORK, SourceFile, seconds
+from urmpipe_pipeline.joint_log import NETWORK, SourceFile, ns_to_seconds
 from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
 from urmpipe_pipeline.runs.run import Run
 
@@ -73,7 +73,7 @@ class Trajectory:
     @property
     def t(self) -> FloatArray:
         """Times in [s], shape (m,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @property
     def has_value(self) -> BoolArray:

@@ -18,7 +18,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.text import json_ready
+from urmpipe_pipeline.text import to_json_value
 
 Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2], [-1.0, 0.5, -0.2, 1.0, -0.8, 2.0]])
 ARM = urmpipe.load_robot("arm6")
@@ -150,7 +150,7 @@ def test_arrays_with_times_are_a_path() -> None:
     assert with_times.path is not None
     assert with_times.to_dict()["targets"][0]["t"] == 5.0
     assert with_times.to_frame()["t"].tolist() == pytest.approx((5.0 + 0.01 * np.arange(30)).tolist())
-    assert json.loads(json.dumps(json_ready(by_period.to_dict())))["verdict"] == "pass"
+    assert json.loads(json.dumps(to_json_value(by_period.to_dict())))["verdict"] == "pass"
 
 
 def test_a_path_tells_where_it_comes_nearest_to_a_singular_pose() -> None:

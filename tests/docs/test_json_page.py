@@ -23,7 +23,7 @@ from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simulation
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
@@ -100,7 +100,7 @@ def test_each_key_of_a_simulation_is_named() -> None:
         name="system", description="", t_ns=t_ns, step=0.005,
         signals=(Signal("meter", "energy_in", np.zeros(2), "J"),),
         system_svg="", system_text="", blocks=(block,), failed=None, warnings=(LogWarning("gap", "a gap"),),
-        provenance=provenance("simulate", {}, ()),
+        provenance=build_provenance("simulate", {}, ()),
         verdicts=tuple(filter(None, [delta_verdict("meter", t_ns, np.zeros((2, 3)), {"axis": 1.0})])),
     )  # fmt: skip
     found = keys(simulation.to_dict())

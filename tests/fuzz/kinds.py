@@ -77,7 +77,7 @@ def robot(path: Path, made: Path, rng: Random) -> None:
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
     from urmpipe_pipeline.presentation.meshes import missing_visuals
-    from urmpipe_pipeline.runs.torques import mass_notices
+    from urmpipe_pipeline.runs.torques import mass_warnings
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     tip = "tool0" if path.suffix == ".urdf" and b"tool0" in path.read_bytes() else None
@@ -85,7 +85,7 @@ def robot(path: Path, made: Path, rng: Random) -> None:
     for one in (
         *missing_visuals(chain),
         *start_warnings(chain, np.array(chain.start), "q"),
-        *mass_notices(chain),
+        *mass_warnings(chain),
     ):
         one.format("command line")
     json.dumps(chain_at(chain, chain.start).to_dict(), default=str)

@@ -15,7 +15,7 @@ from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.meshes import drawable, missing_visuals
-from urmpipe_pipeline.runs.ingest import kinematics
+from urmpipe_pipeline.runs.ingest import tcp_motion
 
 
 def test_one_warning_tells_of_all_meshes_that_are_missing(tmp_path: Path) -> None:
@@ -35,7 +35,7 @@ def test_one_warning_tells_of_all_meshes_that_are_missing(tmp_path: Path) -> Non
         )
     ]
     assert missing_visuals(replace(robot, visuals=visuals[:2])) == []
-    assert kinematics(robot, *(np.zeros((1, 1)),) * 3)[1] == missing_visuals(robot)
+    assert tcp_motion(robot, *(np.zeros((1, 1)),) * 3)[1] == missing_visuals(robot)
 
 
 def test_a_mesh_that_the_description_may_not_take_is_told_and_not_drawn(tmp_path: Path) -> None:

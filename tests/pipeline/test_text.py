@@ -10,7 +10,7 @@ from urmpipe_models.errors import shell_quote
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.comparison.wording import tolerance_words, used_words
-from urmpipe_pipeline.text import plain
+from urmpipe_pipeline.text import format_option_value
 
 
 @pytest.mark.parametrize(
@@ -41,8 +41,8 @@ def test_counts_lists_and_options() -> None:
     assert text.counted(0, "log") == "0 logs"
     assert text.enumerated(("a",)) == "a"
     assert text.enumerated(("a", "b", "c")) == "a, b and c"
-    assert plain("x") == "x"
-    assert plain((0.0, None, "é")) == '[0.0, null, "é"]'
+    assert format_option_value("x") == "x"
+    assert format_option_value((0.0, None, "é")) == '[0.0, null, "é"]'
 
 
 @pytest.mark.parametrize(

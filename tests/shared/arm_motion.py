@@ -8,7 +8,7 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.wraps import repolarize
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
-from urmpipe_pipeline.runs.plausibility import implausible
+from urmpipe_pipeline.runs.plausibility import plausibility_warnings
 
 KINDS = {"outlier-first", "outlier-last", "repeated-samples", "joint-limit", "speed-limit"}
 NO_STEPS = np.empty((0, 2), dtype=np.int64)
@@ -41,7 +41,7 @@ def found(
     turning = np.full(q.shape[1], not slides)
     fixed = repolarize(q, np.diff(t, prepend=0.0))
     before = fixed.q.copy()
-    warnings = implausible(log, fixed.q, robot, turning, fixed.unexplained, timed=timed)
+    warnings = plausibility_warnings(log, fixed.q, robot, turning, fixed.unexplained, timed=timed)
     np.testing.assert_array_equal(fixed.q, before)
     return warnings
 

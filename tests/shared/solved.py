@@ -11,7 +11,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets
 from urmpipe_pipeline.joint_log import SourceFile
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 FILE = SourceFile("targets.csv", "0" * 64, 123)
@@ -51,6 +51,6 @@ def solved(
         targets=forward_targets(chain, q) if targets is None else targets,
         solutions=Solutions(every, ("chosen", *(others or {})), texts), chosen=np.zeros(n, dtype=np.intp),
         miss=np.zeros((n, k)), angle=np.zeros((n, k)), every=others is not None, branches=None, path=None,
-        warnings=(), provenance=provenance("ik", {"robot": chain.name}, [FILE]),
+        warnings=(), provenance=build_provenance("ik", {"robot": chain.name}, [FILE]),
     )  # fmt: skip
     return replace(made, **rest)

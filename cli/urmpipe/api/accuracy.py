@@ -44,7 +44,7 @@ from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planning import joints_of, plan_path
 from urmpipe_pipeline.planned_paths.request import Law, Request, Timing, checked_timing, refuse_unlimited
 from urmpipe_pipeline.planned_paths.result import PlannedPath
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.solved_targets.request import JointValues, start_of
 
 VELOCITIES = tuple(round(0.1 * k, 1) for k in range(1, 11))
@@ -307,7 +307,7 @@ def _accuracy(
         loop_radius=radius,
         compiled=runs.compiled,
         warnings=(*given.warnings, *notes, *_warnings(motions, radius, speed)),
-        provenance=provenance("accuracy", options, [given.file] if given.file else []),
+        provenance=build_provenance("accuracy", options, [given.file] if given.file else []),
     )
 
 

@@ -32,18 +32,18 @@ from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 from urmpipe_pipeline.comparison.unjudged import Unjudged, judge_others
 from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import (
-    MADE_RUNS,
-    WITH_BASELINE,
-    MadeRun,
+    BASELINE_HINT,
+    RUN_LIKE,
+    RunLike,
     is_log,
     load_comparison,
     load_runs,
-    refuse_reading,
+    reject_reading_options,
 )
 from urmpipe_pipeline.outputs import OutputKind
-from urmpipe_pipeline.results import kind_of, present, read_recording
+from urmpipe_pipeline.results import present, read_recording, result_kind
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
+from urmpipe_pipeline.runs.recorded_tcp import MISSING_TOOL
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.given_targets import TargetsLike
@@ -52,7 +52,7 @@ from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 from urmpipe_pipeline.tables.table_csv import write_table
 from urmpipe_pipeline.trajectories import AlignMode
 
-Operand = PathLike | TableLike | MadeRun | Simulation
+Operand = PathLike | TableLike | RunLike | Simulation
 
 EARLIER = Hint("baseline", None, "sets one")
 
@@ -178,7 +178,7 @@ def compare(
         earlier = None if baseline is None else _earlier(baseline)
         load = partial(
             load_runs, sides=sides, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative,
-            block=block, judged=() if diagnose else (WITH_BASELINE,),
+            block=block, judged=() if diagnose else (BASELINE_HINT,),
         )  # fmt: skip
 
         def checked(made: Comparison) -> Comparison:
@@ -208,7 +208,7 @@ def operands_of(given: Mapping[str, Sequence[Any]], *further: type) -> list[Any]
     Raises:
         OptionError: With everything that is no operand.
     """
-    kinds = (*MADE_RUNS, Simulation, Held, *further)
+    kinds = (*RUN_LIKE, Simulation, Held, *further)
     named = {name: list(_with_tables(name.removesuffix("s"), operands)) for name, operands in given.items()}
     map_collecting_errors(lambda one: refuse_others(*one, kinds, OPERANDS), named.items())
     return [one for operands in named.values() for one in operands]
@@ -238,7 +238,7 @@ def _refuse_unused(operands: Sequence[Operand | Comparison], given: Mapping[str,
     """Raise an `OptionError` with all that says how logs are read, if every operand was ingested before."""
     logs = (Path(one) if isinstance(one, str) else one for one in operands)
     if not any(map(is_log, logs)):
-        refuse_reading(given)
+        reject_reading_options(given)
 
 
 def _noise_level(
@@ -256,7 +256,7 @@ def _noise_level(
 
 
 def _compared(
-    operands: Sequence[Path | str | Held | MadeRun | Simulation | Comparison],
+    operands: Sequence[Path | str | Held | RunLike | Simulation | Comparison],
     load: Callable[..., list[Run]],
     options: CompareOptions,
     checked: Callable[[Comparison], Comparison],
@@ -306,7 +306,7 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     refuse_foreign([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):
-        found = f"found a recording ({kind_of(result).name})"
+        found = f"found a recording ({result_kind(result).name})"
         raise RecordingError(
             Finding(f"{found}, allowed: that of a comparison", str(path), parameter="baseline")
         )
@@ -322,7 +322,7 @@ def _with_noise(made: Comparison, noise: Mapping[str, float]) -> Comparison:
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
-    explaining = (LACKING_TOOL, EXCHANGED, CLOCKS_DIFFER)  # a result, and no doubts about it
+    explaining = (MISSING_TOOL, EXCHANGED, CLOCKS_DIFFER)  # a result, and no doubts about it
     doubts = [w for w in result.warnings if w.kind not in explaining]
     refuse_warnings(strict, (*of_logs, *doubts))
 

@@ -23,7 +23,7 @@ from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
-from urmpipe_pipeline.operands import log_files, run_of_recording
+from urmpipe_pipeline.operands import log_files, recording_to_run
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
@@ -105,7 +105,7 @@ def ingest(
     outputs: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": write_map}
     kept = [*_paths(files), *map_files(reading), *paths(inputs)]
     with guarded_outputs(outputs, kept) as written:
-        run = run_of_recording(files, given.arm, unread) or ingest_log(
+        run = recording_to_run(files, given.arm, unread) or ingest_log(
             files, robot=given.arm, read=options, tsp=tsp, derivative=derivative, name=name or folder
         )
         refuse_warnings(strict, run.warnings)

@@ -12,7 +12,7 @@ from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.errors import map_collecting_errors
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Cell, Value
-from urmpipe_pipeline.results import present, read_recording, whole
+from urmpipe_pipeline.results import enclosing_result, present, read_recording
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -126,7 +126,7 @@ def report(
         number, one = numbered
         found = read_recording(Path(one), lazy=True) if isinstance(one, (str, Path)) else one
         reading(number / len(given))
-        return whole(found)
+        return enclosing_result(found)
 
     found = map_collecting_errors(read, enumerate(given, start=1))
     shown = [present(one) for one in found]

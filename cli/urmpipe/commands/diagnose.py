@@ -95,8 +95,8 @@ def _print(result: Diagnosis, replaces: bool) -> None:
     """Print the answer, what it rests on, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_pipeline.results import present, whole
+    from urmpipe_pipeline.results import enclosing_result, present
 
     print_presentation(present(result))
-    say(f"Verdict: {present(whole(result)).headline}")
+    say(f"Verdict: {present(enclosing_result(result)).headline}")
     print_recording(result.recording, replaced=replaces)

@@ -82,13 +82,13 @@ def show(
         chain_spots,
         projected,
     )
-    from urmpipe_pipeline.runs.torques import mass_notices
+    from urmpipe_pipeline.runs.torques import mass_warnings
     from urmpipe_pipeline.solved_targets.request import joint_values
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     chain = _placed(name, placing)
     values = joint_values(chain, chain.start if q is None else q, "q")
-    terminal.warn([*start_warnings(chain, values, "q"), *mass_notices(chain)])
+    terminal.warn([*start_warnings(chain, values, "q"), *mass_warnings(chain)])
     posed = chain_at(chain, values.tolist())
     if picture is not None:
         masses = chain_masses(chain, values)
@@ -120,7 +120,7 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
     from urmpipe_models.files import write_export
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
-    from urmpipe_pipeline.runs.torques import lost_in_urdf
+    from urmpipe_pipeline.runs.torques import urdf_mass_warning
 
     target = output or Path(f"{Path(name).stem}.urdf")
     writers = {".urdf": urdf_text, ".toml": robot_toml}
@@ -129,7 +129,7 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
         raise OptionError(Finding(parameter="output", found=format_value(str(target)), allowed=allowed))
     chain = _placed(name, placing)
     write_export(target, writers[target.suffix.lower()](chain), Path(name))
-    terminal.warn(lost_in_urdf(chain) if target.suffix.lower() == ".urdf" else [])
+    terminal.warn(urdf_mass_warning(chain) if target.suffix.lower() == ".urdf" else [])
     made = {"schema": 1, "robot": chain.name, "file": target}
     terminal.answer(lambda: made, lambda: say(f"Robot: {target}"))
     return 0

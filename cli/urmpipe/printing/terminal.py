@@ -30,9 +30,9 @@ PIPE_WIDTH = 120
 
 def print_json(value: Any) -> None:
     """Print one JSON object, NaN as null."""
-    from urmpipe_pipeline.text import json_ready
+    from urmpipe_pipeline.text import to_json_value
 
-    echo_json(json_ready(value), indent=2)
+    echo_json(to_json_value(value), indent=2)
 
 
 def echo_json(value: Any, indent: int | None = None) -> None:

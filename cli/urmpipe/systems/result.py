@@ -21,7 +21,7 @@ from urmpipe_models.measure_units import readings
 from urmpipe_models.toml_tables import quote_toml
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.coupling import coupling_warnings
 from urmpipe_pipeline.simulations.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation
 from urmpipe_pipeline.sources.tables.text import fingerprint
@@ -81,7 +81,7 @@ def simulation_of(plan: Plan, recorded: CosimulationRecord, blocks: Blocks, svg:
         blocks=tuple(_block(plan, one) for one in system.blocks),
         failed=recorded.failed,
         warnings=(*blocks.warnings, *blocks.between_samples(plan.step, plan.count), *notes, *_told(odd)),
-        provenance=provenance("simulate", given, _inputs([system.path, *blocks.files])),
+        provenance=build_provenance("simulate", given, _inputs([system.path, *blocks.files])),
         connections={str(one.connection.destination): str(one.connection.source) for one in plan.links},
         arms=tuple(_arms(plan, recorded, blocks)),
         verdicts=tuple(_verdicts(plan, recorded, odd)),

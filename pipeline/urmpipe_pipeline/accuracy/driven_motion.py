@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.delta import delta
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
-from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.joint_log import ns_to_seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class DrivenMotion:
     @property
     def t(self) -> FloatArray:
         """Times in [s], shape (n,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @cached_property
     def delta(self) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import Role
-from urmpipe_pipeline.provenance import assumed
+from urmpipe_pipeline.provenance import list_assumptions
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import run_label
 
@@ -26,4 +26,4 @@ def assumptions(sides: Sequence[tuple[Run, Collection[Role]]]) -> tuple[str, ...
     if asked:
         raise LogError(*(replace(one.as_finding(), file=run_label(run)) for run, one in asked))
     found = [(one.assumption, run.name) for run, one in rests_on if one.assumption]
-    return assumed(found, {run.name for run, _ in sides})
+    return list_assumptions(found, {run.name for run, _ in sides})

@@ -30,8 +30,8 @@ from urmpipe_pipeline.comparison.warnings import (
 from urmpipe_pipeline.diagnosis.diagnose import Compared, Limit, diagnose
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
 from urmpipe_pipeline.presentation.meshes import missing_visuals
-from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
+from urmpipe_pipeline.provenance import build_provenance
+from urmpipe_pipeline.runs.recorded_tcp import missing_tool_warning
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ
 from urmpipe_pipeline.trajectories import (
@@ -184,7 +184,9 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         told += recorded_apart((reference, *runs), RECORDED_APART)
     elif chosen.tcp == "fk":
         failed = [one for one in deviations if one.furthest.verdict == "fail"]
-        told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
+        told += [
+            hint.of(one.name) for one in failed for hint in missing_tool_warning(one.run.robot, one.run.log)
+        ]
     return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
 
 
@@ -359,7 +361,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     found = _comparison(recorded, [_deviation(*sides, chosen)], chosen, (), assumed)
     failed = any(one.furthest.verdict == "fail" for one in found.runs)
     asked, turned = failed and "tool" not in chosen.align, "angle" in chosen.tolerance
-    lacks = lacking_tool(run.robot, log, turned=turned) if asked else []
+    lacks = missing_tool_warning(run.robot, log, turned=turned) if asked else []
     return replace(found, warnings=(*found.warnings, *lacks))
 
 
@@ -394,7 +396,7 @@ def _comparison(
         tuple(deviations),
         dict(options.tolerance),
         tuple(warnings),
-        provenance("compare", {"tolerance": dict(options.tolerance), **made}, inputs, options.defaults),
+        build_provenance("compare", {"tolerance": dict(options.tolerance), **made}, inputs, options.defaults),
         assumptions=assumed,
         on_rows=True,
     )

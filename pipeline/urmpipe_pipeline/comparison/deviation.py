@@ -13,7 +13,7 @@ from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Voice
 from urmpipe_pipeline.diagnosis.result import Diagnosis
-from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.joint_log import ns_to_seconds
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import Alignment, Sync
 
@@ -215,7 +215,7 @@ class Deviation(Displayable):
     @property
     def t(self) -> FloatArray:
         """Times of the compared samples in [s], shape (m,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @property
     def axis_ns(self) -> IntArray | None:

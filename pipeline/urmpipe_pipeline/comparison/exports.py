@@ -24,7 +24,7 @@ from urmpipe_pipeline.presentation.exports import (
     Times,
     columns_of,
 )
-from urmpipe_pipeline.runs.exports import provenance_of, stamps
+from urmpipe_pipeline.runs.exports import clock_stamps, provenance_of
 from urmpipe_pipeline.text import encodable
 from urmpipe_pipeline.trajectories import joint_order
 
@@ -149,7 +149,7 @@ def _poses(comparison: Comparison) -> list[Poses]:
         raise RecordingError(Finding("a comparison of joints alone, so no pose", where))
     found = []
     for one in comparison.runs:
-        clock = stamps(one.run, one.t_ns)
+        clock = clock_stamps(one.run, one.t_ns)
         upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(clock), 1))
         prefix = "" if len(comparison.runs) == 1 else f"{one.name}-"
         found.append(Poses(f"{prefix}reference", clock, one.reference, upright))

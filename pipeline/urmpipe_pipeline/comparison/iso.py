@@ -28,7 +28,7 @@ from urmpipe_pipeline.iso9283.result import Cycle, FailedCycle, IsoTest
 from urmpipe_pipeline.iso9283.tables import failed_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR
-from urmpipe_pipeline.runs.run import part_of
+from urmpipe_pipeline.runs.run import slice_run
 from urmpipe_pipeline.trajectories import Side, Sync, Trajectory, match, reference_rows, run_finding
 
 FAILED = "failed-cycle"
@@ -225,7 +225,7 @@ def _part(side: Side, first: int, last: int, number: int) -> _Candidate:
     """Return a part of a log as what may be a cycle."""
     name = f"cycle {number}"
     part = Side(
-        part_of(side.run, first, last, name), _cut(side.trajectory, first, last, name), side.by_joints
+        slice_run(side.run, first, last, name), _cut(side.trajectory, first, last, name), side.by_joints
     )
     return _Candidate(part, _motion(part), first, last)
 

@@ -75,7 +75,7 @@ from urmpipe_pipeline.presentation.section import (
     Table,
     Value,
 )
-from urmpipe_pipeline.provenance import assuming, defaults_words
+from urmpipe_pipeline.provenance import format_assumptions, format_defaults
 from urmpipe_pipeline.runs.figures import times_of
 
 
@@ -116,7 +116,7 @@ def headline(result: Comparison, test: IsoTest) -> str:
     if result.baseline is not None:
         worse = f"{'and' if failed else 'but'} worse" if result.baseline.verdict == "fail" else "not worse"
         said += f", {worse} than the baseline {result.baseline.name}"
-    return said + assuming(result.assumptions) + defaults_words(result.provenance)
+    return said + format_assumptions(result.assumptions) + format_defaults(result.provenance)
 
 
 def _cycles(result: Comparison, test: IsoTest) -> str:

@@ -15,7 +15,7 @@ from urmpipe_pipeline.comparison.coverage import measure_shares
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Deviation
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
-from urmpipe_pipeline.joint_log import gaps_behind, seconds
+from urmpipe_pipeline.joint_log import has_gap_after, ns_to_seconds
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import ORIENTED, Matched, Trajectory, joint_mismatch, run_finding
@@ -44,14 +44,14 @@ def measure(
     values = np.column_stack(delta(_columns(matched.reference), _columns(matched.actual)))
     placed, path, angle = bool(np.isfinite(values).any()), values[:, 3], _angle(matched)
     if placed:
-        joined = ~gaps_behind(reference.t_ns) & run.timed  # nothing joins still poses
+        joined = ~has_gap_after(reference.t_ns) & run.timed  # nothing joins still poses
         joined[[] if reference.broken is None else reference.broken] = False
         path = distance_from_path(matched.actual, reference.position, joined)
         path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
     joint_delta, turns = _joint_delta(run, matched)
     _refuse_unheld(run, reference, tolerance, angle, joint_delta)
     in_space, of_joints = _in_space(values, path, angle) if placed else [], _of_joints(run, joint_delta)
-    t, sample = seconds(matched.t_ns), matched.sample
+    t, sample = ns_to_seconds(matched.t_ns), matched.sample
     if not run.timed:
         t = np.full_like(t, np.nan)
     statistics, joint_statistics = (
@@ -178,8 +178,8 @@ def _speed_by_positions(matched: Matched) -> FloatArray:
 
     NaN without a neighbour. Between two the slopes are weighted so that a parabola's is exact.
     """
-    step = np.diff(seconds(matched.t_ns))[:, np.newaxis]
-    joined = (np.diff(matched.sample) == 1) & ~gaps_behind(matched.t_ns)
+    step = np.diff(ns_to_seconds(matched.t_ns))[:, np.newaxis]
+    joined = (np.diff(matched.sample) == 1) & ~has_gap_after(matched.t_ns)
     slope = np.where(joined[:, np.newaxis], np.diff(matched.actual, axis=0) / step, 0.0)
     weight = np.where(joined[:, np.newaxis], 1.0 / step, 0.0)  # of the nearer neighbour the more
     none = np.zeros((1, 1))

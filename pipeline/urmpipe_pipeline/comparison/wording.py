@@ -12,7 +12,7 @@ from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, Statis
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
 from urmpipe_pipeline.presentation.digits import held, written
 from urmpipe_pipeline.presentation.section import Value
-from urmpipe_pipeline.provenance import assuming, defaults_words
+from urmpipe_pipeline.provenance import format_assumptions, format_defaults
 
 SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
 """The quantities of a deviation as people read them."""
@@ -30,7 +30,7 @@ def verdict_words(one: Comparison) -> str:
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
     lost = f"; not judged: {text.enumerated([log.name for log in one.unjudged])}" if one.unjudged else ""
-    return said + assuming(one.assumptions) + defaults_words(one.provenance) + lost
+    return said + format_assumptions(one.assumptions) + format_defaults(one.provenance) + lost
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_pipeline.diagnosis.motion import STENCIL, Motion, five_point_rates
-from urmpipe_pipeline.joint_log import gaps_behind
+from urmpipe_pipeline.joint_log import has_gap_after
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.trajectories import Matched, Trajectory
 
@@ -85,7 +85,7 @@ class Cubics:
 
 def _joined(t_ns: IntArray, broken: IntArray | None) -> BoolArray:
     """Return which samples a motion joins to the next one, shape (m - 1,)."""
-    joined = ~gaps_behind(t_ns)
+    joined = ~has_gap_after(t_ns)
     joined[[] if broken is None else broken] = False
     return joined
 

@@ -24,7 +24,7 @@ from urmpipe_pipeline.figures.letters import drawable
 from urmpipe_pipeline.figures.panels import in_unit
 from urmpipe_pipeline.figures.sheet import INCH, Sheet, em, fitting, sheet
 from urmpipe_pipeline.figures.size import Size
-from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.joint_log import ns_to_seconds
 from urmpipe_pipeline.presentation.curves import decimate, points_for
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
@@ -211,7 +211,7 @@ def _kept(path: Path) -> tuple[FloatArray, FloatArray, float | None, str]:
     unit, factor = text.SHOWN.get(path.unit, (path.unit, 1.0))
     values = np.full(len(position), np.nan) if path.values is None else factor * np.asarray(path.values[:])
     rows = np.arange(len(position)) if path.sample is None else np.asarray(path.sample[:])
-    t = np.asarray(rows + 1.0) if path.t_ns is None else seconds(path.t_ns[:])
+    t = np.asarray(rows + 1.0) if path.t_ns is None else ns_to_seconds(path.t_ns[:])
     columns = position if path.values is None else np.column_stack([position, values])
     kept = np.union1d(decimate(columns, points_for(path.t_ns), t), np.asarray(path.kept, dtype=np.int64))
     gaps = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)[kept]

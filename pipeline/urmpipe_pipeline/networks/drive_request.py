@@ -43,7 +43,7 @@ from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.rates import Rates, compute_rates
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import SourceFile, seconds
+from urmpipe_pipeline.joint_log import SourceFile, ns_to_seconds
 from urmpipe_pipeline.networks.given_values import (
     Quantity,
     Range,
@@ -63,7 +63,7 @@ from urmpipe_pipeline.networks.network_motion import (
     NetworkMotion,
     Transmission,
 )
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.runs.run import Run
 
 DEFAULT_STEPS = 200
@@ -226,7 +226,7 @@ def drive_network(
         transmission=tuple(_transmissions(mechanism, moved, driven, factors, scaled[:n], rates)),
         forces=_forces(mechanism, moved, driven, factors, wrenches, torques) if loaded else None,
         warnings=() if log is None else tuple(log.warnings),
-        provenance=provenance(
+        provenance=build_provenance(
             "network drive", _options(network, request, columns, log, point, wrenches), inputs
         ),
     )
@@ -349,8 +349,8 @@ def _drive_values(
             for part, rest in zip(parts, (constants, still, still), strict=True)
         )
         return values, rates, curvatures
-    duration = request.duration if request.duration is not None else float(seconds(t_ns)[-1])
-    shares, speed, curvature = compute_shares(request.law, seconds(t_ns) / duration)
+    duration = request.duration if request.duration is not None else float(ns_to_seconds(t_ns)[-1])
+    shares, speed, curvature = compute_shares(request.law, ns_to_seconds(t_ns) / duration)
     begin, end = np.array(ranges, dtype=np.float64).reshape(-1, 2).T
     change = end - begin
     return (
@@ -423,7 +423,7 @@ def _events(
     def event(
         kind: Any, pose: SingularPose | LimitStop, parts: dict[str, float], message: str
     ) -> MotionEvent:
-        t = float(np.interp(pose.s, np.arange(len(t_ns)), seconds(t_ns)))
+        t = float(np.interp(pose.s, np.arange(len(t_ns)), ns_to_seconds(t_ns)))
         values = dict(zip(driven.names, (pose.x[driven.places] * factors).tolist(), strict=True))
         return MotionEvent(kind, pose.s, t, values, parts, message.format(at=_at_words(driven, values)))
 

@@ -29,7 +29,7 @@ from urmpipe_models.networks.parts import exceeded_limits
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.networks.given_values import parse_start
 from urmpipe_pipeline.networks.result import Command, NetworkResult
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.text import allowed, in_words
 
 ROUNDED = 1e-4
@@ -130,7 +130,7 @@ def find_network(
             *_limit_warnings(network, found.assemblies),
             *unreached,
         ),
-        provenance=provenance(f"network {command}", options, inputs),
+        provenance=build_provenance(f"network {command}", options, inputs),
     )
 
 

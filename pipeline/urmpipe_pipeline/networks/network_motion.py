@@ -25,7 +25,7 @@ from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.rates import Taylor, point_motion
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import NETWORK, JointLog, LogColumn, LogWarning, seconds
+from urmpipe_pipeline.joint_log import NETWORK, JointLog, LogColumn, LogWarning, ns_to_seconds
 from urmpipe_pipeline.networks.motion_drawing import (
     MovingNetwork,
     motion_space_figure,
@@ -207,7 +207,7 @@ class NetworkMotion(Result):
     @property
     def t(self) -> FloatArray:
         """Times in [s], shape (n,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @property
     def complete(self) -> bool:

@@ -12,7 +12,7 @@ from urmpipe_models.math3d import COLUMN_NAMES
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.ingest import kinematics
+from urmpipe_pipeline.runs.ingest import tcp_motion
 from urmpipe_pipeline.runs.run import Run
 
 
@@ -47,7 +47,7 @@ def run_of_plan(
         rotation_form=None if quat_xyzw is None else "quat_xyzw",
         columns=tuple(_columns(chain, turned=quat_xyzw is not None)), warnings=warnings,
     )  # fmt: skip
-    tcp, noticed = kinematics(chain, q, qd, qdd)
+    tcp, noticed = tcp_motion(chain, q, qd, qdd)
     return Run(
         name=name, log=log, robot=chain, tsp=tsp, t_ns=t_ns, q=q, qd=qd, qdd=qdd, tcp=tcp,
         tcp_recorded=position, audit=(), warnings=(*warnings, *noticed), provenance=made,

@@ -12,7 +12,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.kinematics.singularity import SingularityLog, singularity_over_log
-from urmpipe_pipeline.runs.torques import torques_of_log
+from urmpipe_pipeline.runs.torques import compute_torques
 
 FOLLOWED = 1.0 + 1e-9
 """So much of a limit may be used: rounding."""
@@ -93,7 +93,7 @@ class PlannedJoints:
     @cached_property
     def tau(self) -> FloatArray | None:
         """Torques of the joints in [N.m] or [N], shape (n, joints); None of an arm without masses."""
-        return torques_of_log(self.chain, self.q, self.qd, self.qdd)
+        return compute_torques(self.chain, self.q, self.qd, self.qdd)
 
     @property
     def nearest_singularity(self) -> int | None:

@@ -23,15 +23,15 @@ from urmpipe_models.planning.joints import (
 )
 from urmpipe_models.planning.laws import PathMotion, TimeLaw, jerk_law, trapezoid_law
 from urmpipe_models.planning.path import EVEN_TURN_TOLERANCE, LineArcPath
-from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
 from urmpipe_pipeline.planned_paths.obstacles import WORTH_MOVING, Obstacle, obstacles_of, too_slow
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints
 from urmpipe_pipeline.planned_paths.request import Request, Timing
 from urmpipe_pipeline.planned_paths.result import PlannedPath
-from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.runs.run import torque_summaries
-from urmpipe_pipeline.runs.torques import MOVE_SLOWER, beyond_efforts
+from urmpipe_pipeline.provenance import build_provenance
+from urmpipe_pipeline.runs.run import summarise_torques
+from urmpipe_pipeline.runs.torques import MOVE_SLOWER, effort_warning
 from urmpipe_pipeline.text import NAMED, counted, rows_text
 from urmpipe_pipeline.text import seconds as in_seconds
 
@@ -98,7 +98,7 @@ def plan_path(
         t_ns=samples.t_ns, motion=samples.motion, segment_times=law.time_at(path.bounds),
         row_times=law.time_at(path.at), joints=samples.joints, obstacles=timed.obstacles,
         warnings=(*given.warnings, *_warnings(path, joints, timed), *_beyond_efforts(timed, samples)),
-        provenance=provenance("plan", options, [given.file] if given.file else []),
+        provenance=build_provenance("plan", options, [given.file] if given.file else []),
     )  # fmt: skip
 
 
@@ -186,7 +186,7 @@ def _sampled(path: LineArcPath, joints: PathJoints | None, law: TimeLaw, tsp: fl
         allowed = f"a period that makes up to {MOST} samples of {law.duration:.6g} s"
         raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
     t_ns = np.round(np.arange(count) * (tsp * 1e9)).astype(np.int64)
-    t = np.minimum(seconds(t_ns), law.duration)
+    t = np.minimum(ns_to_seconds(t_ns), law.duration)
     along = law.at(t)
     moves = np.append(np.ones(count - 1), 0.0)
     s = np.append(np.clip(along.s[:-1], 0.0, path.total), path.total)
@@ -226,7 +226,7 @@ def _beyond_efforts(timed: _Timed, samples: _Samples) -> list[LogWarning]:
     if joints is None or timed.obstacles or not any(math.isfinite(one.effort) for one in joints.chain.moving):
         return []
     names, t_ns = joints.chain.coordinates, samples.t_ns
-    return beyond_efforts(torque_summaries(names, joints.chain, t_ns, joints.tau), t_ns, MOVE_SLOWER)
+    return effort_warning(summarise_torques(names, joints.chain, t_ns, joints.tau), t_ns, MOVE_SLOWER)
 
 
 def _half_turns(path: LineArcPath) -> Iterator[LogWarning]:

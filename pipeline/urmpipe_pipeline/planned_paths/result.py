@@ -17,7 +17,7 @@ from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.laws import Arcs, PathMotion
 from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_pipeline.comparison.deviation import Verdict
-from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
 from urmpipe_pipeline.planned_paths.motion import run_of_plan
 from urmpipe_pipeline.planned_paths.obstacles import Obstacle
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
@@ -92,7 +92,7 @@ class PlannedPath(Result):
     @property
     def t(self) -> FloatArray:
         """Times in [s], shape (n,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @property
     def position(self) -> FloatArray:

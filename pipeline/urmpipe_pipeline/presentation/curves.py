@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.joint_log import ns_to_seconds
 from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel
 from urmpipe_pipeline.presentation.scene import BoolArray
 
@@ -96,7 +96,7 @@ def axis_of(panel: Panel) -> str:
 def across(panel: Panel, one: Line) -> FloatArray:
     """Return the times of a line in [s] or its row numbers from 1, shape (n,)."""
     t_ns = _times(panel, one)
-    return np.arange(1.0, len(one.values) + 1.0) if t_ns is None else seconds(t_ns[:])
+    return np.arange(1.0, len(one.values) + 1.0) if t_ns is None else ns_to_seconds(t_ns[:])
 
 
 def place_of(panel: Panel, at: int) -> float:

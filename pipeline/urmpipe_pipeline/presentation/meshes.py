@@ -7,7 +7,7 @@ from urllib.parse import unquote
 
 from urmpipe_models.arm.chain import FILE, PACKAGE_PATH, Chain, Mesh, Visual
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.text import parsed_json
+from urmpipe_pipeline.text import parse_json
 
 MEDIA_TYPES = {
     ".stl": "model/stl",
@@ -64,7 +64,7 @@ def missing_visuals(robot: Chain) -> list[LogWarning]:
 def _self_contained(path: Path) -> bool:
     """Tell whether a glTF file names no other file, which would not be in the recording."""
     try:
-        document = parsed_json(path.read_bytes())
+        document = parse_json(path.read_bytes())
         parts = [*document.get("buffers", []), *document.get("images", [])]
         return all(part.get("uri", "data:").startswith("data:") for part in parts)
     except (OSError, ValueError, TypeError, AttributeError):  # cannot be read, or is no glTF

@@ -15,7 +15,7 @@ from urmpipe_pipeline.presentation.palette import INK_COLOUR
 from urmpipe_pipeline.presentation.scene import Spot
 from urmpipe_pipeline.presentation.section import Cell, Column, Fact, Table, Value
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.text import plain
+from urmpipe_pipeline.text import format_option_value
 
 Item = TypeVar("Item")
 
@@ -112,7 +112,7 @@ def provenance_table(
 
 def option_words(name: str, value: Any, kinds: Mapping[str, str] | None = None) -> str:
     """Return the value of an option as one line, numbers with their units: "0.25 m/s", {"axis": "3.5 mm"}."""
-    return plain(_in_unit(value, name, {**OPTION_UNITS, **(kinds or {})}))
+    return format_option_value(_in_unit(value, name, {**OPTION_UNITS, **(kinds or {})}))
 
 
 def _in_unit(value: Any, name: str, units: Mapping[str, str]) -> Any:

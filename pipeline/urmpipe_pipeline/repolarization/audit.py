@@ -25,8 +25,12 @@ from urmpipe_models.wraps import (
     repolarize,
 )
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import MISSED_SAMPLE, Inference, JointLog, LogWarning, seconds
-from urmpipe_pipeline.repolarization.interval import double_turns, given_periods, said_intervals
+from urmpipe_pipeline.joint_log import MISSED_SAMPLE, Inference, JointLog, LogWarning, ns_to_seconds
+from urmpipe_pipeline.repolarization.interval import (
+    find_double_turn_joints,
+    interval_inferences,
+    wrap_periods,
+)
 from urmpipe_pipeline.sources.options import GivenInterval
 
 AuditKind = Literal["wrap", "in-between", "repaired", "unexplained", "ambiguous"]
@@ -89,7 +93,7 @@ NEAR = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Audited:
+class AuditResult:
     """A log's joints, repolarized, and what there is to say about it.
 
     Attributes:
@@ -137,7 +141,7 @@ def audit_log(
     *,
     interval: Mapping[str, GivenInterval] | None = None,
     repaired: bool = False,
-) -> Audited:
+) -> AuditResult:
     """Repolarize the joints that turn, on the file's own rows, and tell all about it.
 
     Args:
@@ -152,7 +156,7 @@ def audit_log(
     """
     given = interval or {}
     fixed, periods, limits = _repolarized(log, robot, given)
-    inferences, noticed = said_intervals(log, fixed, periods, given)
+    inferences, noticed = interval_inferences(log, fixed, periods, given)
     odd = _steps_to(log, *fixed.unexplained.T)
     between = _in_between(log, fixed, periods)
     unsure, speeds = _ambiguous(log, fixed, periods, limits, between)
@@ -170,7 +174,7 @@ def audit_log(
     ]
     unresolved = np.concatenate((odd.steps, unsure.steps))
     mended = np.column_stack((between.rows, between.joints))
-    return Audited(
+    return AuditResult(
         q=reinterpolate(fixed.q, log.t, mended) if repaired and len(mended) else fixed.q,
         entries=tuple(_entries(log, fixed, periods, kinds)),
         warnings=tuple(warnings),
@@ -184,10 +188,10 @@ def _repolarized(
     log: JointLog, robot: Chain | None, given: Mapping[str, GivenInterval]
 ) -> tuple[Repolarized, FloatArray, FloatArray]:
     """Repolarize the joints; return P of each and the largest speed of each too."""
-    turns = turning(log, robot)
-    periods = given_periods(log, turns.tolist(), given)
+    turns = is_revolute(log, robot)
+    periods = wrap_periods(log, turns.tolist(), given)
     limits = np.array([np.inf if robot is None else robot.moving[j].velocity for j in range(len(turns))])
-    dt = seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
+    dt = ns_to_seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
     fixed = repolarize(log.q, dt, period=periods, max_speed=limits)
     asked = [] if "" in given or not len(fixed.unexplained) else _doubled(log, fixed)
     doubled = [j for j in asked if log.joints[j] not in given]
@@ -197,7 +201,7 @@ def _repolarized(
     return fixed, periods, limits
 
 
-def turning(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
+def is_revolute(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
     """Tell which joints turn, by the robot or else the unit of their columns, shape (joints,)."""
     if robot is not None and log.joints:
         return np.array([joint.kind == "revolute" for joint in robot.moving])
@@ -220,9 +224,9 @@ def _doubled(log: JointLog, fixed: Repolarized) -> list[int]:
     speeds = np.zeros(len(log.joints))
     for j in np.unique(odd.joints):
         speeds[j] = _held_speed(log, fixed.q, int(j), odd.rows[odd.joints == j])
-    elapsed = seconds(log.t_ns[odd.rows] - log.t_ns[odd.before])
+    elapsed = ns_to_seconds(log.t_ns[odd.rows] - log.t_ns[odd.before])
     rest = NEAR * speeds[odd.joints] * elapsed + FULL_TURN / 100.0
-    return double_turns(log, fixed, odd.joints, odd.figures, np.minimum(rest, FULL_TURN / 2.0))
+    return find_double_turn_joints(log, fixed, odd.joints, odd.figures, np.minimum(rest, FULL_TURN / 2.0))
 
 
 def _in_between(log: JointLog, fixed: Repolarized, periods: FloatArray) -> _Places:
@@ -276,7 +280,7 @@ def _ambiguous(
         odd = fixed.unexplained[fixed.unexplained[:, 1] == j, 0]
         skipped = np.concatenate((odd, between.rows[between.joints == j], after))
         speeds[j] = limits[j] if np.isfinite(limits[j]) else _held_speed(log, fixed.q, j, skipped)
-        reached = speeds[j] * seconds(log.t_ns[after] - log.t_ns[before])
+        reached = speeds[j] * ns_to_seconds(log.t_ns[after] - log.t_ns[before])
         rows.append(after[reached > periods[j] / 2.0])
         joints.append(np.full(len(rows[-1]), j))
     at, on = np.concatenate(rows), np.concatenate(joints)
@@ -304,7 +308,7 @@ def _held_speed(log: JointLog, x: FloatArray, joint: int, skipped: IntArray) -> 
     Outliers do not count, nor do the steps to and from rows at which it does not move as a joint does.
     """
     present = np.flatnonzero(~np.isnan(x[:, joint]))
-    speed = np.abs(np.diff(x[present, joint])) / seconds(np.diff(log.t_ns[present]))
+    speed = np.abs(np.diff(x[present, joint])) / ns_to_seconds(np.diff(log.t_ns[present]))
     at = np.searchsorted(present, skipped)
     for steps in (at - 1, at):
         speed[steps[(steps >= 0) & (steps < len(speed))]] = 0.0
@@ -375,7 +379,7 @@ def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Itera
     if not len(unsure.rows):
         return
     gaps = np.unique(np.column_stack((unsure.rows, unsure.before)), axis=0)
-    passed = seconds(log.t_ns[gaps[:, 0]] - log.t_ns[gaps[:, 1]])
+    passed = ns_to_seconds(log.t_ns[gaps[:, 0]] - log.t_ns[gaps[:, 1]])
     longest, row = int(np.argmax(passed)), int(gaps[0, 0]) + 1
     fastest = {log.joints[j]: speeds[unsure.joints == j].max() for j in np.unique(unsure.joints).tolist()}
     joints = ", ".join(f"{name} (at {speed:.3g} rad/s)" for name, speed in fastest.items())

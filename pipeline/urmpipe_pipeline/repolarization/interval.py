@@ -36,7 +36,7 @@ SHOWN_SLACK = 0.01
 """Values may pass the limits of an inferred interval by this share of P: noise, overshoot."""
 
 
-def over_rows(fold: np.ufunc, values: FloatArray) -> FloatArray:
+def fold_rows(fold: np.ufunc, values: FloatArray) -> FloatArray:
     """Fold the rows into one.
 
     Values are in any unit, shape (n, columns), the row is of shape (columns,).
@@ -66,7 +66,7 @@ def _in_own_unit(interval: GivenInterval, factor: float) -> Interval:
     return low, high
 
 
-def refuse_unknown(given: Iterable[str], able: Iterable[str]) -> None:
+def check_joint_names(given: Iterable[str], able: Iterable[str]) -> None:
     """Raise an `OptionError` with the joints that are given an interval, and are none of those that turn."""
     able = list(dict.fromkeys(able))
     unknown = [name for name in given if name and name not in able]
@@ -75,7 +75,7 @@ def refuse_unknown(given: Iterable[str], able: Iterable[str]) -> None:
         raise OptionError(Finding(parameter="interval", found=", ".join(unknown), allowed=allowed))
 
 
-def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, GivenInterval]) -> FloatArray:
+def wrap_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, GivenInterval]) -> FloatArray:
     """Return P of each joint in [rad], shape (joints,): of the interval given, or a full turn.
 
     It is infinite for joints that slide.
@@ -93,7 +93,7 @@ def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, Gi
     for name, ends in given.items():
         _refuse_empty(name, *_in_own_unit(ends, 1.0))
     able = [name for name, turns in zip(log.joints, turning, strict=True) if turns]
-    refuse_unknown(given, able)
+    check_joint_names(given, able)
     periods, findings = np.full(len(log.joints), SLIDING), []
     for j, name in enumerate(log.joints):
         if not turning[j]:
@@ -111,7 +111,7 @@ def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, Gi
     return periods
 
 
-def double_turns(
+def find_double_turn_joints(
     log: JointLog, fixed: Repolarized, joints: IntArray, steps: FloatArray, rest: FloatArray
 ) -> list[int]:
     """Return the joints that are limited to +-2 pi: they step by 4 pi, never by 2 pi, within +-2 pi.
@@ -144,12 +144,12 @@ def double_turns(
     return found
 
 
-def said_intervals(
+def interval_inferences(
     log: JointLog, fixed: Repolarized, periods: FloatArray, given: Mapping[str, GivenInterval]
 ) -> tuple[list[Inference], list[LogWarning]]:
     """Return the interval of each joint that was given or seen to wrap, and what contradicts it.
 
-    Periods P are in [rad], shape (joints,); intervals are given as `given_periods` takes them.
+    Periods P are in [rad], shape (joints,); intervals are given as `wrap_periods` takes them.
     """
     groups: dict[tuple[str, bool], list[int]] = {}
     warnings = []
@@ -157,7 +157,7 @@ def said_intervals(
     ends: dict[int, Interval] = {}
     least = most = np.empty(0)
     if len(fixed.rows):
-        least, most = over_rows(np.minimum, log.q), over_rows(np.maximum, log.q)
+        least, most = fold_rows(np.minimum, log.q), fold_rows(np.maximum, log.q)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
         column = _column(log, j)
         chosen = given.get(log.joints[j], given.get(""))

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.joint_log import ns_to_seconds
 from urmpipe_pipeline.presentation.curves import decimate, points_for
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
@@ -82,7 +82,7 @@ def _path(path: Path, width: int, dot: int) -> Spec:
     position = np.asarray(path.position[:])
     timed = path.t_ns is not None
     rows = np.arange(len(position)) if path.sample is None else np.asarray(path.sample)
-    t = np.asarray(rows + 1.0, np.float64) if path.t_ns is None else seconds(path.t_ns[:])
+    t = np.asarray(rows + 1.0, np.float64) if path.t_ns is None else ns_to_seconds(path.t_ns[:])
     unit, factor = text.SHOWN.get(path.unit, (path.unit, 1.0))
     values = np.full(len(position), np.nan) if path.values is None else factor * np.asarray(path.values[:])
     columns = position if path.values is None else np.column_stack([position, values])

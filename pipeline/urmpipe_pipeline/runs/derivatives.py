@@ -24,7 +24,7 @@ RESTING = 0.01
 """... or by less than this rms, in [rad/s] or [m/s]: a robot that stands still has rates of noise only."""
 
 
-class OtherUnit(NamedTuple):
+class MatchingUnit(NamedTuple):
     """The unit in which recorded derivatives would agree with the differences.
 
     Attributes:
@@ -39,15 +39,15 @@ class OtherUnit(NamedTuple):
 _OTHER_UNITS = {
     order: {
         **{
-            10.0 ** (-k * order): OtherUnit(f"with the time in {unit}", unit)
+            10.0 ** (-k * order): MatchingUnit(f"with the time in {unit}", unit)
             for k, unit in ((3, "ms"), (6, "us"), (9, "ns"))
         },
         **{
-            10.0 ** (k * order): OtherUnit(f"with the time in s, not in {unit}", "s")
+            10.0 ** (k * order): MatchingUnit(f"with the time in s, not in {unit}", "s")
             for k, unit in ((3, "ms"), (6, "us"))
         },
-        np.pi / 180.0: OtherUnit("in deg"),
-        180.0 / np.pi: OtherUnit("with the joints in deg"),
+        np.pi / 180.0: MatchingUnit("in deg"),
+        180.0 / np.pi: MatchingUnit("with the joints in deg"),
     }
     for order in (1, 2)
 }
@@ -84,14 +84,14 @@ def derivatives(
     return _blanked(_central(q, tsp), 1, broken)
 
 
-def used_method(samples: int, method: Method) -> str:
+def effective_method(samples: int, method: Method) -> str:
     """Return the method that `derivatives` applies to so many samples; empty where they are too few."""
     if samples < 3:
         return ""
     return method if samples > POLYNOMIAL + 1 else "central"
 
 
-def acceleration_words(derivative: str, samples: int) -> str:
+def format_acceleration_source(derivative: str, samples: int) -> str:
     """Say what made the accelerations of so many samples; nothing where that is not known."""
     made = {"central": "central differences", "savgol": f"savgol over {_window(samples)} samples"}
     return f"Accelerations: {made.get(derivative, derivative)}." if derivative else ""
@@ -134,7 +134,7 @@ def _blanked(
     return rates
 
 
-def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
+def is_same_rate(recorded: FloatArray, computed: FloatArray) -> bool:
     """Tell whether recorded and computed rates in [rad/s] or [m/s], shape (g, joints), are the same."""
     both = np.isfinite(recorded) & np.isfinite(computed)
     if not both.any():
@@ -144,7 +144,7 @@ def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
     return error <= max(AGREEMENT * size, RESTING)
 
 
-def other_unit(recorded: FloatArray, computed: FloatArray, order: int) -> OtherUnit | None:
+def find_matching_unit(recorded: FloatArray, computed: FloatArray, order: int) -> MatchingUnit | None:
     """Return in which other unit recorded derivatives would agree with the differences; None if in none.
 
     Both are in [rad/s^order] or [m/s^order], shape (g, joints): rates of order 1, accelerations of order 2.

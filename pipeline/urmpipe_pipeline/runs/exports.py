@@ -178,10 +178,10 @@ def run_poses(run: Run, rows: str) -> list[Poses]:
         recorded = Hint("tcp", "recorded", "takes what the log recorded")
         raise _lacking(run, f"no {lacks}, so no pose", at_ingest, recorded)
     t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)
-    return [poses_by_kinematics("", run.robot, stamps(run, t_ns), q, _where(run))]
+    return [poses_by_kinematics("", run.robot, clock_stamps(run, t_ns), q, _where(run))]
 
 
-def stamps(run: Run, t_ns: IntArray) -> IntArray:
+def clock_stamps(run: Run, t_ns: IntArray) -> IntArray:
     """Return the clock of a run at times in [ns], shape (n,); of still poses the rows' numbers as seconds."""
     return t_ns + (run.log.clock_start_ns if run.timed else ROW_NS)
 
@@ -201,7 +201,7 @@ def recorded_poses(run: Run) -> Poses:
     if not len(there):
         raise _lacking(run, "no row with a pose")
     return Poses(
-        "", stamps(run, run.log.t_ns[there]), position[there], quat[there], len(position) - len(there)
+        "", clock_stamps(run, run.log.t_ns[there]), position[there], quat[there], len(position) - len(there)
     )
 
 

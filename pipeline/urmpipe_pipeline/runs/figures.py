@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Mark, P
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.parts import within_words
 from urmpipe_pipeline.repolarization.audit import AuditEntry
-from urmpipe_pipeline.runs.derivatives import acceleration_words
+from urmpipe_pipeline.runs.derivatives import format_acceleration_source
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED
 
@@ -301,7 +301,7 @@ def joint_torques_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
         views.append(View(f"Torque of {name}", (panel,)))
     caption = "What the joints must exert for this motion, by the masses of the robot (inverse dynamics);"
     caption += " friction and a load at the tool are not in it."
-    made = acceleration_words(run.derivative, len(run.t_ns))
+    made = format_acceleration_source(run.derivative, len(run.t_ns))
     caption += f"{f' {made}' if made else ''} First all joints, then each, numbered from the base."
     if not limited:
         caption += f" {PERIOD_ASSUMED}"

@@ -1,6 +1,6 @@
 """The columns of a log as in its file: names, units, rows, the numbers and the clock.
 
-The log holds SI values; `originals` converts them back to the numbers of the file, bit by bit.
+The log holds SI values; `to_file_values` converts them back to the numbers of the file, bit by bit.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def to_si(numbers: FloatArray, column: LogColumn) -> FloatArray:
     return values if column.factor == 1.0 else values * column.factor
 
 
-def originals(values: FloatArray, column: LogColumn) -> FloatArray:
+def to_file_values(values: FloatArray, column: LogColumn) -> FloatArray:
     """Return the numbers of a column as the file has them, in its unit, shape (n,); NaN stays.
 
     Of the doubles whose conversion gives the value in SI, shape (n,), bit by bit, the one with the shortest
@@ -151,7 +151,7 @@ def _kept(log: JointLog, column: LogColumn) -> bool:
 
 def _numbers(log: JointLog, column: LogColumn) -> FloatArray:
     values: FloatArray = getattr(log, ATTRIBUTES[column.role])
-    return originals(np.ascontiguousarray(values[:, column.index]), column)
+    return to_file_values(np.ascontiguousarray(values[:, column.index]), column)
 
 
 def _names(columns: Sequence[LogColumn]) -> list[str]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.joint_log import JointLog, LogWarning, inside_gaps
+from urmpipe_pipeline.joint_log import JointLog, LogWarning, is_inside_gap
 from urmpipe_pipeline.sources.clocks.quantised import Regular, behind_rounded
 
 REGULAR = 0.01
@@ -131,7 +131,7 @@ def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> Floa
     result = np.empty((len(x), values.shape[1]))
     for i, column in enumerate(values.T):
         result[:, i] = np.interp(x, known, column, np.nan, np.nan)
-    result[inside_gaps(at_ns, known_ns)] = np.nan
+    result[is_inside_gap(at_ns, known_ns)] = np.nan
     return result
 
 
@@ -183,7 +183,7 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     count = int((own[-1] - own[0]) / wanted + 1e-6) + 1
     _refuse_endless(log, wanted, count)
     grid = np.rint(np.arange(count) * wanted).astype(np.int64) + own[0]
-    in_gap = inside_gaps(grid, own)
+    in_gap = is_inside_gap(grid, own)
     return Grid(grid, wanted / 1e9, False, own, (*told, *_changes(log, wanted, count, in_gap)))
 
 

@@ -1,9 +1,9 @@
 """Ingest: a log becomes a run.
 
-- `ingest_log`: read the files, infer the robot where the log identifies it, then `run_of`.
-- `run_of`: repolarize on the rows of the file, resample to the grid, differentiate, compute kinematics and
+- `ingest_log`: read the files, infer the robot where the log identifies it, then `log_to_run`.
+- `log_to_run`: repolarize on the rows of the file, resample, differentiate, compute kinematics and
   torques, and collect the warnings.
-- `on_robot`: the same run with another robot; the joint motion is unchanged.
+- `with_robot`: the same run with another robot; the joint motion is unchanged.
 """
 
 from __future__ import annotations
@@ -22,12 +22,23 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError, check_ch
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogWarning
 from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING, missing_visuals
-from urmpipe_pipeline.provenance import Provenance, provenance
-from urmpipe_pipeline.repolarization.audit import audit_log, turning
-from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree, used_method
+from urmpipe_pipeline.provenance import Provenance, build_provenance
+from urmpipe_pipeline.repolarization.audit import audit_log, is_revolute
+from urmpipe_pipeline.runs.derivatives import (
+    Method,
+    derivatives,
+    effective_method,
+    find_matching_unit,
+    is_same_rate,
+)
 from urmpipe_pipeline.runs.grid import Grid, make_grid
-from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, beyond_limits, implausible
-from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, RECORDED_START, far_from_recorded, infer_robot
+from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, limit_warnings, plausibility_warnings
+from urmpipe_pipeline.runs.recorded_tcp import (
+    FAR_RECORDED,
+    RECORDED_START,
+    infer_robot,
+    recorded_tcp_warnings,
+)
 from urmpipe_pipeline.runs.run import RowJoints, Run
 from urmpipe_pipeline.runs.torques import (
     CHECK_LOG,
@@ -36,10 +47,10 @@ from urmpipe_pipeline.runs.torques import (
     MOVE_SLOWER,
     SMOOTHED,
     TORQUE_NOISE,
-    beyond_efforts,
-    mass_notices,
+    compute_torques,
+    effort_warning,
+    mass_warnings,
     noise_warnings,
-    torques_of_log,
 )
 from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
@@ -48,10 +59,10 @@ from urmpipe_pipeline.sources.read import read_numbers
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
 
-SHORTEST_TSP = 1e-9
+MIN_TSP = 1e-9
 """Times of a log are whole nanoseconds."""
 
-LONGEST_TSP = 1e9
+MAX_TSP = 1e9
 """Periods in [s] from this one on are no times that integers of 64 bits hold in [ns]."""
 
 EULER_SINGULAR = "euler-singular"
@@ -93,17 +104,17 @@ def ingest_log(
     if because:
         log = replace(log, inferences=(*log.inferences, because))
     if options.shared or options.side:  # others are joints of another log, or of the other side
-        own = {"", *compress(log.joints, turning(log, robot))}
+        own = {"", *compress(log.joints, is_revolute(log, robot))}
         options = replace(options, interval={k: one for k, one in options.interval.items() if k in own})
     usual = asdict(ReadOptions())
     usual |= {"shared": options.shared}  # says nothing of this log
     read_by = {name: value for name, value in asdict(options).items() if value != usual[name]}
     given = {"robot": robot.name if robot else None, "tsp": tsp, "derivative": derivative}
-    made = provenance("ingest", given | {"read": read_by or None}, log.files)
-    return run_of(log, robot, options, tsp=tsp, derivative=derivative, name=name, made=made)
+    made = build_provenance("ingest", given | {"read": read_by or None}, log.files)
+    return log_to_run(log, robot, options, tsp=tsp, derivative=derivative, name=name, made=made)
 
 
-def run_of(
+def log_to_run(
     log: JointLog,
     robot: Chain | None,
     options: ReadOptions,
@@ -136,21 +147,21 @@ def run_of(
     log = replace(log, inferences=(*log.inferences, *found.inferences))
     clocked = any(column.role == "time" for column in log.columns)
     grid = make_grid(log, tsp)
-    turns = turning(log, robot)
+    turns = is_revolute(log, robot)
     timed = not log.period_assumed
-    doubts = implausible(log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=grid.tsp)
+    doubts = plausibility_warnings(log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=grid.tsp)
     q, left_open = grid.resample_joints(found.q, found.unresolved)
-    warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
+    warnings = [*log.warnings, *recorded_tcp_warnings(robot, log), *found.warnings, *doubts]
     warnings += [*grid.warnings, *left_open]
     warnings += [unused_period("period")] if clocked and options.period else []
     qd, qdd, made_by = _rates(log, grid, q, _method(log, derivative), grid.steps(found.broken), warnings)
-    tcp, noticed = kinematics(robot, q, qd, qdd)
+    tcp, noticed = tcp_motion(robot, q, qd, qdd)
     recorded = None if log.tcp_position is None else grid.resample(log.tcp_position)
     run = Run(
         name=name or log.name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd,
         tcp=tcp, tcp_recorded=recorded, audit=found.entries, warnings=(*warnings, *noticed), provenance=made,
         rows=None if grid.own else RowJoints(grid.source_ns, found.q),
-        tau=torques_of_log(robot, q, qd, qdd), derivative=made_by,
+        tau=compute_torques(robot, q, qd, qdd), derivative=made_by,
     )  # fmt: skip
     return replace(run, warnings=(*run.warnings, *torque_warnings(run)))
 
@@ -158,21 +169,21 @@ def run_of(
 def _of_poses(log: JointLog, robot: Chain | None, made: Provenance, told: Sequence[LogWarning] = ()) -> Run:
     """Return the run of still poses, a row each: no motion joins them, so there are no turns and no rates."""
     none = np.full_like(log.q, np.nan)
-    tcp, noticed = kinematics(robot, log.q, none, none)
-    limits = [] if robot is None or not log.joints else beyond_limits(log, log.q, robot)
+    tcp, noticed = tcp_motion(robot, log.q, none, none)
+    limits = [] if robot is None or not log.joints else limit_warnings(log, log.q, robot)
     return Run(
         name=log.name, log=log, robot=robot, tsp=0.0, t_ns=log.t_ns, q=log.q, qd=none, qdd=none, tcp=tcp,
         tcp_recorded=log.tcp_position, audit=(), provenance=made,
-        warnings=(*log.warnings, *told, *far_from_recorded(robot, log), *limits, *noticed),
+        warnings=(*log.warnings, *told, *recorded_tcp_warnings(robot, log), *limits, *noticed),
     )  # fmt: skip
 
 
 def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
     """Raise an `OptionError` for a period or a method that makes no sense."""
-    if tsp is not None and not SHORTEST_TSP <= tsp < LONGEST_TSP:
-        allowed = f"a positive time below {LONGEST_TSP:g} s"
-        if 0 < tsp < SHORTEST_TSP:
-            allowed = f"{SHORTEST_TSP:g} s or more: times are in ns"
+    if tsp is not None and not MIN_TSP <= tsp < MAX_TSP:
+        allowed = f"a positive time below {MAX_TSP:g} s"
+        if 0 < tsp < MIN_TSP:
+            allowed = f"{MIN_TSP:g} s or more: times are in ns"
         raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
     if derivative is not None:
         check_choice("derivative", derivative, get_args(Method))
@@ -194,20 +205,20 @@ def _rates(
     result = []
     for order, values, own, word in ((1, qd, log.qd, "rates"), (2, qdd, log.qdd, "accelerations")):
         on_grid = values if own is None else grid.resample(own)
-        if own is None or len(q) < 3 or recorded_agree(on_grid, values):
+        if own is None or len(q) < 3 or is_same_rate(on_grid, values):
             result.append(on_grid)
             continue
         result.append(values)
         said = f"the recorded {word} do not agree with the differences of the joint values"
         hints = []
-        if unit := other_unit(on_grid, values, order):
+        if unit := find_matching_unit(on_grid, values, order):
             said += f", but would {unit.said}"
             clocks = [column.name for column in log.columns if column.role == "time"]
             hints = [Hint("unit", {name: unit.time}, "applies this") for name in clocks[:1] if unit.time]
         said += "; the differences are used"
         warnings.append(LogWarning(f"recorded-{word}", said, hints=tuple(hints)))
     rates, seconds = result
-    return rates, seconds, used_method(len(q), method) if seconds is qdd else "recorded"
+    return rates, seconds, effective_method(len(q), method) if seconds is qdd else "recorded"
 
 
 def torque_warnings(run: Run) -> list[LogWarning]:
@@ -219,12 +230,12 @@ def _effort_warnings(run: Run) -> list[LogWarning]:
     """Return a warning if the motion of a run takes more than the efforts of its joints."""
     log, summaries = run.log, run.torque_summaries()
     if log.source == SOLVED:
-        return beyond_efforts(summaries, run.t_ns, MOVE_SLOWER, run.rows_ns)
+        return effort_warning(summaries, run.t_ns, MOVE_SLOWER, run.rows_ns)
     hints = (SMOOTHED,) if run.derivative == "central" else ()
-    return beyond_efforts(summaries, run.t_ns, CHECK_LOG, run.rows_ns, hints)
+    return effort_warning(summaries, run.t_ns, CHECK_LOG, run.rows_ns, hints)
 
 
-def kinematics(
+def tcp_motion(
     robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> tuple[PointLog | None, list[LogWarning]]:
     """Return the motion of the tool centre point, if there is a robot, and what there is to say about it.
@@ -241,7 +252,7 @@ def kinematics(
         allowed = f"{len(robot.coordinates)}, as robot {robot.name} has"
         raise LogError(f"found {q.shape[1]} joints, allowed: {allowed}")
     tcp = point_over_log(robot, q, qd, qdd)
-    notices = [*missing_visuals(robot), *mass_notices(robot)]
+    notices = [*missing_visuals(robot), *mass_warnings(robot)]
     if not tcp.singular.any():
         return tcp, notices
     count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))
@@ -249,15 +260,14 @@ def kinematics(
     return tcp, [*notices, LogWarning(EULER_SINGULAR, f"at {count} samples from {first} on {said}")]
 
 
-BY_LIMITS = (JOINT_LIMIT, SPEED_LIMIT)
-OF_ROBOT = (
-    EULER_SINGULAR, VISUAL_MISSING, MASS_LEFT_OUT, FAR_RECORDED, RECORDED_START, *BY_LIMITS, EFFORT_LIMIT,
-    TORQUE_NOISE,
+LIMIT_WARNINGS = (JOINT_LIMIT, SPEED_LIMIT)
+ROBOT_WARNINGS = (  # kinds that depend on the robot
+    EULER_SINGULAR, VISUAL_MISSING, MASS_LEFT_OUT, FAR_RECORDED, RECORDED_START, *LIMIT_WARNINGS,
+    EFFORT_LIMIT, TORQUE_NOISE,
 )  # fmt: skip
-"""The kinds of the warnings that rest on the robot."""
 
 
-def on_robot(run: Run, robot: Chain | None) -> Run:
+def with_robot(run: Run, robot: Chain | None) -> Run:
     """Return a run with the kinematics of an arm; as it is without one.
 
     Its joint values, their audit and their rates stay.
@@ -267,11 +277,11 @@ def on_robot(run: Run, robot: Chain | None) -> Run:
     """
     if robot is None or robot == run.robot:
         return run
-    tcp, noticed = kinematics(robot, run.q, run.qd, run.qdd)
+    tcp, noticed = tcp_motion(robot, run.q, run.qd, run.qdd)
     _refuse_other_kinds(run, robot)
-    others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
-    tau = torques_of_log(robot, run.q, run.qd, run.qdd) if run.timed else None
-    doubts = [*far_from_recorded(robot, run.log), *_beyond_limits(run, robot), *noticed]
+    others = [warning for warning in run.warnings if warning.kind not in ROBOT_WARNINGS]
+    tau = compute_torques(robot, run.q, run.qd, run.qdd) if run.timed else None
+    doubts = [*recorded_tcp_warnings(robot, run.log), *_beyond_limits(run, robot), *noticed]
     made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
     warnings = (*others, *doubts)
     moved = replace(run, robot=robot, tcp=tcp, tau=tau, warnings=warnings, provenance=made)
@@ -282,7 +292,7 @@ def _refuse_other_kinds(run: Run, robot: Chain) -> None:
     """Raise a `LogError` with every joint that turns in the log and slides in the arm, or the other way."""
     if not run.log.joints:
         return
-    before, now = turning(run.log, run.robot), turning(run.log, robot)
+    before, now = is_revolute(run.log, run.robot), is_revolute(run.log, robot)
     wrong = [
         f"{run.name}, joint {run.log.joints[j]}: found {_unit(before[j])}, allowed: {_unit(now[j])},"
         f" as robot {robot.name} has"
@@ -302,11 +312,13 @@ def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
     if not run.log.joints:
         return []
     if not run.timed:
-        return beyond_limits(run.log, run.q, robot)
+        return limit_warnings(run.log, run.q, robot)
     read = run.provenance.options.get("read") or {}
     repaired = bool(read.get("repair"))
     found = audit_log(run.log, robot, interval=read.get("interval"), repaired=repaired)
     timed = not run.log.period_assumed
-    turns = turning(run.log, robot)
-    doubts = implausible(run.log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=run.tsp)
-    return [warning for warning in doubts if warning.kind in BY_LIMITS]
+    turns = is_revolute(run.log, robot)
+    doubts = plausibility_warnings(
+        run.log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=run.tsp
+    )
+    return [warning for warning in doubts if warning.kind in LIMIT_WARNINGS]

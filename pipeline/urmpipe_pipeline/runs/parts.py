@@ -21,7 +21,7 @@ from urmpipe_pipeline.presentation.parts import (
 )
 from urmpipe_pipeline.presentation.section import Advice, Cell, Event, Fact, Level, Table, Value
 from urmpipe_pipeline.repolarization.audit import AuditEntry, AuditKind
-from urmpipe_pipeline.runs.derivatives import acceleration_words
+from urmpipe_pipeline.runs.derivatives import format_acceleration_source
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED
 
@@ -122,7 +122,7 @@ def torque_table(run: Run) -> Iterator[Table]:
         "share_out": ("Time beyond", lambda j: Value(found()[j].share_out, "%")),
     }
     note = "The torque that the motion takes, by inverse dynamics, without friction and load at the tool."
-    made, assumed = acceleration_words(run.derivative, len(run.t_ns)), run.log.period_assumed
+    made, assumed = format_acceleration_source(run.derivative, len(run.t_ns)), run.log.period_assumed
     note = " ".join(filter(None, (note, made, PERIOD_ASSUMED if assumed else "")))
     yield Table("Joint torques", columns_of(range(len(run.log.joints)), heads), note)
 

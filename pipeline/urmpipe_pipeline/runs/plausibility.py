@@ -1,9 +1,9 @@
 """Whether a log can be the motion of an arm: its first and last row, repeated rows, limits and speeds.
 
 - `JointMotion`: values, times, steps and the resolution of the number format.
-- `outlying_ends`: a first or last row that is off the motion of the others.
-- `pace`, `repeated_samples`: values that stay the same for several rows.
-- `beyond_limits`, `too_fast`: joints that leave their limits or move faster than they can.
+- `find_end_outliers`: a first or last row that is off the motion of the others.
+- `mean_repeats`, `repeated_sample_warnings`: values that stay the same for several rows.
+- `limit_warnings`, `speed_warning`: joints that leave their limits or move faster than they can.
 
 The values stay as they are: each check returns warnings. A check is silent where noise, the number format of
 the file or an uneven clock explains what it sees.
@@ -22,7 +22,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray, row_blocks
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.repolarization.interval import over_rows
+from urmpipe_pipeline.repolarization.interval import fold_rows
 from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
 
 COARSEST = 0.02
@@ -76,7 +76,7 @@ def largest_steps(q: FloatArray) -> FloatArray:
     Steps and q, shape (n, joints), n > 1, are in [rad] or [m].
     """
     blocks = row_blocks(len(q) - 1)
-    steps = [over_rows(np.maximum, np.abs(q[1:][block] - q[:-1][block])) for block in blocks]
+    steps = [fold_rows(np.maximum, np.abs(q[1:][block] - q[:-1][block])) for block in blocks]
     return np.asarray(np.max(steps, axis=0))
 
 
@@ -118,7 +118,7 @@ FAR = 5.0
 LEAST_STEP = 0.01
 """A step below this in [rad] or [m], beside that of the number format, makes no outlier."""
 
-HARDEST_STOP = 100.0
+MAX_DECELERATION = 100.0
 """Acceleration in [rad/s2] or [m/s2] that no joint of an arm reaches: a smaller one may be a hard start."""
 
 LEAST_ROWS = 10
@@ -143,7 +143,7 @@ ROUNDED_LIMIT = 0.005
 """Robot files round their limits, in [rad] or [m]: 6.28 is 0.0032 short of a turn."""
 
 
-def implausible(
+def plausibility_warnings(
     log: JointLog,
     q: FloatArray,
     robot: Chain | None,
@@ -167,19 +167,19 @@ def implausible(
     if len(q) < 2 or not q.shape[1]:
         return []
     motion = JointMotion.of(log, q, turning)
-    outliers = outlying_ends(motion)
-    held = pace(motion)
-    warnings = [*outlier_warnings(motion, outliers), *repeated_samples(motion, held, tsp)]
+    outliers = find_end_outliers(motion)
+    held = mean_repeats(motion)
+    warnings = [*outlier_warnings(motion, outliers), *repeated_sample_warnings(motion, held, tsp)]
     if robot is not None:
         warnings += _beyond_limits(motion, robot)
     if timed:
         steps = np.maximum(outliers, (1, 0))  # a step belongs to the row that it ends in
         limits = speed_limits(robot, turning)
-        warnings += too_fast(motion, limits, np.vstack((told, steps)), held * motion.period)
+        warnings += speed_warning(motion, limits, np.vstack((told, steps)), held * motion.period)
     return warnings
 
 
-def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
+def find_end_outliers(motion: JointMotion) -> NDArray[np.int64]:
     """Return row and joint index, shape (k, 2), where the first or last row is off the motion of the others.
 
     It is if the joint steps there by more than `FAR` times what it does anywhere else, and starts or stops
@@ -189,7 +189,9 @@ def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
     found = [np.empty((0, 2), dtype=np.int64)]
     for row, beside in motion.ends if len(q) >= LEAST_ROWS else ():
         dt = max(abs(int(t_ns[row]) - int(t_ns[beside])) / 1e9, motion.period)
-        least = np.maximum(LEAST_STEP + motion.fineness, np.maximum(FAR * motion.inner, HARDEST_STOP * dt**2))
+        least = np.maximum(
+            LEAST_STEP + motion.fineness, np.maximum(FAR * motion.inner, MAX_DECELERATION * dt**2)
+        )
         joints = np.flatnonzero(np.abs(q[row] - q[beside]) > least)  # never where values are missing: NaN
         found.append(np.column_stack((np.full(len(joints), row), joints)))
     return np.concatenate(found)
@@ -198,7 +200,7 @@ def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
 def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[LogWarning]:
     """Return a warning for each end that is an outlier: which joints are off, and by how much.
 
-    Outliers are row and joint index, shape (k, 2), as `outlying_ends` returns them.
+    Outliers are row and joint index, shape (k, 2), as `find_end_outliers` returns them.
     """
     q, warnings = motion.q, []
     for row, beside in motion.ends:
@@ -215,7 +217,7 @@ def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[L
     return warnings
 
 
-def pace(motion: JointMotion) -> float:
+def mean_repeats(motion: JointMotion) -> float:
     """Return how many rows a moving arm's values stay bit for bit the same, on average; 1 where they do not.
 
     More than 1 is a slow controller polled fast: its differences are stairs. An arm at rest makes few runs
@@ -234,8 +236,8 @@ def pace(motion: JointMotion) -> float:
     return float(runs[moving].mean())
 
 
-def repeated_samples(motion: JointMotion, rows: float, tsp: float) -> list[LogWarning]:
-    """Return a warning if values stay for several rows, as `pace` tells, longer than tsp in [s]."""
+def repeated_sample_warnings(motion: JointMotion, rows: float, tsp: float) -> list[LogWarning]:
+    """Return a warning if values stay for several rows, as `mean_repeats` returns, longer than tsp in [s]."""
     time = rows * motion.period
     once = float(f"{time:.4g}")
     if rows == 1.0 or tsp >= once:
@@ -266,7 +268,7 @@ def _in_one_go(q: FloatArray, changes: NDArray[np.int64]) -> bool:
     return bool(together or large > 1.5 * small)
 
 
-def beyond_limits(log: JointLog, q: FloatArray, robot: Chain) -> list[LogWarning]:
+def limit_warnings(log: JointLog, q: FloatArray, robot: Chain) -> list[LogWarning]:
     """Return a warning for each joint of a log that leaves the limits of an arm.
 
     Its joint values are in [rad] or [m], shape (n, joints).
@@ -281,7 +283,7 @@ def _beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
     lower, upper = np.array([(joint.lower, joint.upper) for joint in robot.moving]).T
     if not np.isfinite((lower, upper)).any():
         return []
-    kept = (over_rows(np.minimum, q) >= lower - slack) & (over_rows(np.maximum, q) <= upper + slack)
+    kept = (fold_rows(np.minimum, q) >= lower - slack) & (fold_rows(np.maximum, q) <= upper + slack)
     found = []
     for j in np.flatnonzero(~kept).tolist():  # also the columns where values are missing: NaN
         beyond = np.maximum(lower[j] - q[:, j], q[:, j] - upper[j])
@@ -308,7 +310,7 @@ def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
     return np.where(np.isfinite(own), own, fallback)
 
 
-def too_fast(
+def speed_warning(
     motion: JointMotion, limits: FloatArray, told: NDArray[np.int64], period: float
 ) -> list[LogWarning]:
     """Return a warning if joints step faster than they can: which, how often, where first, where worst.

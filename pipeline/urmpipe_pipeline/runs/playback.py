@@ -66,7 +66,7 @@ class Playback:
         return int(np.nanargmax(self.off)) if np.isfinite(self.off).any() else None
 
 
-def play_back(run: Run) -> Playback | None:
+def replay_raw(run: Run) -> Playback | None:
     """Return the playback of a log; None without kinematics or without a repolarization.
 
     Outside the jumps velocity and acceleration are the run's. Within a jump they are those of central
@@ -158,7 +158,7 @@ def playback_figures(run: Run) -> Iterator[Figure | SpaceFigure]:
 
     Nothing of a log without kinematics or without a repolarization.
     """
-    played = play_back(run)
+    played = replay_raw(run)
     if played is not None and run.tcp is not None:
         yield _point_figure(run, run.tcp, played)
         yield _path_figure(run, run.tcp, played)

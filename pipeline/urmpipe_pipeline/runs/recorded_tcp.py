@@ -1,8 +1,8 @@
 """The tool centre point that a log recorded, compared with forward kinematics.
 
 - `RecordedPoses`: rows with joint values and a recorded pose; how far the kinematics of an arm are from them.
-- `outlying_start`: outliers in the first rows, before the controller applies tool and pose.
-- `far_from_recorded`, `lacking_tool`: warnings, with what would explain the distance: another robot of the
+- `count_initial_outliers`: outliers in the first rows, before the controller applies tool and pose.
+- `recorded_tcp_warnings`, `missing_tool_warning`: what would explain the distance: another robot of the
   catalogue, a reversed joint, exchanged joints, another base or tool.
 - `infer_robot`: the only robot of the catalogue that fits a log.
 """
@@ -29,7 +29,7 @@ from urmpipe_models.math3d import (
 )
 from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot, robot_names
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import OWN, Inference, JointLog, LogWarning
+from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, JointLog, LogWarning
 from urmpipe_pipeline.runs.reading_errors import Edit, robot_edits, sign_edits, swap_edits
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources.units.evidence import (
@@ -48,15 +48,15 @@ from urmpipe_pipeline.sources.units.evidence import (
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded, fits
 from urmpipe_pipeline.sources.vocabulary import key, split_unit
 
-FINEST = 1e-4
+MIN_REPORTED_DISTANCE = 1e-4
 """Options are told to a tenth of a millimetre: where kinematics are nearer than this in [m], none helps."""
 
-FINEST_TURN = 1e-3
+MIN_REPORTED_ANGLE = 1e-3
 """The same of an angle in [rad], which moves what is a tool's length away by that."""
 
 
 @dataclass(frozen=True, slots=True)
-class Apart:
+class PoseDifference:
     """How far an arm stays from recorded poses.
 
     Attributes:
@@ -67,12 +67,12 @@ class Apart:
     distance: float
     angle: float
 
-    def clearly_nearer(self, other: Apart) -> bool:
+    def clearly_nearer(self, other: PoseDifference) -> bool:
         """Tell whether it is clearly less in place or in angle than another, and clearly more in neither."""
-        nearer = CLEARLY * self.distance <= other.distance and other.distance > FINEST
-        straighter = CLEARLY * self.angle <= other.angle and other.angle > FINEST_TURN
-        no_further = self.distance <= CLEARLY * max(other.distance, FINEST)
-        no_more_turned = self.angle <= CLEARLY * max(other.angle, FINEST_TURN)
+        nearer = CLEARLY * self.distance <= other.distance and other.distance > MIN_REPORTED_DISTANCE
+        straighter = CLEARLY * self.angle <= other.angle and other.angle > MIN_REPORTED_ANGLE
+        no_further = self.distance <= CLEARLY * max(other.distance, MIN_REPORTED_DISTANCE)
+        no_more_turned = self.angle <= CLEARLY * max(other.angle, MIN_REPORTED_ANGLE)
         return (nearer and no_more_turned) or (straighter and no_further)
 
     def said(self, *, turned: bool) -> str:
@@ -104,7 +104,7 @@ class RecordedPoses:
         """
         if robot is None or log.tcp_position is None or log.measured or log.q.shape[1] != len(robot.moving):
             return None
-        start, _ = outlying_start(robot, log)
+        start, _ = count_initial_outliers(robot, log)
         rows = np.arange(start, log.rows)[spread(log.rows - start)]
         q, position = log.q[rows], log.tcp_position[rows]
         known = has_both(q, position)
@@ -129,7 +129,7 @@ class RecordedPoses:
         parts = zip(np.split(position, len(every)), np.split(rotation, len(every)), strict=True)
         return [tool_fit(*part, self.position) for part in parts]
 
-    def apart(self, robot: Chain, q: FloatArray | None = None, *, tool: bool) -> Apart:
+    def apart(self, robot: Chain, q: FloatArray | None = None, *, tool: bool) -> PoseDifference:
         """Return how far an arm stays from the poses, perhaps but for the constant tool that fits best.
 
         Where a log hardly moves, any tool would fit: its points are then held as the arm has them.
@@ -141,7 +141,7 @@ class RecordedPoses:
         """
         found = self.fit(robot, q)
         distance = found.with_tool if tool and np.isfinite(found.with_tool) else found.distance
-        return Apart(distance, self._angle(robot, self.q if q is None else q, tool=tool))
+        return PoseDifference(distance, self._angle(robot, self.q if q is None else q, tool=tool))
 
     def tool_turn(self, robot: Chain) -> tuple[float, float, float]:
         """Return rx, ry, rz in [rad] of the tool that fits the orientations best; zeros without them."""
@@ -180,7 +180,7 @@ LEAST_ROWS = 10
 """A log of fewer rows tells too little of what is usual in it."""
 
 
-def outlying_start(robot: Chain | None, log: JointLog) -> tuple[int, float]:
+def count_initial_outliers(robot: Chain | None, log: JointLog) -> tuple[int, float]:
     """Return how many rows at the start have the tool centre point elsewhere than the others, and how far.
 
     Elsewhere is in the frame of the tip, where a tool stays: the offset from the kinematics is there
@@ -191,16 +191,16 @@ def outlying_start(robot: Chain | None, log: JointLog) -> tuple[int, float]:
     if log.tcp_position is None or log.measured or log.rows < LEAST_ROWS:
         return 0, 0.0
     first = log.tcp_position[0]
-    zeros = 0 if first.any() or log.source == OWN else int(np.argmax(log.tcp_position.any(axis=1)))
+    zeros = 0 if first.any() or log.source == URMPIPE_SOURCE else int(np.argmax(log.tcp_position.any(axis=1)))
     if robot is None or log.q.shape[1] != len(robot.moving):
         return zeros, np.inf
     rows, apart = _by_tool(robot, log, zeros)
     return (zeros + rows, apart) if rows else (zeros, np.inf)
 
 
-def start_warning(robot: Chain | None, log: JointLog) -> list[LogWarning]:
+def initial_outlier_warning(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     """Return a warning if the first rows recorded the tool centre point elsewhere than the others."""
-    rows, apart = outlying_start(robot, log)
+    rows, apart = count_initial_outliers(robot, log)
     if not rows:
         return []
     first = "the first row" if rows == 1 else f"the first {rows} rows"
@@ -238,7 +238,7 @@ def _offsets(robot: Chain, log: JointLog, rows: IntArray) -> FloatArray:
     return np.asarray(np.einsum("nji,nj->ni", rotation, log.tcp_position[rows] - position))
 
 
-LACKING_TOOL = "recorded-tcp-tool"
+MISSING_TOOL = "recorded-tcp-tool"
 """The kind of a hint beside a verdict of fail: it says nothing against the log."""
 
 FAR_RECORDED = "recorded-tcp-far"
@@ -267,7 +267,7 @@ def distances_from_recorded(run: Run, computed: FloatArray | None = None) -> Flo
     if run.robot is None or run.tcp is None or run.log.tcp_position is None or run.log.measured:
         return np.empty(0)
     place = positions_over_log(run.robot, run.on_rows.q) if computed is None else computed
-    start, _ = outlying_start(run.robot, run.log)
+    start, _ = count_initial_outliers(run.robot, run.log)
     distance = np.linalg.norm(place - run.log.tcp_position, axis=1)[start:]
     return np.asarray(distance[np.isfinite(distance)])
 
@@ -279,10 +279,10 @@ class _Other(NamedTuple):
     hint: Hint
     robot: Chain
     q: FloatArray
-    apart: Apart = Apart(np.inf, np.inf)
+    apart: PoseDifference = PoseDifference(np.inf, np.inf)
 
 
-def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
+def recorded_tcp_warnings(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     """Return warnings if the kinematics of a robot do not come near the recorded tool centre point.
 
     A constant tool is allowed for, unless the log hardly moves. The robot is held against what else the log
@@ -290,13 +290,13 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     another base. What comes clearly nearer is said, however near the robot is; so is a robot that is far off
     where nothing does. The first rows may be outliers: they are told of, and left out.
     """
-    warnings = start_warning(robot, log)
+    warnings = initial_outlier_warning(robot, log)
     poses = RecordedPoses.of(robot, log)
     if robot is None or poses is None:
         return warnings
     own, found = poses.apart(robot, tool=True), poses.fit(robot)
     others = _clearly_nearer(robot, log, poses, own)
-    turned = own.angle > FINEST_TURN and any(CLEARLY * one.apart.angle <= own.angle for one in others)
+    turned = own.angle > MIN_REPORTED_ANGLE and any(CLEARLY * one.apart.angle <= own.angle for one in others)
     said = _stays(robot, poses.apart(robot, tool=False), turned=turned)
     if np.isfinite(found.with_tool):
         said += f" ({own.said(turned=turned)} with the tool that fits best)"
@@ -309,10 +309,10 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     return warnings
 
 
-def lacking_tool(robot: Chain | None, log: JointLog, *, turned: bool = False) -> list[LogWarning]:
+def missing_tool_warning(robot: Chain | None, log: JointLog, *, turned: bool = False) -> list[LogWarning]:
     """Return a warning if kinematics and recorded poses lie apart by what a tool or a base explains.
 
-    There is none where something else does: `far_from_recorded` says so.
+    There is none where something else does: `recorded_tcp_warnings` says so.
 
     Args:
         robot: The arm.
@@ -323,22 +323,22 @@ def lacking_tool(robot: Chain | None, log: JointLog, *, turned: bool = False) ->
     if robot is None or poses is None:
         return []
     own = _judged(poses.apart(robot, tool=False), turned=turned)
-    if own.distance <= FINEST and own.angle <= FINEST_TURN:
+    if own.distance <= MIN_REPORTED_DISTANCE and own.angle <= MIN_REPORTED_ANGLE:
         return []
     if _clearly_nearer(robot, log, poses, poses.apart(robot, tool=True)):
         return []
     said = _stays(robot, own, turned=turned)
     if not np.isfinite(poses.fit(robot).with_tool):
         said = f"{said}, and the log moves too little to show why: {_asked(robot)}"
-        return [LogWarning(LACKING_TOOL, said, hints=tuple(_tool_here(robot, poses)) or _SET)]
+        return [LogWarning(MISSING_TOOL, said, hints=tuple(_tool_here(robot, poses)) or _SET)]
     hints = tuple(_placing(robot, poses, own, turned=turned))
-    return [LogWarning(LACKING_TOOL, said, hints=hints)] if hints else []
+    return [LogWarning(MISSING_TOOL, said, hints=hints)] if hints else []
 
 
 _SET = (Hint("tool", None, "sets it"), Hint("base", None, "sets it"))
 
 
-def _placing(robot: Chain, poses: RecordedPoses, own: Apart, *, turned: bool) -> Iterator[Hint]:
+def _placing(robot: Chain, poses: RecordedPoses, own: PoseDifference, *, turned: bool) -> Iterator[Hint]:
     """Yield the tool and the base with which an arm comes near, each if it does."""
     bare = replace(robot, tool=Transform())
     tool = _frame((*poses.fit(bare).tool, *poses.tool_turn(bare)))
@@ -367,7 +367,7 @@ def _tool_here(robot: Chain, poses: RecordedPoses) -> Iterator[Hint]:
         yield Hint("tool", tool, does, robot=_in_catalogue(robot, "tool"))
 
 
-def _judged(apart: Apart, *, turned: bool) -> Apart:
+def _judged(apart: PoseDifference, *, turned: bool) -> PoseDifference:
     """Return how far poses lie apart in what is judged."""
     return apart if turned else replace(apart, angle=0.0)
 
@@ -384,7 +384,7 @@ def _in_catalogue(robot: Chain, placing: str) -> str:
     return robot.name if same == robot else ""
 
 
-def _stays(robot: Chain, apart: Apart, *, turned: bool) -> str:
+def _stays(robot: Chain, apart: PoseDifference, *, turned: bool) -> str:
     """Say how far an arm stays from what was recorded."""
     angle = f" and {text.quantity(apart.angle, 'rad')}" if turned else ""
     far = f"{apart.distance * 1e3:.1f} mm{angle}"
@@ -399,12 +399,12 @@ def _asked(robot: Chain) -> str:
     return f"perhaps the tool, {length * 1e3:.1f} mm long, is another, or a base is missing"
 
 
-def _clearly_nearer(robot: Chain, log: JointLog, poses: RecordedPoses, own: Apart) -> list[_Other]:
+def _clearly_nearer(robot: Chain, log: JointLog, poses: RecordedPoses, own: PoseDifference) -> list[_Other]:
     """Return what explains the poses clearly better than a robot does: the best, and what is like it.
 
     A base comes last: it explains a part of what anything else does.
     """
-    if own.distance <= FINEST and own.angle <= FINEST_TURN:
+    if own.distance <= MIN_REPORTED_DISTANCE and own.angle <= MIN_REPORTED_ANGLE:
         return []
     moves = np.isfinite(poses.fit(robot).with_tool)
     most = EXPLAINED * extent(poses.position) if moves else CLOSE_WITH_TOOL

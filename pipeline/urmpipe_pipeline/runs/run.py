@@ -16,7 +16,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, Voice
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.math3d import COLUMN_NAMES, is_angular
-from urmpipe_pipeline.joint_log import OWN, JointLog, LogWarning, seconds
+from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, JointLog, LogWarning, ns_to_seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit import AuditEntry
@@ -70,7 +70,7 @@ class TorqueSummary:
         return {key: getattr(self, key) for key in keys}
 
 
-def torque_summaries(
+def summarise_torques(
     names: Sequence[str],
     robot: Chain | None,
     t_ns: IntArray,
@@ -197,7 +197,7 @@ class Run(Result):
     @property
     def t(self) -> FloatArray:
         """Grid times in [s], shape (g,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @property
     def repolarizations(self) -> tuple[AuditEntry, ...]:
@@ -251,7 +251,7 @@ class Run(Result):
     def torque_summaries(self) -> list[TorqueSummary]:
         """Return the torque of each joint in short; none has a limit where the period is assumed."""
         limited = not self.log.period_assumed
-        return torque_summaries(self.log.joints, self.robot, self.t_ns, self.tau, limited=limited)
+        return summarise_torques(self.log.joints, self.robot, self.t_ns, self.tau, limited=limited)
 
     def as_run(self) -> Run:
         """Return this run: what results that have a run return of it."""
@@ -286,7 +286,7 @@ class Run(Result):
                 columns |= {f"{name}{axis}": values[:, i] for i, axis in enumerate("xyz")}
             columns |= {name: self.tcp.euler_zyx[:, i] for i, name in enumerate(("rz", "ry", "rx"))}
         frame = pd.DataFrame(columns)
-        frame.attrs[OWN] = {"units": self._units()}
+        frame.attrs[URMPIPE_SOURCE] = {"units": self._units()}
         return frame
 
     def _units(self) -> dict[str, str]:
@@ -322,7 +322,7 @@ class Run(Result):
         }
 
 
-def part_of(run: Run, first: int, last: int, name: str) -> Run:
+def slice_run(run: Run, first: int, last: int, name: str) -> Run:
     """Return some rows of a run, both ends included, on their own clock, with the joints' turns as they are.
 
     The warnings stay with the whole.

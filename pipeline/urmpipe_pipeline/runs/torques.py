@@ -1,7 +1,7 @@
 """Torques of a run: the masses that they rest on, the inverse dynamics, and warnings about both.
 
-- `mass_notices`, `lost_in_urdf`: masses of an arm that are not used, and those that a URDF does not hold.
-- `torques_of_log`: tau(q, q', q'') on the grid.
+- `mass_warnings`, `urdf_mass_warning`: masses that are not used, and those lost in a URDF.
+- `compute_torques`: tau(q, q', q'') on the grid.
 - `torque_warnings`: joints that need more than their effort, and torques that are noise of the log.
 """
 
@@ -26,7 +26,7 @@ MASS_FAULT = "mass-fault"
 NOT_IN_URDF = "not-in-urdf"
 
 
-def mass_notices(robot: Chain) -> list[LogWarning]:
+def mass_warnings(robot: Chain) -> list[LogWarning]:
     """Return a warning of the masses that the arm carries and that are not among its `inertials`."""
     if robot.mass_faults:
         return [
@@ -41,7 +41,7 @@ def mass_notices(robot: Chain) -> list[LogWarning]:
     return [LogWarning(MASS_LEFT_OUT, words)]
 
 
-def lost_in_urdf(robot: Chain) -> list[LogWarning]:
+def urdf_mass_warning(robot: Chain) -> list[LogWarning]:
     """Return a warning of what a URDF of the arm does not hold."""
     lost = []
     if tuple(robot.gravity) != GRAVITY:
@@ -66,7 +66,7 @@ PERIOD_ASSUMED = "The period of the rows is assumed. Torques depend on it, so no
 """What stands with torques whose rates rest on an assumption."""
 
 
-def torques_of_log(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray | None:
+def compute_torques(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray | None:
     """Return the torques of the joints in [N.m] or [N], (n, joints), NaN where a rate is; None if all are.
 
     Args:
@@ -81,7 +81,7 @@ def torques_of_log(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: Floa
     return tau if np.isfinite(tau).any() else None
 
 
-def beyond_efforts(
+def effort_warning(
     summaries: Sequence[TorqueSummary],
     t_ns: IntArray,
     advice: str,
@@ -185,7 +185,7 @@ def _alternates(qdd: FloatArray) -> bool:
 def _smoothing(run: Run, tau: FloatArray) -> _Change:
     """Return what smoothing does to the torques in [N.m] or [N], shape (n, joints)."""
     q = np.where(np.isfinite(run.qdd), run.q, np.nan)  # no window reaches across a step that is no motion
-    smooth = torques_of_log(run.robot, q, *derivatives(q, run.tsp, "savgol"))
+    smooth = compute_torques(run.robot, q, *derivatives(q, run.tsp, "savgol"))
     if smooth is None:
         none = np.full(tau.shape[1], np.nan)
         return _Change(none, none, none, none)

@@ -17,7 +17,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, Role
-from urmpipe_pipeline.runs.ingest import run_of
+from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import SLOW, Signal, Simulation
 from urmpipe_pipeline.sources import ReadOptions
@@ -69,7 +69,7 @@ def run_of_block(simulation: Simulation, block: str | None = None, robot: Chain 
     only = Inference("block", chosen, "it alone has a motion", hints=(Hint("block"),))
     told = (*(() if block else (only,)), *((because,) if because else ()))
     log = _log(simulation, chosen, arm, told)
-    return run_of(log, arm, ReadOptions(), made=simulation.provenance)
+    return log_to_run(log, arm, ReadOptions(), made=simulation.provenance)
 
 
 def _chosen(simulation: Simulation, block: str | None) -> str:

@@ -25,7 +25,7 @@ from urmpipe_pipeline.presentation.section import (
     Section,
     Value,
 )
-from urmpipe_pipeline.provenance import assuming
+from urmpipe_pipeline.provenance import format_assumptions
 from urmpipe_pipeline.simulations.energy import EnergyBalance
 from urmpipe_pipeline.simulations.figures import RESIDUAL_CAUSES, energy_figure, path_figure, signal_figures
 from urmpipe_pipeline.simulations.scene import simulation_scene
@@ -81,7 +81,7 @@ def outcome_words(simulation: Simulation) -> str:
         return f"{simulation.name}: {text.counted(len(simulation.t_ns), 'sample')}"
     within = "out of" if worst.out_of_tolerance else "within"
     doubted = ", but in doubt" if worst.doubts and not worst.out_of_tolerance else ""
-    assumptions = assuming(simulation.assumptions)
+    assumptions = format_assumptions(simulation.assumptions)
     return f"{worst.block} of {simulation.name} {within} tolerance{doubted}{assumptions}"
 
 

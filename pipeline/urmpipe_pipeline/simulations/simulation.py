@@ -17,9 +17,9 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import CosimulationError, Voice
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
-from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
 from urmpipe_pipeline.presentation.result import Result
-from urmpipe_pipeline.provenance import Provenance, assumed
+from urmpipe_pipeline.provenance import Provenance, list_assumptions
 from urmpipe_pipeline.runs.run import SCHEMA
 from urmpipe_pipeline.simulations.energy import ENERGIES, EnergyBalance, energy_balance
 
@@ -222,7 +222,7 @@ class Simulation(Result):
     @property
     def t(self) -> FloatArray:
         """Times of the samples in [s], shape (n,)."""
-        return seconds(self.t_ns)
+        return ns_to_seconds(self.t_ns)
 
     @property
     def duration(self) -> float:
@@ -241,7 +241,9 @@ class Simulation(Result):
         """What the verdict takes for granted of the logs that were played; nothing without one."""
         if not self.verdicts:
             return ()
-        return assumed((one.assumption, one.about or "a log") for one in self.warnings if one.assumption)
+        return list_assumptions(
+            (one.assumption, one.about or "a log") for one in self.warnings if one.assumption
+        )
 
     @property
     def judged_worst(self) -> DeltaVerdict | None:

@@ -14,7 +14,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.joint_log import ROW_NS, SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.ingest import run_of
+from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
@@ -50,7 +50,7 @@ def run_of_solutions(
         clock_start_ns=clock_start_ns, columns=tuple(_columns(chain, timed=timed)), warnings=warnings,
         timed=timed,
     )  # fmt: skip
-    return run_of(log, chain, ReadOptions(), made=made)
+    return log_to_run(log, chain, ReadOptions(), made=made)
 
 
 def _columns(chain: Chain, *, timed: bool) -> Iterator[LogColumn]:

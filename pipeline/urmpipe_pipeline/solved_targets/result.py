@@ -17,7 +17,7 @@ from urmpipe_models.errors import Finding, LogError, Voice
 from urmpipe_models.ik.path import JointPath
 from urmpipe_models.ik.solutions import Solutions, Targets, pose_errors
 from urmpipe_pipeline.comparison.deviation import Verdict
-from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.run import SCHEMA, Run
@@ -117,7 +117,7 @@ class SolvedTargets(Result):
     @property
     def t(self) -> FloatArray | None:
         """Times on the path's own clock in [s], shape (n,); None where each target stands for itself."""
-        return None if self.clock_ns is None else seconds(self.clock_ns)
+        return None if self.clock_ns is None else ns_to_seconds(self.clock_ns)
 
     @property
     def joint_units(self) -> list[str]:

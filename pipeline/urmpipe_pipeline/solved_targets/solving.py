@@ -13,7 +13,7 @@ from urmpipe_models.ik.path import JointPath, solve_path
 from urmpipe_models.ik.solutions import SingularPoses, Solutions, Targets, concatenate_solutions
 from urmpipe_models.ik.solve import solve
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.solved_targets.request import Request
 from urmpipe_pipeline.solved_targets.result import SolvedTargets, missed_by
 from urmpipe_pipeline.solved_targets.solution_warnings import (
@@ -147,7 +147,7 @@ def _result(
         name=given.name, robot=request.arm, method="iterative" if form is None else form.name, row=given.row,
         t_ns=given.t_ns, clock_start_ns=given.clock_start_ns, targets=given.targets, solutions=solutions,
         chosen=chosen, miss=miss, angle=angle, every=request.every, branches=branches, path=path,
-        warnings=warnings, provenance=provenance("ik", options, [given.file] if given.file else []),
+        warnings=warnings, provenance=build_provenance("ik", options, [given.file] if given.file else []),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.joint_log import GAP, Inference, LogWarning, gaps_behind
+from urmpipe_pipeline.joint_log import GAP, Inference, LogWarning, has_gap_after
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.chunks import Spread, spread_over_chunks
@@ -306,7 +306,7 @@ def _unusual(values: FloatArray) -> list[int]:
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:
     """Return a warning with each gap between two rows at times in [ns], shape (n,)."""
-    places = np.flatnonzero(gaps_behind(t_ns)).tolist()
+    places = np.flatnonzero(has_gap_after(t_ns)).tolist()
     if not places:
         return []
     steps = np.diff(t_ns)

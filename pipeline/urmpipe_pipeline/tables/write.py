@@ -19,7 +19,7 @@ from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
 from urmpipe_pipeline.tables.options import ExportOptions, Format
 from urmpipe_pipeline.tables.parquet_file import is_ours, write_parquet
-from urmpipe_pipeline.text import json_ready, unique
+from urmpipe_pipeline.text import to_json_value, unique
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,7 +152,7 @@ def _writer(
     if to == "csv":
         return partial(write_csv, table)
     named = {"mark": EXPORT_HEADER, "schema": 1, "name": exports.about["name"], "rows": rows}
-    about = json.dumps(json_ready({**named, **exports.about}))  # JSON: every encoding can hold it
+    about = json.dumps(to_json_value({**named, **exports.about}))  # JSON: every encoding can hold it
     if to == "parquet":
         return partial(write_parquet, table, about)
     fields = {**exports.rows[rows].fields(table), "metadata": about}

@@ -16,7 +16,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.accuracy.driven_motion import Diverged, DrivenMotion
 from urmpipe_pipeline.accuracy.result import Accuracy
 from urmpipe_pipeline.planned_paths.result import PlannedPath
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 
 Make = Callable[..., Accuracy]
 
@@ -77,7 +77,7 @@ def accuracy() -> Make:
             "name": "cube wall xy", "robot": plan_at(0.5).robot, "rows": CONTOUR, "law": "trapezoid",
             "acceleration": 6.0, "jerk": None, "period": 0.02, "force": (0.0, 0.0, 0.0), "motions": motions,
             "tried": (), "running": None, "limit": None, "decides": "time", "loop_radius": 0.99,
-            "compiled": True, "warnings": (), "provenance": provenance("accuracy", {}, []),
+            "compiled": True, "warnings": (), "provenance": build_provenance("accuracy", {}, []),
         }  # fmt: skip
         return Accuracy(**fields | more)
 

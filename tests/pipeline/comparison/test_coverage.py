@@ -20,8 +20,8 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import rotation_angle, to_quaternions
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.runs.ingest import run_of
+from urmpipe_pipeline.provenance import build_provenance
+from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
@@ -39,7 +39,7 @@ def path_at(t: FloatArray, position: FloatArray) -> Run:
     """The run of a path, as `ingest` makes it."""
     t_ns = np.rint(t * 1e9).astype(np.int64)
     log = JointLog("path", "path", (), t_ns, (), np.empty((len(t), 0)), tcp_position=position)
-    return run_of(log, None, ReadOptions(), made=provenance("ingest", {}, ()))
+    return log_to_run(log, None, ReadOptions(), made=build_provenance("ingest", {}, ()))
 
 
 def table(t: FloatArray, position: FloatArray) -> pd.DataFrame:

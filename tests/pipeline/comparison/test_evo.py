@@ -22,8 +22,8 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.runs.ingest import ingest_log, run_of
+from urmpipe_pipeline.provenance import build_provenance
+from urmpipe_pipeline.runs.ingest import ingest_log, log_to_run
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
@@ -110,7 +110,7 @@ def path_at(t: FloatArray, rng: np.random.Generator, name: str) -> Run:
         name, "path", (), t_ns, (), np.empty((len(t), 0)),
         tcp_position=rng.uniform(-1, 1, (len(t), 3)), tcp_rotation=quat.as_quat(), rotation_form="quat_xyzw",
     )  # fmt: skip
-    return run_of(log, None, ReadOptions(), made=provenance("ingest", {}, ()))
+    return log_to_run(log, None, ReadOptions(), made=build_provenance("ingest", {}, ()))
 
 
 @pytest.mark.slow

@@ -17,8 +17,8 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, trajectory
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.runs.ingest import run_of
+from urmpipe_pipeline.provenance import build_provenance
+from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
@@ -40,14 +40,14 @@ def joint_log(t: FloatArray, q: FloatArray, name: str = "log", position: FloatAr
     """Return the run of a log at these times."""
     t_ns = np.rint(t * 1e9).astype(np.int64)
     log = JointLog(name, "table", (), t_ns, tuple(f"q{k + 1}" for k in range(6)), q, tcp_position=position)
-    return run_of(log, UR5E, ReadOptions(), made=provenance("ingest", {}, ()))
+    return log_to_run(log, UR5E, ReadOptions(), made=build_provenance("ingest", {}, ()))
 
 
 def path(t: FloatArray, position: FloatArray) -> Run:
     """Return the run of a path."""
     t_ns = np.rint(t * 1e9).astype(np.int64)
     log = JointLog("path", "path", (), t_ns, (), np.empty((len(t), 0)), tcp_position=position)
-    return run_of(log, None, ReadOptions(), made=provenance("ingest", {}, ()))
+    return log_to_run(log, None, ReadOptions(), made=build_provenance("ingest", {}, ()))
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_a_spike_of_one_row_keeps_its_height_to_the_bit(
     wanted = positions_over_log(UR5E, q)
     wanted[row, 2] += height  # the reference has the spike at a row of the log: nothing is interpolated
     log = JointLog("log", "table", (), np.rint(t * 1e9).astype(np.int64), tuple("abcdef"), q)
-    run = run_of(log, UR5E, ReadOptions(), made=provenance("ingest", {}, ()), tsp=tsp)
+    run = log_to_run(log, UR5E, ReadOptions(), made=build_provenance("ingest", {}, ()), tsp=tsp)
     assert run.resampled
     one = compare_runs(path(t, wanted), [run]).runs[0]
     exact = np.abs(wanted - trajectory(run).position)

@@ -20,7 +20,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.repolarization.audit import AuditEntry
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -92,7 +92,7 @@ def build_run(
         name=name, log=log, robot=chain, tsp=0.005, t_ns=t_ns, q=q, qd=qd, qdd=qdd,
         tcp=point_over_log(chain, q, qd, qdd), tcp_recorded=None,
         audit=repolarizations(raw, t, joints), warnings=log.warnings,
-        provenance=provenance("ingest", {"robot": "urm6", "tsp": None}, [file]),
+        provenance=build_provenance("ingest", {"robot": "urm6", "tsp": None}, [file]),
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from urmpipe_models.errors import RecordingError
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.operands import load_runs
-from urmpipe_pipeline.results import read_recording, whole, write_recording
+from urmpipe_pipeline.results import enclosing_result, read_recording, write_recording
 
 MakeComparison = Callable[..., Comparison]
 
@@ -46,7 +46,7 @@ def test_one_alone_reads_back_and_is_no_log(diagnosed: Comparison, tmp_path: Pat
 
 def test_with_its_comparison_it_is_recorded_as_that(diagnosed: Comparison, tmp_path: Path) -> None:
     found = replace(there(diagnosed.runs[0].diagnosis), comparison=diagnosed)
-    assert whole(found) is diagnosed
+    assert enclosing_result(found) is diagnosed
     assert_same(read_recording(write_recording(found, tmp_path / "run.rrd")), diagnosed)
 
 

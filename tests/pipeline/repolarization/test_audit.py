@@ -14,7 +14,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.math3d import translation
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
-from urmpipe_pipeline.repolarization.audit import Audited, audit_log
+from urmpipe_pipeline.repolarization.audit import AuditResult, audit_log
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
@@ -39,7 +39,7 @@ def log_of(q: FloatArray, t_ns: IntArray | None = None, unit: str = "rad", facto
     return JointLog("log", "table", (), t, names, values, columns=columns)
 
 
-def kinds(audited: Audited) -> list[tuple[str, int]]:
+def kinds(audited: AuditResult) -> list[tuple[str, int]]:
     return [(entry.kind, entry.row) for entry in audited.entries]
 
 

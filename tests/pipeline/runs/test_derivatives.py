@@ -8,11 +8,11 @@ from scipy.signal import savgol_filter
 
 from urmpipe_pipeline.runs.derivatives import (
     WINDOW,
+    MatchingUnit,
     Method,
-    OtherUnit,
     derivatives,
-    other_unit,
-    recorded_agree,
+    find_matching_unit,
+    is_same_rate,
 )
 
 TSP = 0.005
@@ -74,11 +74,11 @@ def test_too_few_samples_have_no_derivative(count: int) -> None:
 def test_recorded_rates_are_trusted_only_where_they_are_rates() -> None:
     q = np.sin(5 * T)[:, None]
     qd, _ = derivatives(q, TSP)
-    assert recorded_agree(5 * np.cos(5 * T)[:, None], qd)
-    assert not recorded_agree(np.zeros_like(qd), qd)  # velocity columns of 0 while the joints move
-    assert not recorded_agree(np.degrees(qd), qd)
-    assert recorded_agree(np.zeros_like(qd), 1e-3 * qd)  # a robot at rest
-    assert not recorded_agree(np.full_like(qd, np.nan), qd)
+    assert is_same_rate(5 * np.cos(5 * T)[:, None], qd)
+    assert not is_same_rate(np.zeros_like(qd), qd)  # velocity columns of 0 while the joints move
+    assert not is_same_rate(np.degrees(qd), qd)
+    assert is_same_rate(np.zeros_like(qd), 1e-3 * qd)  # a robot at rest
+    assert not is_same_rate(np.full_like(qd, np.nan), qd)
 
 
 @pytest.mark.parametrize("row", [0, 5, 20, 200, 394, 399])
@@ -97,20 +97,20 @@ def test_smoothing_leaves_a_gap_around_a_missing_sample_and_nothing_else(row: in
 @pytest.mark.parametrize(
     ("factor", "order", "said"),
     [
-        (1e3, 1, OtherUnit("with the time in ms", "ms")),
-        (1e6, 2, OtherUnit("with the time in ms", "ms")),
-        (1e6, 1, OtherUnit("with the time in us", "us")),
-        (1e-3, 1, OtherUnit("with the time in s, not in ms", "s")),
-        (180.0 / np.pi, 1, OtherUnit("in deg")),
-        (np.pi / 180.0, 2, OtherUnit("with the joints in deg")),
+        (1e3, 1, MatchingUnit("with the time in ms", "ms")),
+        (1e6, 2, MatchingUnit("with the time in ms", "ms")),
+        (1e6, 1, MatchingUnit("with the time in us", "us")),
+        (1e-3, 1, MatchingUnit("with the time in s, not in ms", "s")),
+        (180.0 / np.pi, 1, MatchingUnit("in deg")),
+        (np.pi / 180.0, 2, MatchingUnit("with the joints in deg")),
         (1.5, 1, None),
         (0.0, 1, None),
     ],
 )
 def test_the_unit_in_which_recorded_rates_agree_is_told(
-    factor: float, order: int, said: OtherUnit | None
+    factor: float, order: int, said: MatchingUnit | None
 ) -> None:
     computed = np.column_stack((np.sin(np.arange(50.0)), np.cos(np.arange(50.0))))
     computed[7] = np.nan
-    assert other_unit(factor * computed, computed, order) == said
-    assert other_unit(factor * computed[::-1], computed, order) is None
+    assert find_matching_unit(factor * computed, computed, order) == said
+    assert find_matching_unit(factor * computed[::-1], computed, order) is None

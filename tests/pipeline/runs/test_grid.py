@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from asserting import refusal
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.joint_log import JointLog, inside_gaps
+from urmpipe_pipeline.joint_log import JointLog, is_inside_gap
 from urmpipe_pipeline.runs.grid import interpolate, make_grid
 
 MS = 1_000_000
@@ -97,7 +97,7 @@ def test_logs_of_no_and_one_row_have_a_grid(count: int) -> None:
     grid = make_grid(log_at(np.arange(count)))
     assert len(grid.t_ns) == count
     assert grid.own
-    assert not inside_gaps(np.arange(3), np.arange(count)).any()
+    assert not is_inside_gap(np.arange(3), np.arange(count)).any()
 
 
 def test_a_clock_rounded_to_milliseconds_is_regular_and_that_is_said() -> None:

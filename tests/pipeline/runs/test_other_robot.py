@@ -16,7 +16,7 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.results import read_recording, write_recording
-from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run
 
 ARM = replace(load_robot("ur5e"), tool=Transform(translation=(0.3, 0.0, 0.15)))
@@ -64,7 +64,7 @@ def write(file: Path, header: list[str], rows: FloatArray) -> None:
 def test_warnings_and_kinematics_are_those_of_a_log_read_with_the_arm(
     first: Chain, second: Chain, kinds: list[str], log: Path
 ) -> None:
-    held, read = on_robot(ingest_log([log], robot=first), second), ingest_log([log], robot=second)
+    held, read = with_robot(ingest_log([log], robot=first), second), ingest_log([log], robot=second)
     assert [warning.kind for warning in held.warnings] == kinds
     assert held.warnings == read.warnings
     assert held.robot == second
@@ -77,7 +77,7 @@ def test_a_recording_is_held_as_its_log_is(log: Path, tmp_path: Path) -> None:
     file = write_recording(ingest_log([log], robot=OTHER), tmp_path / "run.rrd")
     kept = read_recording(file)
     assert isinstance(kept, Run)
-    assert on_robot(kept, SLOW).warnings == ingest_log([log], robot=SLOW).warnings
+    assert with_robot(kept, SLOW).warnings == ingest_log([log], robot=SLOW).warnings
 
 
 def test_joints_that_turn_are_none_that_slide(log: Path) -> None:
@@ -85,12 +85,12 @@ def test_joints_that_turn_are_none_that_slide(log: Path) -> None:
         replace(joint, kind="prismatic") if joint == OTHER.moving[2] else joint for joint in OTHER.joints
     )
     with pytest.raises(LogError) as caught:
-        on_robot(ingest_log([log], robot=OTHER), replace(OTHER, joints=sliding))
+        with_robot(ingest_log([log], robot=OTHER), replace(OTHER, joints=sliding))
     assert str(caught.value) == "log, joint q3: found rad, allowed: m, as robot urm6 has"
 
 
 def test_a_path_has_no_joints_to_refuse(tmp_path: Path) -> None:
     file = tmp_path / "path.csv"
     file.write_text("t [s],x [m],y [m],z [m]\n0,0,0,0\n0.1,0,0,0.1\n0.2,0,0,0.2\n", encoding="utf-8")
-    run = on_robot(ingest_log([file]), urm_chain("urm2", (0.2, 0.2, 0.2), [0.5, 0.5]))
+    run = with_robot(ingest_log([file]), urm_chain("urm2", (0.2, 0.2, 0.2), [0.5, 0.5]))
     assert (run.tcp, run.warnings) == (None, ())

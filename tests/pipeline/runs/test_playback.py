@@ -14,7 +14,7 @@ from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.repolarization.audit import AuditEntry
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.playback import MOST, PARTS, Playback, play_back
+from urmpipe_pipeline.runs.playback import MOST, PARTS, Playback, replay_raw
 from urmpipe_pipeline.runs.run import Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
@@ -28,7 +28,7 @@ def run() -> Run:
 
 @pytest.fixture(scope="module")
 def played(run: Run) -> Playback:
-    return there(play_back(run))
+    return there(replay_raw(run))
 
 
 def p7(phi: FloatArray) -> FloatArray:
@@ -62,7 +62,7 @@ def test_at_rows_outside_the_jumps_the_tool_is_where_the_run_has_it(run: Run, pl
 
 def test_of_a_resampled_run_the_rows_of_the_file_are_played_back(run: Run) -> None:
     coarse = ingest_log([LOGS / "coppeliasim.csv"], robot=run.robot, tsp=0.02)
-    result = there(play_back(coarse))
+    result = there(replay_raw(coarse))
     assert result.jumps == 13
     rows = np.searchsorted(run.log.t, result.t[~result.jumping])
     np.testing.assert_array_equal(result.q[~result.jumping], run.log.q[rows])
@@ -124,8 +124,8 @@ def test_speed_across_a_jump_is_the_jacobian_of_a_turn_a_period(run: Run, played
 
 
 def test_a_log_without_a_jump_or_without_a_robot_is_not_played_back(run: Run) -> None:
-    assert play_back(replace(run, audit=())) is None
-    assert play_back(replace(run, robot=None, tcp=None)) is None
+    assert replay_raw(replace(run, audit=())) is None
+    assert replay_raw(replace(run, robot=None, tcp=None)) is None
 
 
 def test_a_missing_sample_at_a_jump_leaves_the_rest(run: Run) -> None:
@@ -134,7 +134,7 @@ def test_a_missing_sample_at_a_jump_leaves_the_rest(run: Run) -> None:
     q[row - 2, :] = np.nan
     holed = replace(run, log=replace(run.log, q=q))
     before = q.copy()
-    result = there(play_back(holed))
+    result = there(replay_raw(holed))
     np.testing.assert_array_equal(holed.log.q, before)
     assert np.isfinite(result.off).all()
     assert result.off[there(result.worst)] == pytest.approx(1.16687706595, abs=1e-10)
@@ -147,7 +147,7 @@ def test_neighbouring_jumps_share_their_row_and_of_many_the_first_are_played(run
         AuditEntry(run.log.joints[0], row + 1, (row - 0.5) * run.tsp, run.tsp / 2, -6.28, 0, 1)
         for row in range(1, MOST + 500)
     )
-    result = there(play_back(replace(run, log=replace(run.log, q=q), audit=audit)))
+    result = there(replay_raw(replace(run, log=replace(run.log, q=q), audit=audit)))
     assert result.jumps == MOST
     assert np.count_nonzero(result.jumping) == MOST * PARTS + 1
     assert (np.diff(result.t) > 0).all()

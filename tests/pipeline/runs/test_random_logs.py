@@ -26,7 +26,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.math3d import translation
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
-from urmpipe_pipeline.repolarization.audit import Audited, audit_log
+from urmpipe_pipeline.repolarization.audit import AuditResult, audit_log
 
 TSP_NS = 5_000_000
 APART = 6
@@ -124,12 +124,12 @@ def case_of(
     return Case(log, 1.001 * move / TSP_NS * 1e9, true[kept], *at)
 
 
-def audited(case: Case, known: bool) -> Audited:
+def audited(case: Case, known: bool) -> AuditResult:
     arm = Chain("arm", (Joint("q1", "revolute", velocity=case.speed),), tip=translation(0.1, 0.0, 0.0))
     return audit_log(case.log, arm if known else None)
 
 
-def hold(case: Case, found: Audited) -> int:
+def hold(case: Case, found: AuditResult) -> int:
     """Hold the law of this module; return how many steps were not decidable."""
     here = np.flatnonzero(~np.isnan(case.log.q[:, 0]))
     here = here[~np.isin(here, case.on_jump)]

@@ -18,7 +18,12 @@ from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded, infer_robot, lacking_tool, outlying_start
+from urmpipe_pipeline.runs.recorded_tcp import (
+    count_initial_outliers,
+    infer_robot,
+    missing_tool_warning,
+    recorded_tcp_warnings,
+)
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -38,7 +43,7 @@ def log(q: FloatArray, recorded: FloatArray) -> JointLog:
 
 
 def said(q: FloatArray, recorded: FloatArray) -> str:
-    (warning,) = far_from_recorded(UR5E, log(q, recorded))
+    (warning,) = recorded_tcp_warnings(UR5E, log(q, recorded))
     assert warning.kind == "recorded-tcp-far"
     return warning.message
 
@@ -46,7 +51,7 @@ def said(q: FloatArray, recorded: FloatArray) -> str:
 @pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (0.02, 0.0, 0.15)])
 def test_an_unknown_tool_is_no_reason(tool: tuple[float, float, float]) -> None:
     recorded = positions_over_log(UR5E.placed(tool=translation(*tool)), Q)
-    assert far_from_recorded(UR5E, log(Q, recorded)) == []
+    assert recorded_tcp_warnings(UR5E, log(Q, recorded)) == []
 
 
 def test_exchanged_joints_are_found() -> None:
@@ -70,7 +75,7 @@ def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
             LogColumn(exchanged.joints[k], header, "joint", k, "rad", number=k + 7)
             for k, header in enumerate(headers)
         )
-        (warning,) = far_from_recorded(UR5E, replace(exchanged, columns=columns))
+        (warning,) = recorded_tcp_warnings(UR5E, replace(exchanged, columns=columns))
         assert warning.format("command line").endswith(f"--joints {option} exchanges them")
 
 
@@ -82,13 +87,13 @@ def test_a_joint_that_is_counted_the_other_way_is_found() -> None:
 def test_another_base_is_found_and_its_option_helps() -> None:
     base = from_offset((0.5, -0.3, 0.8, 0.0, 0.0, 1.2))
     recorded = positions_over_log(UR5E.placed(base=base), Q)
-    (warning,) = far_from_recorded(UR5E, log(Q, recorded))
+    (warning,) = recorded_tcp_warnings(UR5E, log(Q, recorded))
     assert warning.message.endswith("on another base they agree within 0.00 mm")
     (hint,) = warning.hints
     found = np.array(hint.value)
     np.testing.assert_allclose(found, (0.5, -0.3, 0.8, 0.0, 0.0, 1.2), atol=5e-5)  # as printed
     placed = UR5E.placed(base=from_offset(found.tolist()))
-    assert far_from_recorded(placed, log(Q, recorded)) == []
+    assert recorded_tcp_warnings(placed, log(Q, recorded)) == []
 
 
 def test_another_robot_is_only_told_of() -> None:
@@ -98,18 +103,18 @@ def test_another_robot_is_only_told_of() -> None:
 
 def test_nothing_is_said_without_motion_robot_or_recorded_tcp() -> None:
     still = np.broadcast_to(Q[:1], Q.shape)
-    assert far_from_recorded(UR5E, log(np.ascontiguousarray(still), np.full((60, 3), 0.5))) == []
-    assert far_from_recorded(None, log(Q, np.full((60, 3), 0.5))) == []
-    assert far_from_recorded(UR5E, JointLog("log", "table", (), np.arange(60), tuple("abcdef"), Q)) == []
+    assert recorded_tcp_warnings(UR5E, log(np.ascontiguousarray(still), np.full((60, 3), 0.5))) == []
+    assert recorded_tcp_warnings(None, log(Q, np.full((60, 3), 0.5))) == []
+    assert recorded_tcp_warnings(UR5E, JointLog("log", "table", (), np.arange(60), tuple("abcdef"), Q)) == []
 
 
 def test_a_tool_that_was_not_told_is_found() -> None:
     recorded = positions_over_log(UR5E.placed(tool=translation(0.02, 0.0, 0.15)), Q)
-    (warning,) = lacking_tool(UR5E, log(Q, recorded))
+    (warning,) = missing_tool_warning(UR5E, log(Q, recorded))
     assert warning.kind == "recorded-tcp-tool"
     assert warning.message == ("the kinematics of ur5e stay 151.3 mm (rms) from the recorded TCP")
-    assert lacking_tool(UR5E.placed(tool=translation(0.02, 0.0, 0.15)), log(Q, recorded)) == []
-    (other,) = lacking_tool(UR5E.placed(tool=translation(0.0, 0.0, 0.1)), log(Q, recorded))
+    assert missing_tool_warning(UR5E.placed(tool=translation(0.02, 0.0, 0.15)), log(Q, recorded)) == []
+    (other,) = missing_tool_warning(UR5E.placed(tool=translation(0.0, 0.0, 0.1)), log(Q, recorded))
     assert other.hints[0].value == [0.02, 0.0, 0.15]  # the whole tool, not what is lacking
 
 
@@ -119,7 +124,7 @@ def test_a_tool_that_was_not_told_is_found() -> None:
 )
 def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) -> None:
     recorded = positions_over_log(UR5E.placed(base=from_offset(base)), Q)
-    (warning,) = lacking_tool(UR5E, log(Q, recorded))
+    (warning,) = missing_tool_warning(UR5E, log(Q, recorded))
     told = warning.format("command line")
     assert told.endswith(
         f" mm (rms) from the recorded TCP; --robot ur5e --base {said} brings them within 0.00 mm"
@@ -128,7 +133,9 @@ def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) 
 
 def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool() -> None:
     still = np.repeat(Q[:1], len(Q), axis=0)
-    (warning,) = lacking_tool(UR5E, log(still, positions_over_log(UR5E, still) + np.array([0.0, 0.0, 0.15])))
+    (warning,) = missing_tool_warning(
+        UR5E, log(still, positions_over_log(UR5E, still) + np.array([0.0, 0.0, 0.15]))
+    )
     up = np.linalg.inv(poses_over_log(UR5E, still[:1])[1][0])[:, 2] * 0.15
     shown = ",".join(f"{value:g}" for value in np.round(up, 4) + 0.0)
     assert warning.format("command line") == (
@@ -138,16 +145,16 @@ def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool(
     )
     few = still[:3]  # too few poses for a tool, and not one tool for all of them
     scattered = positions_over_log(UR5E, few) + np.array([[0.15], [0.25], [0.2]])
-    (warning,) = lacking_tool(UR5E, log(few, scattered))
+    (warning,) = missing_tool_warning(UR5E, log(few, scattered))
     assert warning.format("command line").endswith("base is missing; --tool X,Y,Z or --base X,Y,Z sets it")
     tooled = UR5E.placed(tool=translation(0.0, 0.0, 0.1))
-    (warning,) = lacking_tool(tooled, log(still, positions_over_log(UR5E, still)))
+    (warning,) = missing_tool_warning(tooled, log(still, positions_over_log(UR5E, still)))
     assert warning.format("command line") == (
         "the kinematics of ur5e stay 100.0 mm (rms) from the recorded TCP, and the log moves too"
         " little to show why: perhaps the tool, 100.0 mm long, is another, or a base is missing;"
         " --robot ur5e --tool 0,0,0 brings them within 0.00 mm here"
     )
-    assert lacking_tool(UR5E, log(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))) == []
+    assert missing_tool_warning(UR5E, log(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))) == []
 
 
 def turning(robot: Chain, q: FloatArray) -> dict[str, Any]:
@@ -166,30 +173,30 @@ def test_another_robot_of_the_catalogue_is_found_behind_a_tool_and_a_calibration
     rng = np.random.default_rng(SIX.index(true))
     tool = translation(0.02, 0.0, 0.15)
     recorded = positions_over_log(calibrated(load_robot(true).placed(tool=tool), 3e-4, rng), Q)
-    assert far_from_recorded(load_robot(true), log(Q, recorded)) == []
+    assert recorded_tcp_warnings(load_robot(true), log(Q, recorded)) == []
     for given in sorted({*SIX} - {true, TWINS.get(true)}):
-        (warning,) = far_from_recorded(load_robot(given), log(Q, recorded))
+        (warning,) = recorded_tcp_warnings(load_robot(given), log(Q, recorded))
         assert ("robot", true) in [(hint.parameter, hint.value) for hint in warning.hints]
 
 
 def test_a_still_arm_tells_of_another_robot_that_needs_no_tool() -> None:
     still = np.repeat(Q[:1], len(Q), axis=0)
     recorded = positions_over_log(UR5E, still) + np.array([0.001, 0.0, 0.001])
-    (warning,) = far_from_recorded(load_robot("ur5"), log(still, recorded))
+    (warning,) = recorded_tcp_warnings(load_robot("ur5"), log(still, recorded))
     assert re.fullmatch(
         r"the kinematics of ur5 stay \d+\.\d mm \(rms\) from the recorded TCP:"
         r" those of ur5e agree within 1.41 mm",
         warning.message,
     )
-    assert lacking_tool(load_robot("ur5"), log(still, recorded)) == []  # one line a cause
-    assert far_from_recorded(UR5E, log(still, recorded)) == []
+    assert missing_tool_warning(load_robot("ur5"), log(still, recorded)) == []  # one line a cause
+    assert recorded_tcp_warnings(UR5E, log(still, recorded)) == []
 
 
 @pytest.mark.parametrize("joint", range(5))
 def test_a_sign_shows_in_a_small_motion_too(joint: int) -> None:
     """The arm comes within 20 mm of it by some tool, in a motion of 22 mm rms."""
     q = Q[0] + 0.15 * (Q - Q[0])
-    (warning,) = far_from_recorded(
+    (warning,) = recorded_tcp_warnings(
         UR5E, log(q * np.where(np.arange(6) == joint, -1, 1), positions_over_log(UR5E, q))
     )
     assert float(warning.message.partition("TCP (")[2].partition(" mm")[0]) < 20.0
@@ -199,9 +206,9 @@ def test_a_sign_shows_in_a_small_motion_too(joint: int) -> None:
 def test_the_orientation_tells_of_a_joint_that_moves_no_point() -> None:
     recorded = positions_over_log(UR5E, Q)
     backwards = replace(log(Q * [1, 1, 1, 1, 1, -1], recorded), **turning(UR5E, Q))
-    (warning,) = far_from_recorded(UR5E, backwards)
+    (warning,) = recorded_tcp_warnings(UR5E, backwards)
     assert "with q6 reversed in sign they agree within 0.00 mm and" in warning.message
-    assert far_from_recorded(UR5E, replace(log(Q, recorded), **turning(UR5E, Q))) == []
+    assert recorded_tcp_warnings(UR5E, replace(log(Q, recorded), **turning(UR5E, Q))) == []
 
 
 def calibrated(robot: Chain, size: float, rng: np.random.Generator) -> Chain:
@@ -236,7 +243,7 @@ def test_nothing_is_said_of_logs_that_are_right() -> None:
         if seed % 2:
             one = replace(one, **turning(held, q))
         given = robot.placed(tool=tool) if seed % 3 else robot
-        assert far_from_recorded(given, one) == [], f"seed {seed}"
+        assert recorded_tcp_warnings(given, one) == [], f"seed {seed}"
 
 
 def test_the_rotation_of_a_tool_is_in_the_hint_and_helps() -> None:
@@ -245,19 +252,19 @@ def test_the_rotation_of_a_tool_is_in_the_hint_and_helps() -> None:
         log(Q, positions_over_log(UR5E.placed(tool=tool), Q)), **turning(UR5E.placed(tool=tool), Q)
     )
     for turned in (False, True):
-        (warning,) = lacking_tool(UR5E, recorded, turned=turned)
+        (warning,) = missing_tool_warning(UR5E, recorded, turned=turned)
         (hint,) = warning.hints
         assert hint.format("command line") == "--robot ur5e --tool 0.02,0,0.15,0.3,-0.2,1.5708"
         assert isinstance(hint.value, list)
         given = UR5E.placed(tool=from_offset([float(value) for value in hint.value]))
-        assert lacking_tool(given, recorded, turned=turned) == []
+        assert missing_tool_warning(given, recorded, turned=turned) == []
 
 
 def test_only_a_turned_tool_is_found_where_orientations_are_judged() -> None:
     tool = from_offset((0.0, 0.0, 0.0, 0.0, 0.0, 0.5))
     recorded = replace(log(Q, positions_over_log(UR5E, Q)), **turning(UR5E.placed(tool=tool), Q))
-    assert lacking_tool(UR5E, recorded) == []
-    (warning,) = lacking_tool(UR5E, recorded, turned=True)
+    assert missing_tool_warning(UR5E, recorded) == []
+    (warning,) = missing_tool_warning(UR5E, recorded, turned=True)
     assert warning.format("command line") == (
         "the kinematics of ur5e stay 0.0 mm and 28.65 deg (rms) from the recorded TCP;"
         " --robot ur5e --tool 0,0,0,0,0,0.5 brings them within 0.00 mm and 0.0 deg"
@@ -267,7 +274,7 @@ def test_only_a_turned_tool_is_found_where_orientations_are_judged() -> None:
 def test_an_arm_from_a_file_is_not_called_by_a_name_of_the_catalogue() -> None:
     own = replace(UR5E, tip=translation(0.0, 0.0, 0.01))
     recorded = positions_over_log(own.placed(tool=translation(0.0, 0.0, 0.15)), Q)
-    (warning,) = lacking_tool(own, log(Q, recorded))
+    (warning,) = missing_tool_warning(own, log(Q, recorded))
     assert warning.hints[0].format("python") == "tool=[0, 0, 0.15]"
 
 
@@ -282,15 +289,15 @@ def test_first_rows_without_a_tool_are_told_and_count_nowhere_else(rows: int) ->
     recorded = positions_over_log(TOOLED, Q)
     recorded[:rows] = positions_over_log(UR5E, Q)[:rows]
     first = "the first row" if rows == 1 else f"the first {rows} rows"
-    (told,) = far_from_recorded(TOOLED, log(Q, recorded))
+    (told,) = recorded_tcp_warnings(TOOLED, log(Q, recorded))
     assert (told.kind, told.row, told.message) == (
         "recorded-tcp-start",
         1,
         f"{first} of 60 recorded the TCP 151.3 mm from where the others have it: no tool or pose known"
         " yet? They are kept and judged with the others",
     )
-    assert lacking_tool(TOOLED, log(Q, recorded)) == []
-    (lacking,) = lacking_tool(UR5E, log(Q, recorded))
+    assert missing_tool_warning(TOOLED, log(Q, recorded)) == []
+    (lacking,) = missing_tool_warning(UR5E, log(Q, recorded))
     assert lacking.hints[0].value == [0.0, 0.02, 0.15]
 
 
@@ -298,7 +305,7 @@ def test_first_points_of_zeros_are_told_without_a_robot_and_hide_none() -> None:
     recorded = positions_over_log(TOOLED, Q)
     recorded[:12] = 0.0
     for robot in (None, TOOLED, UR5E):
-        (told,) = far_from_recorded(robot, log(Q, recorded))
+        (told,) = recorded_tcp_warnings(robot, log(Q, recorded))
         assert told.message.startswith("the first 12 rows of 60 recorded the TCP as 0, 0, 0: ")
     position = positions_over_log(UR5E, Q) * (np.arange(60) > 11)[:, None]
     rad, metre = (vocabulary().units[name] for name in ("rad", "m"))
@@ -312,14 +319,14 @@ def test_the_last_outlying_row_of_a_long_log_is_found_between_those_looked_at() 
     q = 0.4 + np.arange(6) * 0.3 + 0.5 * np.sin(t * (1 + 0.4 * np.arange(6)))
     recorded = positions_over_log(TOOLED, q)
     recorded[:3210] = positions_over_log(UR5E, q)[:3210]
-    assert outlying_start(TOOLED, log(q, recorded))[0] == 3210
+    assert count_initial_outliers(TOOLED, log(q, recorded))[0] == 3210
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_start_is_not_told_where_no_row_has_both_sides() -> None:
     q, recorded = Q.copy(), positions_over_log(UR5E, Q)
     q[::2], recorded[1::2] = np.nan, np.nan
-    assert outlying_start(TOOLED, log(q, recorded)) == (0, np.inf)
+    assert count_initial_outliers(TOOLED, log(q, recorded)) == (0, np.inf)
 
 
 REAL = {
@@ -338,7 +345,7 @@ def test_real_logs_tell_their_robot_from_any_other(file: str) -> None:
     run = ingest_log([SHARED / file], robot=load_robot(robot), read=ReadOptions(unit=unit or {}))
     assert [one for one in run.warnings if one.kind.startswith("recorded-tcp")] == []
     for given in [] if "10rows" in file else sorted({*SIX} - {robot}):
-        (warning,) = far_from_recorded(load_robot(given), run.log)
+        (warning,) = recorded_tcp_warnings(load_robot(given), run.log)
         assert [(hint.parameter, hint.value) for hint in warning.hints] == [("robot", robot)], given
         assert f": those of {robot} agree within " in warning.message
 

@@ -18,7 +18,7 @@ from urmpipe_pipeline.presentation.figure import Figure, SpaceFigure
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.playback import play_back
+from urmpipe_pipeline.runs.playback import replay_raw
 from urmpipe_pipeline.runs.run import Run
 
 
@@ -109,7 +109,7 @@ def test_the_motion_is_that_of_the_kinematics(run: Run, shown: Presentation) -> 
 
 
 def test_a_page_shows_the_playback(run: Run, shown: Presentation) -> None:
-    played = there(play_back(run))
+    played = there(replay_raw(run))
     blocks = {one.title: one for one in shown.body.blocks()}
     before = cast("Figure", blocks["Tool centre point before and after repolarization"]).views[0].panels
     np.testing.assert_array_equal(before[0].lines[0].values, played.position)

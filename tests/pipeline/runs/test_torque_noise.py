@@ -20,7 +20,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Table
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
-from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 
@@ -133,9 +133,9 @@ def test_it_rests_on_the_robot(tmp_path: Path) -> None:
     bare = replace(UR10, inertials=())
     run = ingest_log([log_of(tmp_path, smooth() + noise(1e-4), "%.9f")], robot=bare)
     assert noisy(run) == []
-    heavy = on_robot(run, UR10)
+    heavy = with_robot(run, UR10)
     assert len(noisy(heavy)) == 1
-    assert noisy(on_robot(heavy, bare)) == []
+    assert noisy(with_robot(heavy, bare)) == []
 
 
 # --- what made the accelerations -------------------------------------------------------------------

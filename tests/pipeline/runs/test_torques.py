@@ -27,11 +27,11 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.presentation.figure import Drawing, Figure
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.ingest import ingest_log, on_robot
+from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
-from urmpipe_pipeline.text import json_ready
+from urmpipe_pipeline.text import to_json_value
 
 SAME = 1e-10
 """Of the largest torque: two ways to compute the same; found are 1e-13."""
@@ -176,7 +176,7 @@ def test_json_has_the_largest_torque_of_each_joint(run: Run) -> None:
         assert (one["effort"], one["unit"]) == (joint.effort, "N.m")
         assert one["effort_share"] == size.max() / joint.effort
         assert one["share_out"] == np.mean(size > joint.effort)
-    json.dumps(json_ready(torques), allow_nan=False)
+    json.dumps(to_json_value(torques), allow_nan=False)
 
 
 def test_a_torque_beyond_the_effort_is_said(run: Run) -> None:
@@ -202,7 +202,7 @@ def test_smoothing_is_advised_where_it_is_not_used(
     path = panda_csv(tmp_path, weak.coordinates, 2.2)
     for found in (
         ingest_log([path], robot=weak, derivative=derivative),
-        on_robot(ingest_log([path], robot=run.robot, derivative=derivative), weak),
+        with_robot(ingest_log([path], robot=run.robot, derivative=derivative), weak),
     ):
         (warning,) = (one for one in found.warnings if one.kind == "effort-limit")
         assert [(one.parameter, one.value) for one in warning.hints] == count * [("derivative", "savgol")]
@@ -222,7 +222,7 @@ def test_recorded_accelerations_are_not_to_be_smoothed(tmp_path: Path) -> None:
 def test_several_joints_beyond_their_efforts_are_one_warning(run: Run) -> None:
     robot = there(run.robot)
     weak = replace(robot, joints=tuple(replace(one, effort=40.0) for one in robot.joints))
-    (warning,) = (one for one in on_robot(run, weak).warnings if one.kind == "effort-limit")
+    (warning,) = (one for one in with_robot(run, weak).warnings if one.kind == "effort-limit")
     counts = np.count_nonzero(np.abs(there(run.tau)) > 40.0, axis=0).tolist()
     assert warning.row == np.flatnonzero((np.abs(there(run.tau)) > 40.0).any(axis=1))[0] + 1
     others = [f"panda_joint{j + 1} ({counts[j]} samples)" for j in (0, 2, 3) if counts[j]]
@@ -270,7 +270,7 @@ def test_no_limit_is_applied_where_the_period_of_the_rows_is_assumed(moved: bool
     values = 0.1 * np.sin(0.05 * np.arange(200.0))
     path.write_text("\n".join(["q1 [m]", *map(repr, values.tolist())]) + "\n", encoding="utf-8")
     run = ingest_log([path], robot=slider(effort=25.0))
-    run = on_robot(run, slider(effort=24.0)) if moved else run
+    run = with_robot(run, slider(effort=24.0)) if moved else run
     assert run.timed and run.log.period_assumed
     largest = np.abs(there(run.tau)).max()
     assert largest > 25.0
@@ -299,7 +299,7 @@ def test_still_poses_have_no_torques(tmp_path: Path) -> None:
 
 
 def test_a_robot_without_masses_gives_what_it_gave(run: Run) -> None:
-    bare = on_robot(run, replace(there(run.robot), inertials=(), left_out=()))
+    bare = with_robot(run, replace(there(run.robot), inertials=(), left_out=()))
     assert bare.tau is None
     assert [name for name in bare.to_frame().columns if name.startswith("tau_")] == []
     assert bare.to_dict()["torques"] == []
@@ -314,9 +314,9 @@ def test_a_robot_without_masses_gives_what_it_gave(run: Run) -> None:
 
 def test_another_robot_gets_its_own_torques(run: Run) -> None:
     robot = there(run.robot)
-    double = on_robot(run, replace(robot, inertials=2 * robot.inertials))
+    double = with_robot(run, replace(robot, inertials=2 * robot.inertials))
     np.testing.assert_allclose(there(double.tau), 2.0 * there(run.tau), rtol=0, atol=1e-10)
-    again = on_robot(double, robot)
+    again = with_robot(double, robot)
     np.testing.assert_array_equal(again.tau, run.tau)
     assert {one.kind for one in again.warnings} == {one.kind for one in run.warnings}
 
@@ -359,7 +359,7 @@ def test_a_plan_within_its_efforts_or_in_the_way_of_something_has_no_such_warnin
 
 @pytest.mark.slow
 def test_a_plan_on_another_arm_is_told_to_move_slower() -> None:
-    run = on_robot(planned(load_robot("ur10"), SMALL).as_run(), limited("ur10", effort=60.0))
+    run = with_robot(planned(load_robot("ur10"), SMALL).as_run(), limited("ur10", effort=60.0))
     (warning,) = (one for one in run.warnings if one.kind == "effort-limit")
     assert "move slower" in warning.message and warning.hints == ()
 

@@ -18,7 +18,7 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.repolarization.audit import turning
+from urmpipe_pipeline.repolarization.audit import is_revolute
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_log, read_map
 
@@ -365,9 +365,9 @@ def test_joints_turn_by_their_own_columns(write: Write) -> None:
     table = csv(names, Q[:, :2] * DEG, FLANGE)
     options = ReadOptions(joints=("a", "b"), names=("x", "b"))
     run = ingest_log([write(table)], read=options)
-    assert (turning(run.log, None).tolist(), run.joint_units) == ([True, True], ["rad", "rad"])
+    assert (is_revolute(run.log, None).tolist(), run.joint_units) == ([True, True], ["rad", "rad"])
     bare = replace(run.log, columns=())
-    assert (turning(bare, None).tolist(), bare.joint_units) == ([True, True], ("rad", "rad"))
+    assert (is_revolute(bare, None).tolist(), bare.joint_units) == ([True, True], ("rad", "rad"))
 
 
 def test_the_same_unit_for_every_angle_confirms_the_names(read: Read) -> None:

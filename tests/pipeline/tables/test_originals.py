@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from urmpipe_pipeline.joint_log import LogColumn
-from urmpipe_pipeline.runs.file_columns import originals, to_si
+from urmpipe_pipeline.runs.file_columns import to_file_values, to_si
 
 FACTORS = {"deg": 0.017453292519943295, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 
@@ -19,7 +19,7 @@ def column(unit: str, sign: int = 1, offset: float = 0.0) -> LogColumn:
 
 def there_and_back(numbers: list[float], how: LogColumn) -> list[float]:
     values = to_si(np.array(numbers), how)
-    back = originals(values, how)
+    back = to_file_values(values, how)
     np.testing.assert_array_equal(to_si(back, how), values)
     return [float(number) for number in back]
 
@@ -71,7 +71,7 @@ def test_decimals_come_back_through_an_offset(
 
 def test_missing_samples_stay_missing_and_the_input_is_left_alone() -> None:
     values = np.array([np.nan, 0.5])
-    back = originals(values, column("deg"))
+    back = to_file_values(values, column("deg"))
     assert np.isnan(back[0])
     np.testing.assert_array_equal(values, [np.nan, 0.5])
 
@@ -79,4 +79,4 @@ def test_missing_samples_stay_missing_and_the_input_is_left_alone() -> None:
 @pytest.mark.parametrize("value", [5e-324, 1e-300, 1e300, np.inf, -np.inf])
 def test_extremes_do_not_break_it(value: float) -> None:
     values = np.array([value])
-    assert to_si(originals(values, column("mm")), column("mm")) == values
+    assert to_si(to_file_values(values, column("mm")), column("mm")) == values

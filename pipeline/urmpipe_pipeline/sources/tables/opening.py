@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
-from urmpipe_pipeline.joint_log import OWN, Inference
+from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference
 from urmpipe_pipeline.sources.cells.cell import is_number
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
@@ -105,7 +105,7 @@ def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain:
     names = _names(layouts)
     known, why = _known(names, options.source, titles if forced else ())
     if known is None and options.source is None and all(map(in_si, layouts)):
-        known, why = vocabulary().source(OWN), "what its columns are called, and their units"
+        known, why = vocabulary().source(URMPIPE_SOURCE), "what its columns are called, and their units"
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
     said = Inference("source", name, why, hints=(Hint("source"),))
     foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
