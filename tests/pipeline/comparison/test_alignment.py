@@ -25,7 +25,7 @@ from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import deviation_facts
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Advice
-from urmpipe_pipeline.runs.other_robot import on_robot
+from urmpipe_pipeline.runs.ingest import with_robot
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import Alignment, AlignMode
 
@@ -331,7 +331,7 @@ def test_the_base_and_the_tool_that_are_advised_give_the_same_deviation() -> Non
     assert isinstance(advice, Advice)
     base, tool = (from_offset(cast("list[float]", hint.value)) for hint in advice.hints)
     assert [hint.parameter for hint in advice.hints] == ["base", "tool"]
-    told = on_robot(run, there(run.robot).placed(base, tool))
+    told = with_robot(run, there(run.robot).placed(base, tool))
     after = compare_recorded(told).runs[0]
     np.testing.assert_allclose(after.delta, found.delta, atol=5e-7)  # 7 digits, of angles on an arm of 1 m
     np.testing.assert_allclose(there(after.angle), there(found.angle), atol=5e-7)

@@ -22,7 +22,7 @@ from urmpipe_pipeline.comparison.baseline import DEFAULT_NOISE, against_baseline
 from urmpipe_pipeline.comparison.baseline_section import worse_words
 from urmpipe_pipeline.comparison.change import Absent, Difference
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.json_values import json_ready
+from urmpipe_pipeline.text import to_json_value
 from urmpipe_pipeline.trajectories import Sync
 
 Compared = Callable[..., Comparison]
@@ -239,7 +239,7 @@ def test_the_result_is_json_in_the_comparison(paths: Compared) -> None:
     held = replace(now, baseline=against_baseline(now, before))
     assert (held.verdict, held.within_tolerance, now.verdict) == ("fail", True, "pass")
     assert (held.to_dict()["verdict"], now.to_dict()["baseline"]) == ("fail", None)
-    told = json.loads(json.dumps(json_ready(held.to_dict())))["baseline"]
+    told = json.loads(json.dumps(to_json_value(held.to_dict())))["baseline"]
     assert (told["name"], told["recording"], told["verdict"]) == ("against-path", "old.rrd", "fail")
     assert told["noise"] == DEFAULT_NOISE
     assert told["gone"] == [{"run": "old", "quantity": None}]
