@@ -20,7 +20,7 @@ from pairs import Bound, machine, ratio, rounds, table, write_results
 
 from urmpipe_datasets import LOGS
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.nearest_path import distance_from_path
+from urmpipe_pipeline.comparison.path_distance import distance_from_path
 
 CASES = [(1, 1), (1, 3), (1, 30), (10, 3), (10, 30), (10, 300)]
 """Every so many samples of the motion are taken, and it is repeated so often."""

@@ -22,8 +22,7 @@ from urmpipe_models.errors import (
     format_value,
     map_collecting_errors,
 )
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.unjudged import Unjudged
+from urmpipe_pipeline.comparison.comparison import Comparison, Unjudged
 from urmpipe_pipeline.networks.network_motion import NetworkMotion
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording

@@ -23,7 +23,7 @@ from urmpipe.main import cli, run
 from urmpipe.options.comparing import SYNC
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import Statistics
-from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
+from urmpipe_pipeline.comparison.verdict import LEAST_SHARES
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,7 @@ import urmpipe
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
+from urmpipe_pipeline.comparison.verdict import LEAST_SHARES
 
 Spoil = Callable[[FloatArray], FloatArray]
 

@@ -21,7 +21,7 @@ from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
 from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
+from urmpipe_pipeline.comparison.verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simulation

@@ -13,7 +13,7 @@ from asserting import refusal
 from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
+from urmpipe_pipeline.comparison.verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.simulations.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation

@@ -24,13 +24,11 @@ from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, Voice, map_collecting_errors
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
-from urmpipe_pipeline.comparison.clocks import CLOCKS_DIFFER
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison, Unjudged, judge_others
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tolerance import parse_tolerance
-from urmpipe_pipeline.comparison.unjudged import Unjudged, judge_others
-from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
+from urmpipe_pipeline.comparison.verdict import parse_tolerance
+from urmpipe_pipeline.comparison.warnings import CLOCKS_DIFFER, LARGE_NOISE, SWAPPED, large_noises
 from urmpipe_pipeline.operands import (
     BASELINE_HINT,
     RUN_LIKE,
@@ -322,7 +320,7 @@ def _with_noise(made: Comparison, noise: Mapping[str, float]) -> Comparison:
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
-    explaining = (MISSING_TOOL, EXCHANGED, CLOCKS_DIFFER)  # a result, and no doubts about it
+    explaining = (MISSING_TOOL, SWAPPED, CLOCKS_DIFFER)  # a result, and no doubts about it
     doubts = [w for w in result.warnings if w.kind not in explaining]
     refuse_warnings(strict, (*of_logs, *doubts))
 

@@ -24,7 +24,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
         return None
     if ctx.get_parameter_source("tolerance") != ParameterSource.DEFAULT_MAP:
         return float(parsed(DEVIATION.read, value.removeprefix("axis="), ctx, param))
-    from urmpipe_pipeline.comparison.tolerance import parse_tolerance
+    from urmpipe_pipeline.comparison.verdict import parse_tolerance
 
     kinds: dict[str, float] = parsed(parse_tolerance, value, ctx, param)
     return kinds.get("axis")

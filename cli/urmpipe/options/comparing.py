@@ -34,7 +34,7 @@ def _sync(text: str) -> str | float:
 
 def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
     """Return the text of all tolerances, joined by commas, after a check that it can be read."""
-    from urmpipe_pipeline.comparison.tolerance import parse_tolerance
+    from urmpipe_pipeline.comparison.verdict import parse_tolerance
 
     text = ",".join(values)
     parsed(partial(parse_tolerance, iso=bool(ctx.params.get("iso"))), text, ctx, param)

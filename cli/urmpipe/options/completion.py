@@ -78,7 +78,7 @@ def units(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[C
 def tolerances(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the completions of KIND=VALUE,...: kinds, those of ISO 9283 behind --iso, and units."""
     from urmpipe_models.measure_units import WRITTEN
-    from urmpipe_pipeline.comparison.tolerance import DEVIATIONS, LEAST_SHARES, UNITS
+    from urmpipe_pipeline.comparison.verdict import DEVIATIONS, LEAST_SHARES, UNITS
 
     before, comma, last = incomplete.rpartition(",")
     if number := BEGUN.fullmatch(last):

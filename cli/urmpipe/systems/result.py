@@ -19,7 +19,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.measure_units import readings
 from urmpipe_models.toml_tables import quote_toml
-from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
+from urmpipe_pipeline.comparison.verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.coupling import coupling_warnings

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.delta import delta
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.comparison.nearest_path import distance_from_path
+from urmpipe_pipeline.comparison.path_distance import distance_from_path
 from urmpipe_pipeline.joint_log import ns_to_seconds
 
 

@@ -10,16 +10,16 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.math3d import Transform, matrix_to_rpy
-from urmpipe_pipeline.comparison.change import (
+from urmpipe_pipeline.comparison.comparison import (
     Absent,
     BaselineComparison,
     Change,
+    Comparison,
     CriterionChange,
     Difference,
 )
-from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
-from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, allowed_for, check_tolerance, parse_tolerance
+from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, allowed_for, check_tolerance, parse_tolerance
 from urmpipe_pipeline.iso9283.criteria import Criterion
 
 LENGTHS = ("axis", "norm", "path")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.change import BaselineComparison, Change, CriterionChange, Worse
+from urmpipe_pipeline.comparison.comparison import BaselineComparison, Change, CriterionChange, Worse
 from urmpipe_pipeline.comparison.deviation import Verdict
-from urmpipe_pipeline.comparison.tolerance import UNITS
+from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.comparison.wording import quantity_name, size_of, symbol
 from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, option_words, table_of

@@ -9,23 +9,30 @@ from typing import Literal, get_args
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, check_choice, map_collecting_errors
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.alignment import align
-from urmpipe_pipeline.comparison.assumptions import assumptions
-from urmpipe_pipeline.comparison.clocks import clocks_differ, late, stamp_offset
+from urmpipe_pipeline.comparison.align import align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.iso import IsoOptions, judge_cycles
 from urmpipe_pipeline.comparison.measure import measure, unheld
-from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
-from urmpipe_pipeline.comparison.tolerance import check_tolerance, complete_tolerance, deviations_of
+from urmpipe_pipeline.comparison.sync import (
+    SyncOption,
+    check_sync,
+    stamp_offset,
+    sync_warnings,
+    synchronise,
+)
+from urmpipe_pipeline.comparison.verdict import check_tolerance, complete_tolerance, deviations_of
 from urmpipe_pipeline.comparison.warnings import (
-    exchanged,
+    clocks_differ,
+    is_late,
     large_tolerances,
     left_out_warnings,
-    open_frames,
-    recorded_apart,
+    recorded_tcp_mismatch,
     same_data,
-    thin_evidence,
+    swapped_operands,
+    undetermined_frames,
+    verdict_assumptions,
+    weak_evidence,
 )
 from urmpipe_pipeline.diagnosis.diagnose import Compared, Limit, diagnose
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
@@ -175,13 +182,17 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if chosen.iso is not None:
         return _test(asked, sides, chosen, same)
     deviations = map_collecting_errors(lambda done: _deviation(asked, done, chosen), sides)
-    told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs), *same]
+    told = [
+        *(one.of(reference.name) for one in reference.warnings),
+        *swapped_operands(reference, runs),
+        *same,
+    ]
     for done, one in zip(sides, deviations, strict=True):
-        told += clocks_differ(wanted, done.trajectory, one) if late(one) else ()
+        told += clocks_differ(wanted, done.trajectory, one) if is_late(one) else ()
     if chosen.tcp == "fk":
         told += _differing_robots([reference, *runs])
     if chosen.tcp == "fk" and wanted.joints:
-        told += recorded_apart((reference, *runs), RECORDED_APART)
+        told += recorded_tcp_mismatch((reference, *runs), RECORDED_APART)
     elif chosen.tcp == "fk":
         failed = [one for one in deviations if one.furthest.verdict == "fail"]
         told += [
@@ -243,7 +254,7 @@ def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOpti
     alike = len({run.log.rows for run, _ in sides}) == 1 and not isinstance(options.sync, (int, float))
     if not (without and alike):  # else the rows are compared one by one, whatever their period
         sides = [(run, {*roles, "time"} if run.timed else roles) for run, roles in sides]
-    return assumptions(sides)
+    return verdict_assumptions(sides)
 
 
 def _compared_roles(run: Run, options: CompareOptions) -> set[Role]:
@@ -356,7 +367,8 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         recorded_trajectory(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None
     )
     computed = replace(fk_trajectory(run), joints=(), joint_units=(), q=None)
-    assumed = assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])  # others go by the joints'
+    # Others go by the orientations of the joints.
+    assumed = verdict_assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])
     sides = Side(run, recorded, by_joints=False), Side(run, computed, by_joints=True)
     found = _comparison(recorded, [_deviation(*sides, chosen)], chosen, (), assumed)
     failed = any(one.furthest.verdict == "fail" for one in found.runs)
@@ -375,9 +387,9 @@ def _comparison(
     deviations_allowed = () if options.from_text else large_tolerances(deviations_of(options.tolerance))
     warnings = [*deviations_allowed, *told]
     for one in deviations if options.iso is None else ():
-        warnings += sync_doubts(one.name, one.sync, one.run.tsp)
+        warnings += sync_warnings(one.name, one.sync, one.run.tsp)
         warnings += left_out_warnings(one, reference)
-        warnings += [*thin_evidence(one), *open_frames(one)]
+        warnings += [*weak_evidence(one), *undetermined_frames(one)]
         if reference.joints and one.run.log.joints and one.joint_delta is None:
             said = f"no joint is compared: {unheld(reference, one.run)}"
             warnings.append(LogWarning("joints-not-compared", said, about=one.name))

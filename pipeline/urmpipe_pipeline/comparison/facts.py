@@ -12,10 +12,10 @@ from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.identification import Twist, apply_twists_to_frames
 from urmpipe_models.math3d import Transform
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.alignment import as_option, placed
+from urmpipe_pipeline.comparison.align import as_option, placed
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics
-from urmpipe_pipeline.comparison.warnings import rests
+from urmpipe_pipeline.comparison.warnings import is_stationary
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
 from urmpipe_pipeline.diagnosis.causes import Cause
 from urmpipe_pipeline.diagnosis.diagnose import LEAST_SAMPLES
@@ -130,7 +130,7 @@ def _undiagnosed(one: Deviation) -> Iterator[Fact]:
 
     Nothing if that is known, with an alignment, or where a diagnosis finds nothing: in one pose, or in few.
     """
-    told = len(one.sample) >= LEAST_SAMPLES and not rests(one)
+    told = len(one.sample) >= LEAST_SAMPLES and not is_stationary(one)
     failed = one.furthest.verdict == "fail"
     if failed and one.diagnosis is None and one.alignment.mode == "none" and told:
         yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))

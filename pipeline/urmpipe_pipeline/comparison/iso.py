@@ -10,12 +10,11 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.coverage import measure_shares
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
-from urmpipe_pipeline.comparison.measure import measure
-from urmpipe_pipeline.comparison.nearest_path import distance_from_path
+from urmpipe_pipeline.comparison.measure import measure, measure_shares
+from urmpipe_pipeline.comparison.path_distance import distance_from_path
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, deviations_of
+from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, deviations_of
 from urmpipe_pipeline.comparison.wording import share_words
 from urmpipe_pipeline.iso9283.command_path import Bend, Stations, Stop
 from urmpipe_pipeline.iso9283.criteria import angles, fewest_cycles

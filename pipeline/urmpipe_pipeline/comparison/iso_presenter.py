@@ -9,12 +9,11 @@ from functools import partial
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.alignment import placed
+from urmpipe_pipeline.comparison.align import placed
 from urmpipe_pipeline.comparison.baseline_section import baseline_section, criterion_checks, worse_facts
-from urmpipe_pipeline.comparison.change import BaselineComparison
-from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import BaselineComparison, Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.tolerance import UNITS
+from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict
 from urmpipe_pipeline.iso9283.figures import (
     CYCLES_COLOUR,

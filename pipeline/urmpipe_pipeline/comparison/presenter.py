@@ -28,7 +28,7 @@ from urmpipe_pipeline.comparison.tables import (
     statistics_rows,
     statistics_tables,
 )
-from urmpipe_pipeline.comparison.tolerance import UNITS
+from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.comparison.wording import (
     amount_words,
     decided_words,

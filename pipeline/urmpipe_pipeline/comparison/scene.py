@@ -8,7 +8,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_pipeline.comparison.alignment import placed
+from urmpipe_pipeline.comparison.align import placed
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.mended import cause_marks, mended_path

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, Statistics, Stretch
-from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
+from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, DeltaVerdict
 from urmpipe_pipeline.presentation.digits import held, written
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.provenance import format_assumptions, format_defaults

@@ -8,9 +8,8 @@ import numpy as np
 
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
-from urmpipe_pipeline.comparison.tolerance import allowed_for
+from urmpipe_pipeline.comparison.verdict import DeltaVerdict, allowed_for
 from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour

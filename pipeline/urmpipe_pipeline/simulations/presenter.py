@@ -8,8 +8,8 @@ from functools import partial
 from itertools import groupby
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
+from urmpipe_pipeline.comparison.verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
 from urmpipe_pipeline.presentation.figure import Drawing, Text
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact

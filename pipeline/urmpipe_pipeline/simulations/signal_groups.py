@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.verdict import DeltaVerdict
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 

@@ -15,8 +15,8 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import CosimulationError, Voice
-from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
+from urmpipe_pipeline.comparison.verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance, list_assumptions

@@ -17,7 +17,7 @@ from flat_arm import lay_flat_arm
 from urmpipe_datasets import LOGS
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.display import Displayable
-from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
+from urmpipe_pipeline.comparison.comparison import Absent, BaselineComparison
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 

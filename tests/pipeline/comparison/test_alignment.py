@@ -19,7 +19,7 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import Transform, from_offset, from_rpy
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.alignment import RESOLVED, as_option, placed
+from urmpipe_pipeline.comparison.align import RESOLVED, as_option, placed
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import deviation_facts

@@ -20,8 +20,7 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.math3d import translation
 from urmpipe_pipeline.comparison.baseline import DEFAULT_NOISE, against_baseline, complete_noise, parse_noise
 from urmpipe_pipeline.comparison.baseline_section import worse_words
-from urmpipe_pipeline.comparison.change import Absent, Difference
-from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Absent, Comparison, Difference
 from urmpipe_pipeline.text import to_json_value
 from urmpipe_pipeline.trajectories import Sync
 

@@ -14,8 +14,13 @@ from asserting import there
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import complete_noise
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.statistics import Measured, describe
-from urmpipe_pipeline.comparison.warnings import large_noises, large_tolerances, recorded_apart, thin_evidence
+from urmpipe_pipeline.comparison.measure import Measured, describe
+from urmpipe_pipeline.comparison.warnings import (
+    large_noises,
+    large_tolerances,
+    recorded_tcp_mismatch,
+    weak_evidence,
+)
 
 Compared = Callable[..., Comparison]
 
@@ -84,9 +89,9 @@ def test_one_sample_is_one_pose(paths: Compared) -> None:
 def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Compared) -> None:
     moving = arms({"log": np.zeros((50, 6))}).runs[0]
     still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)))
-    assert list(thin_evidence(moving)) == list(thin_evidence(still)) == []
+    assert list(weak_evidence(moving)) == list(weak_evidence(still)) == []
     at_rest = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)))
-    assert [one.kind for one in thin_evidence(replace(still, run=at_rest))] == ["one-pose"]
+    assert [one.kind for one in weak_evidence(replace(still, run=at_rest))] == ["one-pose"]
 
 
 def test_encoders_that_flicker_are_no_motion(arms: Compared) -> None:
@@ -95,7 +100,7 @@ def test_encoders_that_flicker_are_no_motion(arms: Compared) -> None:
     for scale, expected in ((1.0, ["one-pose"]), (3.0, [])):
         run = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)) + scale * flicker)
         still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)) + flicker, run=run)
-        assert [one.kind for one in thin_evidence(still)] == expected
+        assert [one.kind for one in weak_evidence(still)] == expected
 
 
 def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) -> None:
@@ -105,7 +110,7 @@ def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) 
     for compared, expected in ((20, ["one-pose"]), (21, [])):
         kept = {name: getattr(moving, name)[:compared] for name in ("sample", "t_ns")}
         resting = replace(moving, **kept, actual=np.zeros((compared, 3)), run=replace(moving.run, q=q))
-        assert [one.kind for one in thin_evidence(resting)] == expected
+        assert [one.kind for one in weak_evidence(resting)] == expected
 
 
 def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compared) -> None:
@@ -134,19 +139,19 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     assert run.tcp is not None
     for away, expected in ((0.0005, []), (0.005, ["recorded-tcp-apart"])):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
-        assert [one.kind for one in recorded_apart([beside], 1e-3)] == expected
+        assert [one.kind for one in recorded_tcp_mismatch([beside], 1e-3)] == expected
     usual = (
         "usual up to 5 mm where a controller uses the calibration of its arm, which this robot model lacks"
     )
     more = "more than a calibration explains (5 mm): another robot, tool or base?"
     for away, shown, cause in ((0.00104, "1.040", usual), (0.0051, "5.100", more)):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
-        assert next(recorded_apart([beside], 1e-3)).message == (
+        assert next(recorded_tcp_mismatch([beside], 1e-3)).message == (
             f"its kinematics are up to {shown} mm from its recorded tool centre point, {cause};"
             " this verdict does not include that; a comparison of bad alone does"
         )
-    assert list(recorded_apart([run], 1e-3)) == []
-    (both,) = recorded_apart([beside, replace(beside, name="worse")], 1e-3)
+    assert list(recorded_tcp_mismatch([run], 1e-3)) == []
+    (both,) = recorded_tcp_mismatch([beside, replace(beside, name="worse")], 1e-3)
     assert both.message == (
         "by forward kinematics bad is up to 5.100 mm and worse is up to 5.100 mm from the recorded tool"
         f" centre points, {more}; this verdict does not include that; a comparison of each alone does"
@@ -158,4 +163,6 @@ def test_first_rows_that_recorded_another_tool_are_not_told_of_as_another_robot(
     assert run.tcp is not None
     position = run.tcp.position + np.array((0, 0, 0.0005))
     position[:4] = 0.0
-    assert list(recorded_apart([replace(run, log=replace(run.log, tcp_position=position))], 1e-3)) == []
+    assert (
+        list(recorded_tcp_mismatch([replace(run, log=replace(run.log, tcp_position=position))], 1e-3)) == []
+    )

@@ -13,9 +13,9 @@ from asserting import refusal, there
 from urmpipe_models.delta import delta as model_delta
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
-from urmpipe_pipeline.comparison.statistics import Measured, describe, overall
+from urmpipe_pipeline.comparison.measure import Measured, describe, overall
+from urmpipe_pipeline.comparison.verdict import delta_verdict
 from urmpipe_pipeline.comparison.wording import meter_words
 
 T_NS = np.array([0, 5_000_000, 10_000_000])

@@ -21,7 +21,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.statistics import UNCHANGING, correlation
+from urmpipe_pipeline.comparison.measure import UNCHANGING, correlation
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.nearest_path import _distances, distance_from_path
+from urmpipe_pipeline.comparison.path_distance import _distances, distance_from_path
 
 ROUNDING = 1e-12
 """Distances of points up to 10 m away round at 2e-15; feet of perpendiculars on tiny pieces at some more."""

@@ -15,12 +15,16 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison import sync_coarse
+from urmpipe_pipeline.comparison import sync as sync_chapter
 from urmpipe_pipeline.comparison.compare import trajectory
-from urmpipe_pipeline.comparison.sync import sync_doubts, synchronise
-from urmpipe_pipeline.comparison.sync_coarse import mean_rates, similarity
-from urmpipe_pipeline.comparison.sync_fine import line_at
-from urmpipe_pipeline.comparison.sync_views import views
+from urmpipe_pipeline.comparison.sync import (
+    iter_channels,
+    linearise,
+    mean_rates,
+    similarity,
+    sync_warnings,
+    synchronise,
+)
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory
@@ -166,7 +170,7 @@ def test_noise_and_gaps_leave_an_error_that_the_precision_tells(seed: int) -> No
     assert sync.precision is not None
     assert abs(sync.offset - 3.4021) < 5.0 * sync.precision
     assert sync.precision < 0.1 * 0.008  # 0.01 rad of noise in 6 rad/s x 3000 samples: some 0.05 ms
-    assert sync_doubts("log", sync, 0.008) == []
+    assert sync_warnings("log", sync, 0.008) == []
 
 
 def test_a_tool_that_is_not_known_does_not_move_the_offset() -> None:
@@ -196,11 +200,11 @@ def test_the_rate_is_the_derivative_of_the_residual_by_the_offset(align: AlignMo
     quat = np.hstack((turn * 0.5 * np.sinc(angle / (2.0 * np.pi)), np.cos(0.5 * angle)))
     motion = smooth(4, 3)(t)
     log = replace(path(motion[700:9000], t[700:9000]), quat_xyzw=quat[700:9000])
-    view = next(views(path(motion, t), log, align))
+    view = next(iter_channels(path(motion, t), log, align))
     assert (view.turned, view.tool_axes is not None) == (align in ("start", "base+tool"), "tool" in align)
     found = there(mean_rates(view))
     offset_ns, step_ns = 1_400_000_000, 1_000_000
-    before, at, after = (line_at(view, found, offset_ns + k * step_ns) for k in (-1, 0, 1))
+    before, at, after = (linearise(view, found, offset_ns + k * step_ns) for k in (-1, 0, 1))
     slope = (after.residual - before.residual) / (2e-9 * step_ns)
     # Both are of lines between samples 2 ms apart: they miss a motion of 0.6 Hz by (2 pi 0.6 0.002)^2 / 8.
     np.testing.assert_allclose(at.rate, slope, rtol=0.0, atol=1e-3 * np.abs(slope).max())
@@ -241,7 +245,7 @@ def test_joints_are_put_together_by_name() -> None:
 @pytest.mark.slow
 def test_more_samples_than_are_looked_at_tell_the_offset_as_well() -> None:
     t = times(0.0, 1500.0, 0.005)
-    assert len(t) > 2 * sync_coarse.MOST
+    assert len(t) > 2 * sync_chapter.MAX_COARSE_SAMPLES
     q = smooth(5, 6)(t)
     sync = synchronise(joints(q, t), joints(q[12345:], t[12345:]), "auto")
     assert sync.offset == 12345 * 0.005
@@ -352,9 +356,9 @@ def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
 
 
 def test_what_is_not_known_well_is_told() -> None:
-    assert sync_doubts("log", Sync("auto", 0.25, "joints", 0.0005, 0.9), 0.005) == []
-    assert sync_doubts("log", Sync("given", 0.25), 0.005) == []
-    assert sync_doubts("log", Sync("auto", 0.25, "joints", 0.00084, 0.85), 0.005) == [
+    assert sync_warnings("log", Sync("auto", 0.25, "joints", 0.0005, 0.9), 0.005) == []
+    assert sync_warnings("log", Sync("given", 0.25), 0.005) == []
+    assert sync_warnings("log", Sync("auto", 0.25, "joints", 0.00084, 0.85), 0.005) == [
         LogWarning(
             "sync-uncertain",
             "the offset of 0.25 s, estimated by the joints, is known to +-0.84 ms (standard error);"

@@ -12,7 +12,7 @@ from asserting import refusal
 from four_logs import ALLOWED, NOISE
 from urmpipe_models.errors import OptionError
 from urmpipe_models.measure_units import DEGREE
-from urmpipe_pipeline.comparison.tolerance import (
+from urmpipe_pipeline.comparison.verdict import (
     LEAST_SHARES,
     UNITS,
     allowed_for,

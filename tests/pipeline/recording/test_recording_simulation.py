@@ -18,7 +18,7 @@ from asserting import refusal
 from recorded import columns
 from same_results import assert_same
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.provenance import Provenance
