@@ -80,7 +80,7 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
 
 def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
     """Print errors on standard error, a line each, and as one JSON object if it is asked for."""
-    lines = [f"error: {finding.format('command line')}" for finding in findings[:SHOWN_FINDINGS]]
+    lines = [f"error: {finding}" for finding in findings[:SHOWN_FINDINGS]]
     if len(findings) > SHOWN_FINDINGS:
         lines.append(f"error: and {len(findings) - SHOWN_FINDINGS} more")
     with suppress(OSError):  # where standard error takes no more, the exit code tells it all the same
@@ -89,7 +89,7 @@ def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
         from urmpipe.printing.terminal import echo_json
 
         with suppress(OSError):  # where standard output takes no more, that is told already
-            echo_json({"schema": 1, "errors": [one.to_dict("command line") for one in findings]})
+            echo_json({"schema": 1, "errors": [one.to_dict() for one in findings]})
 
 
 def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding]) -> None:
@@ -113,4 +113,4 @@ def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding]) -> None
     from urmpipe_pipeline.tables.junit import write_errors
 
     others = [Path(word) for word in arguments if word != named[0]]
-    write_errors(Path(named[0]), others, findings, "command line")
+    write_errors(Path(named[0]), others, findings)

@@ -282,7 +282,6 @@ KINDS = {
     "build_fmu.unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a BlockModel"),
     "velocities": NUMBERS,
     "velocity": Kind(_is_number, "a number, in m/s"),
-    "voice": _one_of("python", "command line"),
     "within_pi": FLAG,
     "wrenches": Kind(_are_wrenches, 'a list of texts such as "coupler:0.45,0,0:0,-50,0"'),
     "write_map": PATH,

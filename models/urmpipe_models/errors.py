@@ -1,16 +1,14 @@
 """Messages and errors: faults and notes, the parameters that the user may give, and how both are written.
 
-1. Parameters: the same parameter is an option, a keyword, or a key of a system file and its log maps. Values
-   are written by type: a mapping is given per column or joint ("" for all), a list is A,B,C, a tuple is
+1. Parameters: the same parameter is an option and a keyword. Values are written as in a shell, which Python
+   and TOML read as texts: a mapping is given per column or joint ("" for all), a list is A,B,C, a tuple is
    LOW:HIGH, True is a flag, None is a value that the user fills in.
 2. Escapes: names come from files and may contain what ends a line, acts on a terminal or reorders letters.
 3. Messages: the sentence is written where the fault is found; its subject and the parameters that change it
-   are fields. The printer chooses the voice, so that a stored message reads right for every user:
+   are fields. The text is the same for users of the command line, of Python and of files:
 
-    warning = Finding("no unit is given", hints=(Hint("unit", {"q1": "deg"}, "applies this"),))
-    warning.format("command line")   no unit is given; --unit q1=deg applies this
-    warning.format("python")         no unit is given; unit={"q1": "deg"} applies this
-    warning.format("system file")    no unit is given; units.q1 = "deg" in the map of the log applies this
+    Finding(parameter="unit", found="'deg'", hints=(Hint("unit", {"q1": "deg"}, "applies this"),))
+    unit (--unit): found 'deg'; --unit q1=deg applies this
 
 4. Errors: everything that urmpipe raises on purpose is an `UrmpipeError`. It carries *findings*: all faults
    of an input are collected and reported at once, one line per finding, with file, line, column, the value
@@ -21,17 +19,14 @@
 from __future__ import annotations
 
 import html
-import json
 import re
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from difflib import SequenceMatcher
 from itertools import groupby
-from typing import Any, Literal, TypeVar
-
-Voice = Literal["command line", "python", "system file"]  # the reader of a message
+from typing import Any, TypeVar
 
 
 class Placeholder(str):
@@ -66,35 +61,15 @@ _PLACEHOLDERS: Mapping[str, Any] = {  # of other parameters: the name in capital
     "write_system": Placeholder("FILE.toml"),
 }
 
-IN_MAP = {  # keys of a log map, which a system file names
-    "source": "source",
-    "delimiter": "delimiter",
-    "decimal": "decimal",
-    "layout": "layout",
-    "time": "clock.column",
-    "period": "clock.period",
-    "poses": "clock.poses",
-    "joints": "joints.column",
-    "interval": "joints.interval",
-    "rotation": "tcp.form",
-    "unit": "units",
+_NO_OPTION = {  # keywords that are positional arguments of commands, or of Python alone
+    *("defaults", "drives", "font", "inputs", "lazy", "logs", "name", "name_or_path", "names", "network"),
+    *("offsets", "orientation", "path", "position", "progress", "q", "recorded_tcp", "recordings"),
+    *("reference", "result", "results", "run", "shared", "side", "signs", "starts", "system", "t", "targets"),
+    *("title", "told", "width"),
 }
-IN_FILE = {**IN_MAP, "log_map": "map", "robot": "robot"}  # keys of a system file or its log maps
-IN_NO_FILE = ("repair", "skip_bad", "derivative", "tsp")  # parameters of a log without such a key
-ARGUMENTS = ("path", "drives")  # positional arguments of the command line, shown in capitals
 
-_BARE_KEY = re.compile("[A-Za-z0-9_-]+")  # a key of TOML that needs no quotes
 _QUOTES = "'\u2018\u2019\u201a\u201b"  # single quotes of PowerShell
 _SPECIAL = frozenset(_QUOTES + ' \t"\u201c\u201d\u201e&()[]{},;=@#$`^!+%~|<>')  # special in PowerShell or cmd
-
-
-def _format_parameter(parameter: str, voice: Voice) -> str:
-    """Return the name of a parameter: an option, a keyword, or a key of a file."""
-    if voice == "python":
-        return parameter
-    if parameter in ARGUMENTS:
-        return parameter.upper()
-    return IN_FILE.get(parameter, to_option(parameter)) if voice == "system file" else to_option(parameter)
 
 
 def to_option(parameter: str) -> str:
@@ -102,15 +77,12 @@ def to_option(parameter: str) -> str:
     return f"--{parameter.replace('_', '-')}"
 
 
-def _format_assignment(parameter: str, value: Any, voice: Voice) -> str:
-    """Return a parameter with its value: `--unit q1=deg`, `unit={"q1": "deg"}`, `units.q1 = "deg"`."""
+def _format_assignment(parameter: str, value: Any) -> str:
+    """Return an option with its value: `--unit q1=deg`."""
     placeholder = _PLACEHOLDERS.get(parameter, Placeholder(parameter.upper()))
     if isinstance(value, Mapping):
         value = {key: placeholder if item is None else item for key, item in value.items()}
-    value = placeholder if value is None else value
-    if voice == "command line" or (voice == "system file" and parameter not in IN_FILE):
-        return " ".join(_iter_options(to_option(parameter), value))
-    return f"{parameter}={_to_python(value)}" if voice == "python" else _to_file(parameter, value)
+    return " ".join(_iter_options(to_option(parameter), placeholder if value is None else value))
 
 
 def _iter_options(option: str, value: Any) -> Iterator[str]:
@@ -138,38 +110,6 @@ def _to_cell(value: Any) -> str:
 def _is_placeholder(value: Any) -> bool:
     sequence = isinstance(value, (list, tuple))
     return isinstance(value, Placeholder) or (sequence and all(map(_is_placeholder, value)))
-
-
-def _to_python(value: Any) -> str:
-    if isinstance(value, Mapping):
-        items = (f"{_quote(key)}: {_to_python(item)}" for key, item in value.items())
-        return _to_python(value[""]) if list(value) == [""] else f"{{{', '.join(items)}}}"
-    if isinstance(value, (list, tuple)):
-        inner = ", ".join(map(_to_python, value))
-        return f"[{inner}]" if isinstance(value, list) else f"({inner})"
-    if isinstance(value, str) and not isinstance(value, Placeholder):
-        return _quote(value)
-    return str(value) if isinstance(value, bool) else _to_cell(value)
-
-
-def _to_file(parameter: str, value: Any) -> str:
-    """Return the line of TOML in a system file or a log map."""
-    key = IN_FILE[parameter]
-    if not isinstance(value, Mapping):
-        return f"{key} = {_to_toml(value)}"
-    paths = (f"{key}.{name if _BARE_KEY.fullmatch(name) else _quote(name)}" for name in value)
-    return ", ".join(f"{path} = {_to_toml(item)}" for path, item in zip(paths, value.values(), strict=True))
-
-
-def _to_toml(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_to_toml, value))}]"
-    return str(value).lower() if isinstance(value, bool) else _to_python(value)
-
-
-def _quote(text: str) -> str:
-    """Return a string literal of both Python and TOML."""
-    return _escape_long(json.dumps(text, ensure_ascii=False))
 
 
 def _escape_long(text: str) -> str:
@@ -277,23 +217,16 @@ class Hint:
     def __hash__(self) -> int:
         return hash((self.parameter, self.does))  # a mapping has no hash
 
-    def format(self, voice: Voice) -> str:
-        """Return the parameter with its value: `--unit q1=deg`, `unit={"q1": "deg"}`."""
+    def __str__(self) -> str:
         if not self.parameter:
             return ""
-        if self.robot:
-            separator = " " if voice == "command line" else ", "
-            robot = _format_assignment("robot", self.robot, voice)
-            return f"{robot}{separator}{replace(self, robot='').format(voice)}"
-        if not self.call:
-            return _format_assignment(self.parameter, self.value, voice)
-        if voice == "python":
-            return f"{self.call}({_format_assignment(self.parameter, self.value, voice)})"
-        return f"urmpipe {self.call} {_format_assignment(self.parameter, self.value, 'command line')}"
+        robot = f"{_format_assignment('robot', self.robot)} " if self.robot else ""
+        call = f"urmpipe {self.call} " if self.call else ""
+        return f"{call}{robot}{_format_assignment(self.parameter, self.value)}"
 
 
 class Message:
-    """Base of all messages: their text in each voice. Its classes are frozen dataclasses.
+    """Base of all messages. Its classes are frozen dataclasses.
 
     Attributes:
         message: The sentence, without the content of the other fields.
@@ -312,30 +245,27 @@ class Message:
     hints: tuple[Hint, ...]
 
     def __str__(self) -> str:
-        return self.format("python")
+        place = escape_line(self.place())
+        return f"{place}: {self.sentence()}" if place else self.sentence()
 
     def place(self) -> str:
         """Return the place that precedes the sentence, or an empty string."""
         return ""
 
-    def sentence(self, voice: Voice = "python") -> str:
+    def sentence(self) -> str:
         """Return the message without its place: subject, sentence, found, allowed and hints."""
         fields = (("found ", self.found), ("allowed: ", self.allowed))
         values = ", ".join(f"{label}{value}" for label, value in fields if value)
         text = (": " if self.found else ", ").join(filter(None, (self.message, values)))
         if self.parameter:
-            text = f"{_format_parameter(self.parameter, voice)}: {text}"
-        return escape_line("; ".join([text, *format_hints(self.hints, voice)]))
+            option = "" if self.parameter in _NO_OPTION else f" ({to_option(self.parameter)})"
+            text = f"{self.parameter}{option}: {text}"
+        return escape_line("; ".join([text, *format_hints(self.hints)]))
 
-    def format(self, voice: Voice) -> str:
-        """Return the whole message in one line."""
-        place = escape_line(self.place())
-        return f"{place}: {self.sentence(voice)}" if place else self.sentence(voice)
-
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return its fields for JSON, with the sentence as `message`."""
         fields: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
-        return fields | {"message": self.sentence(voice), "hints": list(fields["hints"])}
+        return fields | {"message": self.sentence(), "hints": list(fields["hints"])}
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,22 +307,11 @@ class Finding(Message):
         return ": ".join(filter(None, (place, self.about) if self.file else (self.about, place)))
 
 
-def format_hints(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:
-    """Yield one clause per effect: "--repair or --skip-bad leaves them out".
-
-    Args:
-        hints: The hints; for a system file, those of a parameter that has no key in a file are left out.
-        voice: The reader.
-    """
+def format_hints(hints: Sequence[Hint]) -> Iterator[str]:
+    """Yield one clause per effect: "--repair or --skip-bad leaves them out"."""
     for effect, group in groupby(hints, key=lambda hint: hint.does):
-        usable = [
-            hint for hint in group if hint.call or voice != "system file" or hint.parameter not in IN_NO_FILE
-        ]
-        text = " or ".join(filter(None, (hint.format(voice) for hint in usable)))
-        if voice == "system file" and any(hint.parameter in IN_MAP and not hint.call for hint in usable):
-            text += " in the map of the log"
-        if usable:
-            yield f"{text} {effect}".strip() if effect else f"use {text}"
+        text = " or ".join(filter(None, map(str, group)))
+        yield f"{text} {effect}".strip() if effect else f"use {text}"
 
 
 class UrmpipeError(Exception):

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
-from urmpipe_models.errors import Finding, Hint, Message, Voice
+from urmpipe_models.errors import Finding, Hint, Message
 from urmpipe_models.math3d import COLUMN_NAMES, RotationForm, to_quaternions
 from urmpipe_models.wraps import unwrap_orientations, unwrap_quaternions
 
@@ -88,15 +88,15 @@ class Inference:
         if not self.kind:
             object.__setattr__(self, "kind", self.what)
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return its fields for JSON, and `otherwise`."""
         told = asdict(self)
         lists = {name: list(told[name]) for name in ("columns", "hints")}
-        return told | lists | {"otherwise": self.otherwise(voice)}
+        return told | lists | {"otherwise": self.otherwise()}
 
-    def otherwise(self, voice: Voice = "python") -> str:
+    def otherwise(self) -> str:
         """Return how to have it otherwise; empty where it cannot be."""
-        return ", or ".join(f"{hint.format(voice)} {hint.does}".strip() for hint in self.hints)
+        return ", or ".join(f"{hint} {hint.does}".strip() for hint in self.hints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,7 +325,7 @@ class JointLog(Displayable):
         rotation = COLUMN_NAMES[self.rotation_form] if self.rotation_form else ()
         yield "rotation", rotation, ("rad" if len(rotation) == 3 else "",) * len(rotation), self.tcp_rotation
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return what the log is and how it was read, without its rows; messages in somebody's words."""
         return {
             "name": self.name,
@@ -336,8 +336,8 @@ class JointLog(Displayable):
             "clock_start": self.clock_start if self.timed else None,
             "joints": list(self.joints),
             "units": self.units,
-            "inferences": [one.to_dict(voice) for one in self.inferences],
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "inferences": [one.to_dict() for one in self.inferences],
+            "warnings": [one.to_dict() for one in self.warnings],
         }
 
 

@@ -56,12 +56,15 @@ SPEED = "allowed: a speed in m/s, such as 0.25 or 250mm/s"
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--velocities", "0,-1"], "--velocities: found 0.0, -1.0, allowed: finite numbers of m/s above 0"),
-        (["--velocities", "nan"], f"--velocities: found 'nan', {SPEED}"),
-        (["--velocities", "abc"], f"--velocities: found 'abc', {SPEED}"),
-        (["--limit", "0"], "--limit: found '0', allowed: a positive length in m, such as 0.0004 or 0.4mm"),
-        (["--force", "1,2"], "--force: found [1.0, 2.0], allowed: three finite numbers of N"),
-        (["--law", "limit"], "--law: found 'limit' (did you mean limits?), allowed: trapezoid, jerk, limits"),
+        (["--velocities", "0,-1"], "velocities (--velocities): found 0.0, -1.0, allowed: finite numbers of"
+                                   " m/s above 0"),
+        (["--velocities", "nan"], f"velocities (--velocities): found 'nan', {SPEED}"),
+        (["--velocities", "abc"], f"velocities (--velocities): found 'abc', {SPEED}"),
+        (["--limit", "0"], "limit (--limit): found '0', allowed: a positive length in m, such as 0.0004 or"
+                           " 0.4mm"),
+        (["--force", "1,2"], "force (--force): found [1.0, 2.0], allowed: three finite numbers of N"),
+        (["--law", "limit"], "law (--law): found 'limit' (did you mean limits?), allowed: trapezoid, jerk,"
+                             " limits"),
     ],
 )  # fmt: skip
 def test_values_that_are_refused(capsys: Captured, options: list[str], said: str) -> None:
@@ -73,7 +76,10 @@ def test_path_and_robot_are_asked_for(capsys: Captured) -> None:
     assert run(["accuracy", "--robot", "irb60"]) == 2
     assert capsys.readouterr().err.startswith("error: found no --path, allowed: urmpipe accuracy ")
     assert run(["accuracy", *CUBE]) == 2
-    assert capsys.readouterr().err == "error: --robot: found none, allowed: an arm with masses and drives\n"
+    assert (
+        capsys.readouterr().err
+        == "error: robot (--robot): found none, allowed: an arm with masses and drives\n"
+    )
 
 
 def test_the_log_of_a_plan_is_no_path(

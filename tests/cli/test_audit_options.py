@@ -89,7 +89,8 @@ def test_repair_and_interval_reach_the_repolarizer(urmpipe: RunCommand, log: Pat
     outside = urmpipe("ingest", log, "--interval", "q2=-90:90")
     assert outside.code == 2
     assert outside.err == (
-        "error: log.csv, row 21, column q2: --interval: found 40 values outside, first 100 deg in row"
+        "error: log.csv, row 21, column q2: interval (--interval): found 40 values outside, first 100 deg"
+        " in row"
         " 21, allowed: -90..90 deg\n"
     )
 
@@ -128,7 +129,7 @@ def test_an_interval_is_that_of_a_joint_of_any_log(
         table = np.column_stack([t, *[10.0 * t] * (head.count(",") + 1)])
         np.savetxt(tmp_path / name, table, delimiter=",", header=f"t,{head}", comments="")
     ran = urmpipe("compare", *operands, "--tolerance", "joint=1deg", "--interval", f"{joint}=-180:180")
-    said = f"error: --interval: found {joint}, allowed: joints that turn: {allowed}"
+    said = f"error: interval (--interval): found {joint}, allowed: joints that turn: {allowed}"
     assert [line for line in ran.err.splitlines() if "interval" in line] == ([said] if allowed else [])
 
 

@@ -1,4 +1,4 @@
-"""How clocks are put together without --sync: by absolute stamps; and what a wrong offset looks like."""
+"""How clocks are put together without sync: by absolute stamps; and what a wrong offset looks like."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_each_log_decides_for_itself_and_coarse_stamps_do_not(
     assert isinstance(made, Comparison)
     assert [run.sync.mode for run in made.runs] == ["stamps", "start", "start"]
     assert refusal(OptionError, api.compare, wanted, early, "ur5e", iso=True, sync="stamps").startswith(
-        "sync: found stamps, allowed: auto, start or an offset with iso"
+        "sync (--sync): found stamps, allowed: auto, start or an offset with iso"
     )
 
 

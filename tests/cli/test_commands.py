@@ -95,7 +95,7 @@ def test_rows_that_cannot_be_read_are_left_out_if_asked_for(urmpipe: RunCommand,
 def test_strict_makes_a_warning_an_error_and_writes_nothing(urmpipe: RunCommand, tmp_path: Path) -> None:
     ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--rotation", "zyx", "--strict")
     assert ran.code == 2
-    assert ran.err.startswith("error: --strict: found 1 warning, allowed: none\n")
+    assert ran.err.startswith("error: strict (--strict): found 1 warning, allowed: none\n")
     assert files_in(tmp_path) == []
 
 
@@ -125,7 +125,7 @@ def test_compare_passes_and_its_exit_code_is_the_verdict(urmpipe: RunCommand, tm
     assert answer["verdict"] == "pass"
     assert [run["name"] for run in answer["runs"]] == ["matlab", "coppeliasim", "solidworks"]
     stored = read_recording(tmp_path / "a.rrd")
-    assert json.loads(json.dumps(stored.to_dict("command line")["runs"])) == answer["runs"]
+    assert json.loads(json.dumps(stored.to_dict()["runs"])) == answer["runs"]
     shifted = answer["runs"][2]["delta"]["norm"]
     assert shifted["mean"] == pytest.approx(0.0025, abs=5e-5)
     assert shifted["std"] < 5e-5
@@ -228,7 +228,10 @@ def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:
     assert urmpipe(*COMPARE_FEW, "--tolerance", "0.0023", "-o", "b.rrd").code == 1
     wrong = urmpipe(*COMPARE_FEW, "--tolerance", "3 inch")
     assert wrong.code == 2
-    assert "error: --tolerance: found '3 inch', allowed: a length in m, or axis=, x=, y=, z=" in wrong.err
+    assert (
+        "error: tolerance (--tolerance): found '3 inch', allowed: a length in m, or axis=, x=, y=, z="
+        in wrong.err
+    )
 
 
 def test_a_path_alone_is_nothing_to_judge(urmpipe: RunCommand) -> None:

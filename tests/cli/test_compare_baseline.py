@@ -119,8 +119,8 @@ def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -
     given = ["--tolerance", "1mm", "--align", "none", "-o", "b.rrd"]
     assert run(["compare", "a.rrd", "--baseline", "a.rrd", *given]) == 2
     assert said(capsys) == (
-        "error: --output, --tolerance, --align: found with the recording of a comparison (a.rrd),"
-        " which stands as it was made, allowed: with the logs themselves"
+        "error: --output, --tolerance, --align: found with the recording of a comparison (a.rrd), which"
+        " stands as it was made, allowed: with the logs themselves"
     )
     assert run(["compare", "a.rrd"]) == 2
     assert said(capsys) == (
@@ -132,21 +132,22 @@ def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -
 def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     assert run(["ingest", "good.csv", "--robot", "ur5e", "-q"]) == 0
     for baseline, found in (
-        ("good.rrd", "--baseline: found a recording (run), allowed: that of a comparison"),
+        ("good.rrd", "baseline (--baseline): found a recording (run), allowed: that of a comparison"),
         ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"),
         (
             "missing.rrd",
-            "--baseline: found no such file, allowed: the recording of an earlier comparison",
+            "baseline (--baseline): found no such file, allowed: the recording of an earlier comparison",
         ),
     ):
         assert compare("good.csv", "--baseline", baseline, "-q") == 2
         assert said(capsys) == f"error: {baseline}: {found}"
     assert compare("good.csv", "--noise", "1um", "-q") == 2
     assert said(capsys) == (
-        "error: --noise: found no baseline, allowed: with an earlier comparison; --baseline RUN.rrd sets one"
+        "error: noise (--noise): found no baseline, allowed: with an earlier comparison; --baseline"
+        " RUN.rrd sets one"
     )
     assert compare("good.csv", "--baseline", "good.rrd", "--noise", "-1", "-q") == 2
-    assert said(capsys) == f"error: --noise: found '-1', {NOISE}"
+    assert said(capsys) == f"error: noise (--noise): found '-1', {NOISE}"
 
 
 @pytest.mark.slow

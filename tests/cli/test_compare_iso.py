@@ -148,20 +148,23 @@ def test_given_cycles_are_taken_as_they_are(capsys: Captured) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--iso", "--align", "rigid"], "--align: found rigid, allowed: none with iso"),
-        (["--iso", "--diagnose"], "--diagnose: found with iso, allowed: one of the two"),
-        (["--iso", "--cycles", "1:601"], "--cycles: found rows of cycles and 4 logs"),
-        (["--iso", "--planes", "0"], "--planes: found 0, allowed: a whole number, 1 or more"),
-        (["--iso", "--band", "0"], "--band: found '0', allowed: a positive length in m"),
-        (["--iso", "--band", "-1mm"], "--band: found '-1mm', allowed: a positive length in m"),
-        (["--iso", "--tolerance", "axis=1mm"], "--tolerance: found axis=0.001, allowed: criteria"),
-        (["--iso", "--tolerance", "3.5mm"], "--tolerance: found axis=0.0035, allowed: criteria"),
-        (["--tolerance", "AP=1mm"], "--tolerance: found AP=0.001, allowed: numbers of axis"),
-        (["--iso", "--tolerance", "RV=5mm"], "--tolerance: found 'RV=5mm'"),
-        (["--cycles", "1:2"], "--cycles: found no test, allowed: with iso"),
-        (["--targets", "square.csv"], "--targets: found no test, allowed: with iso"),
-        (["--planes", "5"], "--planes: found no test, allowed: with iso"),
-        (["--band", "1mm"], "--band: found no test, allowed: with iso"),
+        (["--iso", "--align", "rigid"], "align (--align): found rigid, allowed: none with iso"),
+        (["--iso", "--diagnose"], "diagnose (--diagnose): found with iso, allowed: one of the two"),
+        (["--iso", "--cycles", "1:601"], "cycles (--cycles): found rows of cycles and 4 logs"),
+        (["--iso", "--planes", "0"], "planes (--planes): found 0, allowed: a whole number, 1 or more"),
+        (["--iso", "--band", "0"], "band (--band): found '0', allowed: a positive length in m"),
+        (["--iso", "--band", "-1mm"], "band (--band): found '-1mm', allowed: a positive length in m"),
+        (
+            ["--iso", "--tolerance", "axis=1mm"],
+            "tolerance (--tolerance): found axis=0.001, allowed: criteria",
+        ),
+        (["--iso", "--tolerance", "3.5mm"], "tolerance (--tolerance): found axis=0.0035, allowed: criteria"),
+        (["--tolerance", "AP=1mm"], "tolerance (--tolerance): found AP=0.001, allowed: numbers of axis"),
+        (["--iso", "--tolerance", "RV=5mm"], "tolerance (--tolerance): found 'RV=5mm'"),
+        (["--cycles", "1:2"], "cycles (--cycles): found no test, allowed: with iso"),
+        (["--targets", "square.csv"], "targets: found no test, allowed: with iso"),
+        (["--planes", "5"], "planes (--planes): found no test, allowed: with iso"),
+        (["--band", "1mm"], "band (--band): found no test, allowed: with iso"),
     ],
 )
 def test_what_does_not_go_is_exit_code_2(options: list[str], said: str, capsys: Captured) -> None:
@@ -188,8 +191,8 @@ def test_bad_cycles_are_exit_code_2(cycles: str, said: str, capsys: Captured) ->
 def test_a_tolerance_for_what_has_no_value_is_exit_code_2(capsys: Captured) -> None:
     assert iso("cycle1.csv", "--tolerance", "RP=1mm,vAP=1mm") == 2
     told = capsys.readouterr().err
-    assert "--tolerance: found RP, which 1 cycle of this motion cannot determine" in told
-    assert "--tolerance: found vAP, which 1 cycle of this motion cannot determine" in told
+    assert "tolerance (--tolerance): found RP, which 1 cycle of this motion cannot determine" in told
+    assert "tolerance (--tolerance): found vAP, which 1 cycle of this motion cannot determine" in told
     assert not Path("run.rrd").exists()
 
 
@@ -201,7 +204,7 @@ def test_one_cycle_has_what_needs_no_spread() -> None:
 
 def test_a_reference_alone_is_no_test(capsys: Captured) -> None:
     assert run(["compare", "square.csv", "--iso"]) == 2
-    assert "--iso: found no log, allowed: a reference and its cycles" in capsys.readouterr().err
+    assert "iso (--iso): found no log, allowed: a reference and its cycles" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -295,7 +298,7 @@ def test_a_later_test_is_held_against_an_earlier_one(capsys: Captured) -> None:
 def test_a_test_is_not_held_against_a_comparison_log_by_log(capsys: Captured) -> None:
     run(["compare", "square.csv", "cycle1.csv", "-q", "-o", "before.rrd"])
     assert iso("cycle1.csv", "--baseline", "before.rrd") == 2
-    said = "--baseline: found a comparison log by log, allowed: a test after ISO 9283"
+    said = "baseline (--baseline): found a comparison log by log, allowed: a test after ISO 9283"
     assert said in capsys.readouterr().err
 
 
@@ -422,7 +425,10 @@ def test_noise_that_is_most_of_fv_is_told(capsys: Captured) -> None:
 @pytest.mark.parametrize("tolerance", ["FOO=1mm", "AV=5mm", "AP=-1mm"])
 def test_a_tolerance_that_is_none_names_the_criteria(tolerance: str, capsys: Captured) -> None:
     assert iso(*FILES, "--tolerance", tolerance) == 2
-    assert f"--tolerance: found '{tolerance}', allowed: criteria: AP=, RP=" in capsys.readouterr().err
+    assert (
+        f"tolerance (--tolerance): found '{tolerance}', allowed: criteria: AP=, RP="
+        in capsys.readouterr().err
+    )
     assert run(["compare", "square.csv", *FILES, "--tolerance", "FOO=1mm", "-q"]) == 2
     assert "allowed: a length in m, or axis=" in capsys.readouterr().err
 

@@ -101,8 +101,8 @@ def test_what_is_given_replaces_the_default_tolerance_whole(capsys: Captured) ->
 def test_all_that_is_wrong_with_a_tolerance_is_told_at_once(capsys: Captured) -> None:
     assert compare("good.csv", "--tolerance", "axis=3 inch,roll=1deg,norm=5mm") == 2
     assert capsys.readouterr().err.splitlines() == [
-        f"error: --tolerance: found 'axis=3 inch', {ALLOWED}",
-        f"error: --tolerance: found 'roll=1deg', {ALLOWED}",
+        f"error: tolerance (--tolerance): found 'axis=3 inch', {ALLOWED}",
+        f"error: tolerance (--tolerance): found 'roll=1deg', {ALLOWED}",
     ]
     assert names() == set()
 
@@ -256,7 +256,7 @@ def test_results_are_operands_of_the_function() -> None:
     assert str(error.value) == wanted
     with pytest.raises(OptionError) as error:
         urmpipe.compare(before, baseline=before, output="a.rrd")
-    assert str(error.value) == "output: found a.rrd with an existing comparison, allowed: without"
+    assert str(error.value) == "output (--output): found a.rrd with an existing comparison, allowed: without"
 
 
 @pytest.mark.slow
@@ -319,7 +319,7 @@ def test_all_that_is_wrong_with_any_log_is_told_at_once(capsys: Captured) -> Non
     assert compare("still.csv", "good.csv", "rest.csv", "--sync", "auto") == 2
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
     assert [line.split(":")[1] for line in errors] == [" still.csv", " rest.csv"]
-    assert all("--sync: auto: found no motion of the joints in this log" in line for line in errors)
+    assert all("sync (--sync): auto: found no motion of the joints in this log" in line for line in errors)
 
 
 def test_strict_names_the_log_of_each_warning(capsys: Captured) -> None:
@@ -329,6 +329,6 @@ def test_strict_names_the_log_of_each_warning(capsys: Captured) -> None:
     assert compare("good.csv", "slack.csv", "--strict") == 2
     said = "no unit is given for q1, q2, q3, q4, q5, q6: the joints are taken as rad; --unit deg"
     assert capsys.readouterr().err.splitlines() == [
-        "error: --strict: found 2 warnings, allowed: none",
+        "error: strict (--strict): found 2 warnings, allowed: none",
         *(f"error: {name}: {said} overrides this" for name in ("good", "slack")),
     ]

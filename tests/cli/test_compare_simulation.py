@@ -108,14 +108,14 @@ def test_the_block_is_asked_for_and_its_answers_work(
         assert urmpipe("compare", PATH, path, *answer.split(), "-q").code == 0
     ran = urmpipe("compare", PATH, path, "--block", "delta")
     allowed = "chain, log, reference, repolarizer, which have a motion in"
-    assert (ran.code, ran.err) == (2, f"error: --block: found 'delta', allowed: {allowed} {path}\n")
+    assert (ran.code, ran.err) == (2, f"error: block (--block): found 'delta', allowed: {allowed} {path}\n")
 
 
 def test_a_block_without_a_simulation_is_refused(urmpipe: Callable[..., Any]) -> None:
     ran = urmpipe("compare", PATH, LOG, "--robot", "urm6", "--block", "arm")
     allowed = "a block of a simulation, or one for each of several"
     assert (ran.code, ran.err.splitlines()[-1]) == (
-        2, f"error: --block: found 'arm' with 0 simulations, allowed: {allowed}",
+        2, f"error: block (--block): found 'arm' with 0 simulations, allowed: {allowed}",
     )  # fmt: skip
     ran = urmpipe("compare", LOG, "--sides", "a,b", "--block", "arm")
     assert ran.code == 2

@@ -127,7 +127,7 @@ def test_words_are_those_of_the_pipeline(folder: Path, urmpipe: RunCommand) -> N
     assert source_names() == SOURCES
     allowed = f"{', '.join(DELIMITERS)}, or the character itself"
     assert urmpipe("ingest", "log.csv", "--delimiter", "foo").err == (
-        f"error: --delimiter: found 'foo', allowed: {allowed}\n"
+        f"error: delimiter (--delimiter): found 'foo', allowed: {allowed}\n"
     )
 
 

@@ -221,7 +221,7 @@ def test_all_outputs_are_written_or_none(lab: Path, capsys: Captured) -> None:
     assert run([*INGEST, "--audit", "a.csv", "--write-map", "./a.csv"]) == 2
     assert capsys.readouterr().err == "error: found a.csv as audit and as map; allowed: a name for each\n"
     assert run([*INGEST, "--explain", "-o", "a.rrd"]) == 2
-    said = "error: --output: found a.rrd, allowed: no output: --explain writes no recording\n"
+    said = "error: output (--output): found a.rrd, allowed: no output: --explain writes no recording\n"
     assert capsys.readouterr().err == said
     assert run([*INGEST, "--audit", "a.csv", "--write-map", "m.toml"]) == 0
     assert "Audit: a.csv  (0 lines)" in capsys.readouterr().out
@@ -240,7 +240,7 @@ def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Ca
     both = ["compare", "log.rrd", "log.rrd", "--unit", "rad", "--repair"]
     assert run(both) == 2
     assert (
-        "--unit, --repair: found with recordings only (log.rrd, log.rrd), allowed: "
+        "--unit, repair (--repair): found with recordings only (log.rrd, log.rrd), allowed: "
         in capsys.readouterr().err
     )
     mixed = ["compare", "log.rrd", "log.csv", "--robot", "ur5e", "--unit", "deg", "--joints", "a,b,c,d,e,f"]

@@ -167,7 +167,7 @@ def test_junit_has_the_answer_as_a_property(both: Both) -> None:
         ),
         (
             [PATH, RIGHT, *ARM, "--align", "rigid"],
-            "--align: found rigid, allowed: none with a diagnosis: base and tool are possible causes",
+            "align (--align): found rigid, allowed: none with a diagnosis: base and tool are possible causes",
         ),
     ],
 )
@@ -180,7 +180,8 @@ def test_what_cannot_be_diagnosed_is_refused(arguments: list[str], said: str, ca
 def test_an_alignment_is_refused_with_a_diagnosis(capsys: Captured) -> None:
     assert run(["compare", PATH, RIGHT, *ARM, "--diagnose", "--align", "tool"]) == 2
     assert capsys.readouterr().err == (
-        "error: --align: found tool, allowed: none with a diagnosis: base and tool are possible causes\n"
+        "error: align (--align): found tool, allowed: none with a diagnosis: base and tool are possible"
+        " causes\n"
     )
 
 
@@ -189,7 +190,8 @@ def test_a_comparison_that_stands_is_not_diagnosed(capsys: Captured) -> None:
     run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])
     assert run(["compare", "made.rrd", "--baseline", "made.rrd", "--diagnose"]) == 2
     assert capsys.readouterr().err == (
-        "error: --diagnose: found with the recording of a comparison (made.rrd), which stands as it was made,"
+        "error: diagnose (--diagnose): found with the recording of a comparison (made.rrd), which stands"
+        " as it was made,"
         " allowed: with the logs themselves\n"
     )
 
@@ -275,7 +277,7 @@ def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:
     cause = Cause("joint_unit", "phi3", ("q3",), value=(np.pi / 180.0,))
     diagnosis = replace(there(run.diagnosis), causes=(cause,), remainder=Remainder(0.0))
     (hint,) = remedy_hints(replace(run, diagnosis=diagnosis))
-    assert hint.format("command line") == "--unit q3=deg"
+    assert str(hint) == "--unit q3=deg"
     assert isinstance(hint.value, dict)
     right, mixed = (
         urmpipe.compare(PATH, log, "urm6", unit={"": "rad"} | unit).runs[0]

@@ -211,7 +211,10 @@ def test_without_casadi_it_is_python_and_says_why(
     out, err = capsys.readouterr()
     assert out.splitlines()[1].startswith("FMU: delta_meter.fmu  (python, ")
     assert err.startswith("note: delta_meter.fmu runs on Python, as no native one can be built here: casadi")
-    said = "--backend: found native, which cannot be built here: casadi is not installed, allowed: python"
+    said = (
+        "backend (--backend): found native, which cannot be built here: casadi is not installed,"
+        " allowed: python"
+    )
     assert run(["fmu", "build", "delta_meter", "--backend", "native"]) == 2
     assert capsys.readouterr().err == f"error: {said}\n"
     assert run(["simulate", "one-drive", "--backend", "native"]) == 2

@@ -101,10 +101,10 @@ def test_a_row_without_a_value_is_an_error(tmp_path: Path) -> None:
 
 def test_a_unit_says_what_it_lacks() -> None:
     assert refusal("kinematic_chain") == [
-        "unit kinematic_chain: found no robot; robot=NAME|FILE sets one, in a system file robot = ..."
+        "unit kinematic_chain: found no robot; --robot NAME|FILE sets one, in a system file robot = ..."
     ]
     assert refusal("log_source") == [
-        "unit log_source: found no log; log=LOG sets one, in a system file log = ..."
+        "unit log_source: found no log; --log LOG sets one, in a system file log = ..."
     ]
     assert refusal("repolarizer") == [
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6"
@@ -134,7 +134,10 @@ def test_a_chain_is_taken_as_a_robot() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("kinematic_chan",), "unit: found 'kinematic_chan' (did you mean kinematic_chain?), allowed: kine"),
+        (
+            ("kinematic_chan",),
+            "unit: found 'kinematic_chan' (did you mean kinematic_chain?), allowed: kine",
+        ),
         (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm8?)"),
         (
             ("repolarizer", "-s", "joints=nan"),
@@ -149,7 +152,10 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
         (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),
-        (("delta_meter", "--map", "lab.toml"), "--log-map: found without a log; --log LOG sets one"),
+        (
+            ("delta_meter", "--map", "lab.toml"),
+            "log_map (--log-map): found without a log; --log LOG sets one",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(
@@ -166,12 +172,11 @@ def test_a_unit_is_told_what_a_map_says_of_its_log(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,q1,q2\n0,1,2\n1,1.1,2.1\n", encoding="utf-8")
     *_, warning = (one for one in read_mapped_table(path).warnings if one.kind == "assumed-unit")
-    assert warning.format("command line").endswith(
-        '; --log-map FILE.toml with units."" = "deg" overrides this'
-    )
+    written = "--log-map FILE.toml from urmpipe ingest --unit {} --write-map FILE.toml"
+    assert str(warning).endswith(f"; {written.format('deg')} overrides this")
     path.write_text("time,q1,q2\n0,1,2\n1000,1,2\n2000,1,2\n", encoding="utf-8")
     (said,) = refusal("log_source", log=path)
-    assert '; log_map=FILE.toml with units.time = "ms" specifies it' in said
+    assert f"; {written.format('time=ms')} specifies it" in said
     (tmp_path / "lab.toml").write_text('[units]\ntime = "ms"\n', encoding="utf-8")
     table = read_mapped_table(path, log_map=tmp_path / "lab.toml").table
     assert table.t_ns.tolist() == [0, 10**9, 2 * 10**9]

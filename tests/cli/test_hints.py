@@ -98,7 +98,7 @@ def test_hints_that_are_followed_help(name: str, capfd: pytest.CaptureFixture[st
             told = ingested(name, given.pop("robot"), **given)
             assert of_message(message) not in map(of_message, told)
 
-            spelled = hint.format("command line")
+            spelled = str(hint)
             if hint in typed or (spelled == MOST_USUAL and name != "pandas_default"):
                 continue
             typed.add(hint)
@@ -106,7 +106,7 @@ def test_hints_that_are_followed_help(name: str, capfd: pytest.CaptureFixture[st
             run(["ingest", *files, *words, "--explain", "--json", "-q"])
             answer = json.loads(capfd.readouterr().out)
             printed = answer.get("errors", answer.get("warnings", []))
-            assert [one["message"] for one in printed] == [one.sentence("command line") for one in told]
+            assert [one["message"] for one in printed] == [one.sentence() for one in told]
 
 
 def test_smoothing_brings_a_noisy_log_within_its_efforts(
@@ -125,7 +125,7 @@ def test_smoothing_brings_a_noisy_log_within_its_efforts(
 
     (warning,) = told()
     (hint,) = warning["hints"]
-    words = Hint(**hint).format("command line")
+    words = str(Hint(**hint))
     assert warning["message"].endswith(f"; {words} smooths the accelerations")
     assert told(*shlex.split(words)) == []
 
@@ -179,7 +179,7 @@ def test_what_a_comparison_with_the_recorded_poses_advises_helps(
         (message, hint), *_ = advised
         if step == 0:
             assert (message["kind"], hint["parameter"]) == (kind, parameter)
-        spelled = Hint(**hint).format("command line")
+        spelled = str(Hint(**hint))
         assert spelled in message["message"]
         words += shlex.split(spelled)
     assert answer["verdict"] == "pass"
@@ -196,9 +196,7 @@ def test_the_tool_of_a_recorded_run_is_advised_with_its_robot(tmp_path: Path) ->
 def test_a_robot_that_was_singled_out_is_named_with_its_tool(tmp_path: Path) -> None:
     log = recorded_beside(tmp_path / "log.csv", TRUTH, UR5E.placed(tool=from_offset((0.02, 0.0, 0.15))))
     (found,) = [one for one in urmpipe.ingest(log).log.inferences if one.kind == "robot"]
-    assert found.otherwise("command line") == (
-        "--robot NAME|FILE, or --robot ur5e --tool 0.02,0,0.15 applies it"
-    )
+    assert found.otherwise() == ("--robot NAME|FILE, or --robot ur5e --tool 0.02,0,0.15 applies it")
 
 
 def test_the_same_call_gives_the_same_message_on_any_thread_and_within_a_command(tmp_path: Path) -> None:
@@ -214,8 +212,8 @@ def test_the_same_call_gives_the_same_message_on_any_thread_and_within_a_command
         return str(error.value), [str(one.message) for one in caught]
 
     here = said()
-    assert here[0].startswith("joints: found no column 'q3'")
-    assert 'unit="deg"' in here[1][-1]
+    assert here[0].startswith("joints (--joints): found no column 'q3'")
+    assert "--unit deg" in here[1][-1]
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(said).result() == here
     with cli.make_context("urmpipe", ["ingest", str(log)]):

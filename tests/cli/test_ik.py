@@ -126,7 +126,7 @@ def test_the_papers_four_digits_and_a_start_in_degrees_are_warned_of(capsys: Cap
     assert run(["ik", "four.csv", "--robot", "arm6", "--start", "0,0,-90,0,0,0"]) == 0
     said = capsys.readouterr().err.splitlines()
     assert said[0] == (
-        "warning: --start: these values look like degrees: found theta3 = -90 rad (-5156.62 deg),"
+        "warning: start (--start): these values look like degrees: found theta3 = -90 rad (-5156.62 deg),"
         " allowed: rad"
     )
     assert said[1].startswith("warning: row 1: singular or nearly so: smallest singular value ")
@@ -142,7 +142,9 @@ def test_strict_makes_a_choice_an_error_and_writes_nothing(capsys: Captured, fol
     before = sorted(folder.iterdir())
     assert run(["ik", "default.csv", "--robot", "arm6", "--strict", "-o", "log.csv"]) == 2
     err = capsys.readouterr().err
-    assert err.startswith("error: --strict: found 1 warning, allowed: none\nerror: row 1: wrist aligned: ")
+    assert err.startswith(
+        "error: strict (--strict): found 1 warning, allowed: none\nerror: row 1: wrist aligned: "
+    )
     assert sorted(folder.iterdir()) == before
 
 

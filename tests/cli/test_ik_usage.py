@@ -51,7 +51,7 @@ def refused(capsys: Captured, *arguments: str) -> list[str]:
 )
 def test_no_unit_is_dropped(capsys: Captured, units: list[str], said: str) -> None:
     options = [word for unit in units for word in ("--unit", unit)]
-    assert refused(capsys, "targets.csv", "--robot", "arm6", *options) == [f"error: --unit: {said}"]
+    assert refused(capsys, "targets.csv", "--robot", "arm6", *options) == [f"error: unit (--unit): {said}"]
 
 
 def test_a_unit_that_is_given_twice_alike_is_one(folder: Path) -> None:
@@ -63,19 +63,20 @@ def test_a_unit_that_is_given_twice_alike_is_one(folder: Path) -> None:
 def test_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv")
     assert said == (
-        "error: --robot: found none, allowed: a TOML, a URDF or one of arm6, articulated6r,"
+        "error: robot (--robot): found none, allowed: a TOML, a URDF or one of arm6, articulated6r,"
         " iiwa14, irb60, irb60-spring, panda, ur3, ur5, ur10, ur3e, ur5e, ur10e, urm4, urm6, urm8"
     )
 
 
 def test_a_tool_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv", "--tool", "0,0,0.1")
-    assert said == ("error: --tool: found without a robot; --robot NAME|FILE sets one")
+    assert said == ("error: tool (--tool): found without a robot; --robot NAME|FILE sets one")
 
 
 def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
     assert refused(capsys, "nowhere.csv", "--robot", "arm6", "-o", "log.txt") == [
-        "error: --output: found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd (a"
+        "error: output (--output): found 'log.txt', allowed: a name that ends in .csv (a joint log) or"
+        " .rrd (a"
         " recording)",
         "error: nowhere.csv: found no such file",
     ]
@@ -89,7 +90,7 @@ def test_an_unknown_robot(capsys: Captured) -> None:
 def test_a_start_of_the_wrong_length(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv", "--robot", "arm6", "--start", "0,0,1.57")
     assert said == (
-        "error: --start: found 3 values, allowed: 6, one for each of theta1, theta2, theta3,"
+        "error: start (--start): found 3 values, allowed: 6, one for each of theta1, theta2, theta3,"
         " theta4, theta5, theta6"
     )
 
@@ -97,9 +98,9 @@ def test_a_start_of_the_wrong_length(capsys: Captured) -> None:
 def test_a_start_beyond_the_limits_of_joints(capsys: Captured) -> None:
     start = "0,-45,0,-135,0,90,2.8974"  # joint 7 ends at 2.8973
     assert refused(capsys, "targets.csv", "--robot", "panda", "--start", start) == [
-        "error: --start: found panda_joint2 = -45 rad, allowed: -1.7628 to 1.7628 rad; in deg?",
-        "error: --start: found panda_joint4 = -135 rad, allowed: -3.0718 to -0.0698 rad; in deg?",
-        "error: --start: found panda_joint6 = 90 rad, allowed: -0.0175 to 3.7525 rad; in deg?",
+        "error: start (--start): found panda_joint2 = -45 rad, allowed: -1.7628 to 1.7628 rad; in deg?",
+        "error: start (--start): found panda_joint4 = -135 rad, allowed: -3.0718 to -0.0698 rad; in deg?",
+        "error: start (--start): found panda_joint6 = 90 rad, allowed: -0.0175 to 3.7525 rad; in deg?",
     ]
 
 
@@ -176,18 +177,20 @@ def test_no_row_that_is_a_target(capsys: Captured, folder: Path) -> None:
 
 def test_a_closed_form_that_there_is_not(capsys: Captured) -> None:
     assert refused(capsys, "targets.csv", "--robot", "urm6", "--method", "closed") == [
-        "error: --method: robot urm6 has no closed form, allowed: closed for six joints whose last three"
+        "error: method (--method): robot urm6 has no closed form, allowed: closed for six joints whose"
+        " last three"
         " axes meet in a point or whose axes 2, 3 and 4 are parallel, exactly or nearly;"
         " --method iterative searches"
     ]
     assert refused(capsys, "targets.csv", "--robot", "urm6", "--method", "closed", "--tsp", "1") == [
-        "error: --method: found closed with a path of urm6 that has no closed form, allowed: auto"
+        "error: method (--method): found closed with a path of urm6 that has no closed form, allowed: auto"
     ]
 
 
 def test_a_method_that_a_path_does_not_take(capsys: Captured) -> None:
     assert refused(capsys, "targets.csv", "--robot", "arm6", "--tsp", "1", "--method", "iterative") == [
-        "error: --method: found iterative with a path, allowed: auto; --method auto takes the closed form of"
+        "error: method (--method): found iterative with a path, allowed: auto; --method auto takes the"
+        " closed form of"
         " the arm if it has one"
     ]
 
@@ -235,7 +238,7 @@ def test_values_that_make_no_sense(capsys: Captured, option: str, value: str, sa
 def test_errors_as_json(capsys: Captured) -> None:
     assert run(["ik", "targets.csv", "--json"]) == 2
     (error,) = json.loads(capsys.readouterr().out)["errors"]
-    assert error["message"].startswith("--robot: found none, allowed: ")
+    assert error["message"].startswith("robot (--robot): found none, allowed: ")
 
 
 def test_a_robot_among_the_operands_is_told_by_its_option(capsys: Captured) -> None:

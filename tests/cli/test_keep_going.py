@@ -62,7 +62,7 @@ def test_the_others_are_judged_and_all_outputs_name_the_log_that_is_not(capsys: 
     with Path("v.csv").open(encoding="utf-8", newline="") as file:
         assert {row["run"] for row in csv.DictReader(file)} == {"good"}
     made = recorded("v.rrd")
-    assert [(one.name, [error.format("command line") for error in one.errors]) for one in made.unjudged] == [
+    assert [(one.name, [str(error) for error in one.errors]) for one in made.unjudged] == [
         ("broken", WRONG), ("missing", [MISSING]),
     ]  # fmt: skip
     said = (
@@ -103,7 +103,7 @@ def test_with_strict_a_log_with_a_warning_is_not_judged() -> None:
     (lost,) = result.unjudged
     assert ([one.name for one in result.runs], lost.name) == (["good"], "half")
     assert [str(one) for one in lost.errors] == [
-        "strict: found 1 warning, allowed: none",
+        "strict (--strict): found 1 warning, allowed: none",
         "half: it shows 79 of 200 samples of wanted (39.5 %), longest unseen: 0.600 s from t = 0.395 s"
         " of the reference",
     ]
@@ -115,7 +115,9 @@ def test_without_any_log_to_judge_it_is_an_error_as_ever(capsys: Captured) -> No
     with pytest.raises(LogError, match=r"^missing.csv: found no such file$"):
         urmpipe.compare("missing.csv", ["good.csv"], "ur5e", keep_going=True)
     assert names() == {"broken.csv"}
-    with pytest.raises(OptionError, match=r"^keep_going: found with iso, allowed: one of the two$"):
+    with pytest.raises(
+        OptionError, match=r"^keep_going \(--keep-going\): found with iso, allowed: one of the two$"
+    ):
         urmpipe.compare("wanted.csv", ["good.csv"], "ur5e", keep_going=True, iso=True)
 
 

@@ -97,7 +97,10 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
         ("robots list", f"found 'robots' (did you mean robot?), allowed: {COMMAND_NAMES}"),
         ("robot lst", "found 'lst' (did you mean list?), allowed: equations, export, list, show"),
         ("ingest", "found no LOG..., allowed: urmpipe ingest [OPTIONS] LOG..."),
-        ("ingest x --robt a", "--robt: no such option (did you mean --robot?); see urmpipe ingest --help"),
+        (
+            "ingest x --robt a",
+            "--robt: no such option (did you mean --robot?); see urmpipe ingest --help",
+        ),
         ("ingest x --tsp", "--tsp: found no value, allowed: --tsp NUMBER[s|ms|us]"),
         (
             "ingest x --delimiter",  # as from a shell that ended the line at ;
@@ -108,18 +111,19 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
         ("ingest x --decimal", "--decimal: found no value, allowed: --decimal point|comma|.|,"),
         ("ingest x -o", "-o: found no value, allowed: -o RUN.rrd"),
         ("ingest x --json=1", "--json: found a value, allowed: --json alone"),
-        ("ik x --restarts -1", "--restarts: found '-1', allowed: a whole number, 0 or more"),
-        ("ingest x --tsp never", f"--tsp: found 'never', {DURATIONS}"),
-        ("ingest x --tsp -1", f"--tsp: found '-1', {DURATIONS}"),
-        ("ingest x --tsp 5m", f"--tsp: found '5m', {DURATIONS}"),
-        ("ingest x --derivative magic", "--derivative: found 'magic', allowed: central, savgol"),
+        ("ik x --restarts -1", "restarts (--restarts): found '-1', allowed: a whole number, 0 or more"),
+        ("ingest x --tsp never", f"tsp (--tsp): found 'never', {DURATIONS}"),
+        ("ingest x --tsp -1", f"tsp (--tsp): found '-1', {DURATIONS}"),
+        ("ingest x --tsp 5m", f"tsp (--tsp): found '5m', {DURATIONS}"),
+        ("ingest x --derivative magic", "derivative (--derivative): found 'magic', allowed: central, savgol"),
         (
             "ingest x --interval 3",
-            "--interval: found '3', allowed: LOW:HIGH or JOINT=LOW:HIGH, in the file's unit or with units,"
+            "interval (--interval): found '3', allowed: LOW:HIGH or JOINT=LOW:HIGH, in the file's unit or"
+            " with units,"
             " such as -180deg:180deg",
         ),
-        ("ingest x --base 0,0,1kg", f"--base: found '0,0,1kg', {FRAMES}"),
-        ("compare x --sync soon", f"--sync: found 'soon', {OFFSETS}"),
+        ("ingest x --base 0,0,1kg", f"base (--base): found '0,0,1kg', {FRAMES}"),
+        ("compare x --sync soon", f"sync (--sync): found 'soon', {OFFSETS}"),
     ],
 )
 def test_wrong_use_is_one_line_that_says_what_is_allowed(urmpipe: RunCommand, line: str, said: str) -> None:
@@ -133,18 +137,21 @@ def test_wrong_use_is_one_line_that_says_what_is_allowed(urmpipe: RunCommand, li
     [
         (
             "compare LOG LOG --iso --planes 1000000000",
-            "planes: found 1000000000, allowed: 10000 at most",
+            "planes (--planes): found 1000000000, allowed: 10000 at most",
         ),
         (
             "ik PATH --robot urm6 --unit m --restarts 10001",
-            "restarts: found 10001, allowed: 10000 at most",
+            "restarts (--restarts): found 10001, allowed: 10000 at most",
         ),
         (
             "network solve four-bar --restarts 1000000000",
-            "restarts: found 1000000000, allowed: 200000 at most",
+            "restarts (--restarts): found 1000000000, allowed: 200000 at most",
         ),
-        ("simulate one-drive --duration 1e300", "duration: found 1e+300 s, allowed: below 1e+09 s"),
-        ("ingest LOG --tsp 1e-300", "tsp: found 1e-300 s, allowed: 1e-09 s or more: times are in ns"),
+        (
+            "simulate one-drive --duration 1e300",
+            "duration (--duration): found 1e+300 s, allowed: below 1e+09 s",
+        ),
+        ("ingest LOG --tsp 1e-300", "tsp (--tsp): found 1e-300 s, allowed: 1e-09 s or more: times are in ns"),
         (
             "fmu build repolarizer -s joints=1001",
             "unit repolarizer: option joints: found 1001, allowed: 1000 at most",

@@ -206,7 +206,7 @@ def test_a_special_configuration_is_a_warning_and_fails_if_strict(urmpipe: Run, 
     assert ran.err == f"warning: {said}\n"
     strict = urmpipe("network", "check", "flat.toml", "--strict")
     assert (strict.code, strict.out) == (2, "")
-    assert strict.err == f"error: --strict: found 1 warning, allowed: none\nerror: {said}\n"
+    assert strict.err == f"error: strict (--strict): found 1 warning, allowed: none\nerror: {said}\n"
     (tmp_path / "regular.toml").write_text(PARALLEL)
     told = json.loads(urmpipe("network", "check", "regular.toml", "--json").out)
     assert (told["special"], told["mobility"], told["warnings"]) == (False, 1, [])
@@ -315,21 +315,21 @@ def test_an_input_and_a_foreign_file_are_not_replaced(urmpipe: Run, tmp_path: Pa
         (
             ("check", "four-bar", "--set", "crak=1", "--set", "x=2"),
             [
-                "--controls: control found 'crak' (did you mean crank?), allowed: crank",
-                "--controls: control found 'x', allowed: crank",
+                "controls (--controls): control found 'crak' (did you mean crank?), allowed: crank",
+                "controls (--controls): control found 'x', allowed: crank",
             ],
         ),
         (
             ("check", "four-bar", "--set", "crank"),
-            ["--controls: found 'crank', allowed: NAME=VALUE, each name once"],
+            ["controls (--controls): found 'crank', allowed: NAME=VALUE, each name once"],
         ),
         (
             ("check", "four-bar", "--set", "crank=a"),
-            ["--controls: found crank = a, allowed: a number, or an angle with its unit"],
+            ["controls (--controls): found crank = a, allowed: a number, or an angle with its unit"],
         ),
         (
             ("solve", "four-bar", "--set", "crank=1m"),
-            ["--controls: found crank = 1m, allowed: a number, or an angle with its unit"],
+            ["controls (--controls): found crank = 1m, allowed: a number, or an angle with its unit"],
         ),
         (("solve", "missing.toml"), ["missing.toml: cannot be read: No such file or directory"]),
     ],

@@ -184,62 +184,63 @@ LOAD = "BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ] in m, N and N.m, such as coupler:0,0,0:0,
 ON_BRANCH = "allowed: a range on its branch, or another assembly by --branch or --start"
 
 WRONG: list[tuple[str, list[str]]] = [
-    ("four-bar", ["DRIVES: found nothing that drives four-bar, allowed: crank"]),
+    ("four-bar", ["drives: found nothing that drives four-bar, allowed: crank"]),
     ("four-bar crank", ["[CONTROL=FROM:TO]...: found 'crank', allowed: NAME=VALUE, each name once"]),
     ("four-bar crank=0 crank=1", [
         "[CONTROL=FROM:TO]...: found 'crank=1', allowed: NAME=VALUE, each name once",
     ]),
-    ("four-bar crank=0:1:2", ["DRIVES: found crank = '0:1:2', allowed: FROM:TO, or one value"]),
-    ("four-bar crank=1:nan", [f"DRIVES: found crank = nan, allowed: {NUMBER}"]),
+    ("four-bar crank=0:1:2", ["drives: found crank = '0:1:2', allowed: FROM:TO, or one value"]),
+    ("four-bar crank=1:nan", [f"drives: found crank = nan, allowed: {NUMBER}"]),
     ("four-bar theta2=0:1", [
-        "DRIVES: theta2 is a function of controls, allowed: the controls themselves, or a joint that is free",
+        "drives: theta2 is a function of controls, allowed: the controls themselves, or a joint that is free",
     ]),
-    ("four-bar crank=0:1 theta4=1:2", ["DRIVES: found 2 drives, crank, theta4, allowed: 1, the mobility"]),
-    ("rssr S1=0:1", ["DRIVES: S1 has 3 variables, allowed: S1[1], S1[2], S1[3]"]),
-    ("rssr S1[4]=0:1", ["DRIVES: S1[4] has 3 variables, allowed: a number from 1 to 3"]),
+    ("four-bar crank=0:1 theta4=1:2", ["drives: found 2 drives, crank, theta4, allowed: 1, the mobility"]),
+    ("rssr S1=0:1", ["drives: S1 has 3 variables, allowed: S1[1], S1[2], S1[3]"]),
+    ("rssr S1[4]=0:1", ["drives: S1[4] has 3 variables, allowed: a number from 1 to 3"]),
     ("four-bar theta4=20deg:120deg", [
-        "DRIVES: no motion from the assembly at the start leads to theta4 = 0.34906585: the motion turns back"
+        "drives: no motion from the assembly at the start leads to theta4 = 0.34906585: the motion turns back"
         f" at theta4 = 1.42744876; {ON_BRANCH}",
     ]),
     ("stewart-gough-driven leg1=0.8:1.1 leg2=0.6", [
-        "DRIVES: found leg1 = 1.1, allowed: 0.65 to 1",
-        "DRIVES: found leg2 = 0.6, allowed: 0.65 to 1",
+        "drives: found leg1 = 1.1, allowed: 0.65 to 1",
+        "drives: found leg2 = 0.6, allowed: 0.65 to 1",
     ]),
     ("four-bar crank=0:1 --steps 5 --duration 1s", [
-        "--duration: found together with steps, allowed: one of the two",
+        "duration (--duration): found together with steps, allowed: one of the two",
     ]),
-    ("four-bar crank=0:1 --branch 3", ["--branch: found 3, allowed: 1 to 2"]),
-    ("four-bar crank=0:1 --start theta4=1,2", ["--start: found theta4 = '1,2', allowed: 1 in rad"]),
+    ("four-bar crank=0:1 --branch 3", ["branch (--branch): found 3, allowed: 1 to 2"]),
+    ("four-bar crank=0:1 --start theta4=1,2", ["start (--start): found theta4 = '1,2', allowed: 1 in rad"]),
     ("four-bar crank=0:1 --wrench bar:0,0,0:1,2,3", [
-        "--wrenches: body found 'bar', allowed: ground, input, coupler, output",
+        "wrenches (--wrenches): body found 'bar', allowed: ground, input, coupler, output",
     ]),
     ("four-bar crank=0:1 --torque theta4=1m", [
-        "--torques: found theta4 = '1m', allowed: a number in N.m",
+        "torques (--torques): found theta4 = '1m', allowed: a number in N.m",
     ]),
     ("four-bar crank=0:1 -o run.txt", [
-        "--output: found 'run.txt', allowed: a name that ends in .csv (a motion log) or .rrd (a recording)",
+        "output (--output): found 'run.txt', allowed: a name that ends in .csv (a motion log) or .rrd (a"
+        " recording)",
     ]),
     ("four-bar --log log.csv --steps 5 --law quintic", [
-        f"--{name}: found together with a log, allowed: without one, which has times of its own"
+        f"{name} (--{name}): found together with a log, allowed: without one, which has times of its own"
         for name in ("steps", "law")
     ]),
-    ("four-bar --log log.csv crank=foo", ["DRIVES: column found 'foo', allowed: crank, leg1"]),
+    ("four-bar --log log.csv crank=foo", ["drives: column found 'foo', allowed: crank, leg1"]),
     ("four-bar --log log.csv crank=leg1", [
-        "DRIVES: column leg1 is in m, allowed: rad, the unit of crank",
+        "drives: column leg1 is in m, allowed: rad, the unit of crank",
     ]),
     ("four-bar --log missing.csv", ["missing.csv: found no such file"]),
     ("four-bar crank=0:1foo x=3 --steps 0 --law quintic --branch 0 --point bar --wrench coupler --torque z=1"
      " --start q=2", [
-        "--steps: found 0, allowed: a whole number, 1 or more",
-        "--branch: found 0, allowed: a whole number, 1 or more",
-        "--law: found without a duration, allowed: with one",
-        "--branch: found together with start, allowed: one of the two",
-        "DRIVES: drive found 'x', allowed: crank, A, B, theta4",
-        f"DRIVES: found crank = 1foo, allowed: {NUMBER}",
-        "--start: joint found 'q', allowed: theta2, A, B, theta4",
-        "--point: body found 'bar', allowed: ground, input, coupler, output",
-        f"--wrenches: found 'coupler', allowed: {LOAD}",
-        "--torques: joint found 'z', allowed: theta2, A, B, theta4",
+        "steps (--steps): found 0, allowed: a whole number, 1 or more",
+        "branch (--branch): found 0, allowed: a whole number, 1 or more",
+        "law (--law): found without a duration, allowed: with one",
+        "branch (--branch): found together with start, allowed: one of the two",
+        "drives: drive found 'x', allowed: crank, A, B, theta4",
+        f"drives: found crank = 1foo, allowed: {NUMBER}",
+        "start (--start): joint found 'q', allowed: theta2, A, B, theta4",
+        "point (--point): body found 'bar', allowed: ground, input, coupler, output",
+        f"wrenches (--wrenches): found 'coupler', allowed: {LOAD}",
+        "torques (--torques): joint found 'z', allowed: theta2, A, B, theta4",
     ]),
 ]  # fmt: skip
 

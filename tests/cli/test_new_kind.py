@@ -21,7 +21,6 @@ from same_results import assert_same
 from urmpipe.printing.presentation import print_presentation
 from urmpipe.printing.terminal import print_json
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Voice
 from urmpipe_pipeline import results
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.exports import ExportColumn, Exports, ExportTable, Rows, Times
@@ -66,7 +65,7 @@ class Swing(Result):
     def to_frame(self) -> pd.DataFrame:
         return pd.DataFrame({"t": self.t_ns / 1e9, "angle": self.angle})
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         return {"schema": 1, "name": self.name, "largest": float(np.abs(self.angle).max())}
 
 

@@ -60,7 +60,7 @@ OPERANDS: dict[str, set[str]] = {
 }
 """Keywords that stand without an option on the command line."""
 
-OF_PYTHON = {"inputs", "defaults", "progress", "told", "voice", "t", "q", "recorded_tcp", "names", "name"}
+OF_PYTHON = {"inputs", "defaults", "progress", "told", "t", "q", "recorded_tcp", "names", "name"}
 """Keywords for callbacks, arrays and their names, and for who prints."""
 
 OF_COMMANDS = {"as_json", "quiet", "explain", "listed", "write_system", "version"}

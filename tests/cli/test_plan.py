@@ -166,7 +166,10 @@ def test_a_warning_is_told_and_strict_refuses_it(urmpipe: RunCommand, folder: Pa
     assert (ran.code, ran.err) == (0, f"warning: {said}\n")
     ran = urmpipe("plan", "load.csv", "--strict", "-o", "plan.csv")
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err.splitlines() == ["error: --strict: found 1 warning, allowed: none", f"error: {said}"]
+    assert ran.err.splitlines() == [
+        "error: strict (--strict): found 1 warning, allowed: none",
+        f"error: {said}",
+    ]
     assert not (folder / "plan.csv").exists()
 
 
@@ -338,9 +341,9 @@ def test_what_is_wrong_is_raised_at_once() -> None:
         f"{line.format(first, first + 1)}, allowed: its length, 0.1 m" for first in (1, 2)
     )
     assert refusal(OptionError, package.plan, PathRows(points, -0.01), velocity=0.0, start=[0.0]) == (
-        "start: found without a robot; robot=NAME|FILE sets one\n"
+        "start (--start): found without a robot; --robot NAME|FILE sets one\n"
         "row 2, column radius: path: found -0.01 m, allowed: finite, 0 or more\n"
-        "velocity: found 0.0, allowed: a finite number of m/s above 0"
+        "velocity (--velocity): found 0.0, allowed: a finite number of m/s above 0"
     )
     array: Any = points
     assert refusal(OptionError, package.plan, array) == (

@@ -77,8 +77,8 @@ def test_compare_asks_for_an_arm_that_the_log_cannot_tell_or_takes_what_was_reco
     planned(name, log)
     planned_alone(name, path)
     assert refusal(LogError, urmpipe.compare, path, log) == (
-        "plan.csv: no robot, so no forward kinematics; robot=NAME|FILE sets one;"
-        ' tcp="recorded" uses the recorded tool centre point'
+        "plan.csv: no robot, so no forward kinematics; --robot NAME|FILE sets one;"
+        " --tcp recorded uses the recorded tool centre point"
     )
     found = urmpipe.compare(path, log, tcp="recorded")
     assert (found.verdict, [one.kind for one in found.warnings]) == ("pass", ["same-data"])

@@ -44,18 +44,19 @@ def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
     cube = "cube:wall,a=0.06,r=0.03,x=1.7,y=0,z=1,plane=zz"
     options = ["--velocity", "0", "--acceleration", "-6", "--jerk", "3", "-o", "plan.txt"]
     timing = [
-        "PATH: plane of a wall section: found 'zz', allowed: xy, xz, yz",
-        "PATH: found a = 0.06 m, allowed: more than 2 r = 0.06 m",
-        "--velocity: found 0.0, allowed: a finite number of m/s above 0",
-        "--acceleration: found -6.0, allowed: a finite number of m/s2 above 0",
-        "--jerk: found a jerk with the law trapezoid, allowed: with the law jerk",
-        "--output: found 'plan.txt', allowed: a name that ends in .csv (a plan) or .rrd (a recording)",
+        "path: plane of a wall section: found 'zz', allowed: xy, xz, yz",
+        "path: found a = 0.06 m, allowed: more than 2 r = 0.06 m",
+        "velocity (--velocity): found 0.0, allowed: a finite number of m/s above 0",
+        "acceleration (--acceleration): found -6.0, allowed: a finite number of m/s2 above 0",
+        "jerk (--jerk): found a jerk with the law trapezoid, allowed: with the law jerk",
+        "output (--output): found 'plan.txt', allowed: a name that ends in .csv (a plan) or .rrd (a"
+        " recording)",
     ]
     unknown, *rest = refused(capsys, cube, *options, "--robot", "ur55")
     assert unknown.startswith("unknown robot 'ur55' (did you mean ur5?); allowed: arm6, ")
     assert rest == timing
     assert refused(capsys, cube, *options, "--robot", "irb60", "--start", "1,2") == [
-        "--start: found 2 values, allowed: 4, one for each of theta1, theta2, theta3, theta4",
+        "start (--start): found 2 values, allowed: 4, one for each of theta1, theta2, theta3, theta4",
         *timing,
     ]
 
@@ -64,10 +65,11 @@ def test_a_law_that_the_arm_does_not_suit_is_told_beside_wrong_rows(capsys: Capt
     (folder / "path.csv").write_text("x,y,z,r\n0,0,0,0\n0.1,0,0,-0.03\n0.1,0.1,0,0\n")
     row = "path.csv:3, column r: found -0.03, allowed: 0 or more, or an empty cell"
     lacks, no_robot, start = (
-        "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
+        "robot (--robot): found irb60 without the largest acceleration of theta1, theta2, theta3, allowed:"
+        " a robot"
         " file with the key acceleration in limits, in rad/s2 or m/s2",
-        "--law: found limits without a robot, allowed: with a robot",
-        "--start: found without a robot; --robot NAME|FILE sets one",
+        "law (--law): found limits without a robot, allowed: with a robot",
+        "start (--start): found without a robot; --robot NAME|FILE sets one",
     )
     for options, said in ((["--robot", "irb60"], [lacks]), (["--start", "1"], [start, no_robot])):
         assert refused(capsys, "path.csv", "--law", "limits", *options) == [*said, row]
@@ -81,7 +83,7 @@ def test_a_path_has_no_time(capsys: Captured) -> None:
 def test_a_map_that_is_not_there_is_told_once(capsys: Captured) -> None:
     assert refused(capsys, "path.csv", "--log-map", "map.toml", "--velocity", "-1") == [
         "map.toml: cannot be read: No such file or directory",
-        "--velocity: found -1.0, allowed: a finite number of m/s above 0",
+        "velocity (--velocity): found -1.0, allowed: a finite number of m/s above 0",
     ]
 
 
@@ -126,29 +128,35 @@ def test_rows_that_make_no_path(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--velocity", "5m"], "--velocity: found '5m', allowed: a speed in m/s, such as 0.25 or 250mm/s"),
+        (["--velocity", "5m"], "velocity (--velocity): found '5m', allowed: a speed in m/s, such as 0.25"
+                               " or 250mm/s"),
         (
             ["--acceleration", "fast"],
-            "--acceleration: found 'fast', allowed: an acceleration in m/s2, such as 0.5 or 500mm/s2",
+            "acceleration (--acceleration): found 'fast', allowed: an acceleration in m/s2, such as 0.5 or"
+            " 500mm/s2",
         ),
-        (["--jerk", ""], "--jerk: found '', allowed: a jerk in m/s3, such as 60 or 60m/s3"),
-        (["--velocity", "inf"], "--velocity: found 'inf', allowed: a speed in m/s, such as 0.25 or 250mm/s"),
-        (["--tsp", "0s"], "--tsp: found '0s', allowed: a positive time in s, such as 0.005 or 5ms"),
+        (["--jerk", ""], "jerk (--jerk): found '', allowed: a jerk in m/s3, such as 60 or 60m/s3"),
+        (["--velocity", "inf"], "velocity (--velocity): found 'inf', allowed: a speed in m/s, such as 0.25"
+                                " or 250mm/s"),
+        (["--tsp", "0s"], "tsp (--tsp): found '0s', allowed: a positive time in s, such as 0.005 or 5ms"),
         (["--tsp", "1e-9"],
-         "--tsp: found 1e-09 s, allowed: a period that makes up to 1000000 samples of 4.78032 s"),
-        (["--law", "limit"], "--law: found 'limit' (did you mean limits?), allowed: trapezoid, jerk, limits"),
-        (["--law", "jerk"], "--jerk: found no jerk with the law jerk, allowed: a number of m/s3"),
-        (["--jerk", "5"], "--jerk: found a jerk with the law trapezoid, allowed: with the law jerk"),
-        (["--law", "limits"], "--law: found limits without a robot, allowed: with a robot"),
+         "tsp (--tsp): found 1e-09 s, allowed: a period that makes up to 1000000 samples of 4.78032 s"),
+        (["--law", "limit"], "law (--law): found 'limit' (did you mean limits?), allowed: trapezoid, jerk,"
+                             " limits"),
+        (["--law", "jerk"], "jerk (--jerk): found no jerk with the law jerk, allowed: a number of m/s3"),
+        (["--jerk", "5"], "jerk (--jerk): found a jerk with the law trapezoid, allowed: with the law jerk"),
+        (["--law", "limits"], "law (--law): found limits without a robot, allowed: with a robot"),
         (["--law", "limits", "--robot", "irb60"],
-         "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
+         "robot (--robot): found irb60 without the largest acceleration of theta1, theta2, theta3,"
+         " allowed: a robot"
          " file with the key acceleration in limits, in rad/s2 or m/s2"),
         (["--law", "limits", "--arcs", "total", "--robot", "irb60"],
-         "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
+         "robot (--robot): found irb60 without the largest acceleration of theta1, theta2, theta3,"
+         " allowed: a robot"
          " file with the key acceleration in limits, in rad/s2 or m/s2\n"
-         "--arcs: found total with the law limits, allowed: with the laws trapezoid and jerk"),
-        (["--start", "0,0,0,0"], "--start: found without a robot; --robot NAME|FILE sets one"),
-        (["--tool", "0,0,0.1"], "--tool: found without a robot; --robot NAME|FILE sets one"),
+         "arcs (--arcs): found total with the law limits, allowed: with the laws trapezoid and jerk"),
+        (["--start", "0,0,0,0"], "start (--start): found without a robot; --robot NAME|FILE sets one"),
+        (["--tool", "0,0,0.1"], "tool (--tool): found without a robot; --robot NAME|FILE sets one"),
     ],
 )  # fmt: skip
 def test_values_that_are_refused(capsys: Captured, options: list[str], said: str) -> None:
@@ -158,11 +166,11 @@ def test_values_that_are_refused(capsys: Captured, options: list[str], said: str
 @pytest.mark.parametrize(
     ("cube", "said"),
     [
-        ("cube:wall,a=0.06,r=0.03,x=1,y=0,z=1", ["PATH: found a = 0.06 m, allowed: more than 2 r = 0.06 m"]),
+        ("cube:wall,a=0.06,r=0.03,x=1,y=0,z=1", ["path: found a = 0.06 m, allowed: more than 2 r = 0.06 m"]),
         ("cube:diagonal,a=1,r=0,x=1,y=0,z=1,plane=xy",
-         ["PATH: plane of a diagonal section: found 'xy', allowed: c1, c2, c3, c4"]),
-        ("cube:wal,a=1,r=0,x=1", ["PATH: found no y, z, allowed: all of a, r, x, y, z",
-                                  "PATH: found 'wal' (did you mean wall?), allowed: wall, diagonal"]),
+         ["path: plane of a diagonal section: found 'xy', allowed: c1, c2, c3, c4"]),
+        ("cube:wal,a=1,r=0,x=1", ["path: found no y, z, allowed: all of a, r, x, y, z",
+                                  "path: found 'wal' (did you mean wall?), allowed: wall, diagonal"]),
     ],
 )  # fmt: skip
 def test_cubes_that_are_none(capsys: Captured, cube: str, said: list[str]) -> None:

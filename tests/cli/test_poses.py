@@ -56,5 +56,5 @@ def test_poses_drive_no_simulation(tmp_path: Path) -> None:
     )
     with pytest.raises(LogError) as error:
         read_table(path)
-    said = "found still poses, allowed: a motion with times; period=SECONDS reads the rows as a motion"
+    said = "found still poses, allowed: a motion with times; --period SECONDS reads the rows as a motion"
     assert str(error.value) == f"{path}: {said}"

@@ -107,7 +107,7 @@ def test_options_of_reading_are_refused_with_a_recording(run: Run, urmpipe: Call
 
     found = "found with an ingested log, allowed: with a log; a run or a recording is used"
     assert refusal(OptionError, api.ingest, run.recording, unit="deg", tsp=0.01).splitlines() == [
-        f"unit: {found} as ingested", f"tsp: {found} as ingested",
+        f"unit (--unit): {found} as ingested", f"tsp (--tsp): {found} as ingested",
     ]  # fmt: skip
     ran = urmpipe("ingest", there(run.recording), "--unit", "deg")
     assert ran.code == 2

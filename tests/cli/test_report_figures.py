@@ -32,7 +32,7 @@ def test_options_of_figures_without_a_folder_are_refused_all_at_once(
     ran = urmpipe("report", recording, "--format", "svg", "--figure-width", "column")
     assert (ran.code, ran.out) == (2, "")
     for option in ("--formats", "--figure-width"):
-        assert f"{option}: found without figures; --figures FIGURES names their folder" in ran.err
+        assert f"({option}): found without figures; --figures FIGURES names their folder" in ran.err
     assert not recording.with_suffix(".html").exists()
 
 
@@ -61,13 +61,17 @@ def test_what_is_wrong_with_figures_is_told_by_options_and_nothing_is_written(
     ran = urmpipe("report", recording, "--figures", "figures", *wrong)
     assert ran.code == 2
     for line in (
-        "--formats: found both, allowed: pdf, svg, png",
-        "--figure-width: found 'wide', allowed: column, page, or 40 mm to 1 m, such as 85mm or 3.5in",
-        "--figure-font: found 99.0, allowed: 4 to 32, in pt",
-        "--figure-dpi: found 3, allowed: 50 to 1200",
+        "formats (--formats): found both, allowed: pdf, svg, png",
+        "figure_width (--figure-width): found 'wide', allowed: column, page, or 40 mm to 1 m, such as 85mm"
+        " or 3.5in",
+        "figure_font (--figure-font): found 99.0, allowed: 4 to 32, in pt",
+        "figure_dpi (--figure-dpi): found 3, allowed: 50 to 1200",
     ):
         assert line in ran.err
     ran = urmpipe("report", recording, "--figures", "figures", "--figure-names", "Moton")
     assert ran.code == 2
-    assert "--figure-names: found 'Moton' (did you mean Motion?), allowed: Joints before and after" in ran.err
+    assert (
+        "figure_names (--figure-names): found 'Moton' (did you mean Motion?), allowed: Joints before and"
+        " after" in ran.err
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["run.rrd"]

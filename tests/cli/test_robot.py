@@ -176,13 +176,16 @@ def test_a_picture_has_the_mass_centres(urmpipe: Any, tmp_path: Path) -> None:
         (["urm7"], "error: unknown robot 'urm7' (did you mean urm8?); allowed: " + ", ".join(NAMES)),
         (
             ["urm4", "--q", "1,2"],
-            "error: --q: found 2 values, allowed: 4, one for each of phi1, phi2, phi3, phi4",
+            "error: q: found 2 values, allowed: 4, one for each of phi1, phi2, phi3, phi4",
         ),
         (
             ["urm4", "--tip", "x"],
             "error: robot urm4: found a base or tip link, allowed only for a .urdf file",
         ),
-        (["urm4", "--base", "1"], "error: --base: found '1', allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad"),
+        (
+            ["urm4", "--base", "1"],
+            "error: base (--base): found '1', allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad",
+        ),
         (["arm.urdf"], "error: arm.urdf: cannot be read: No such file or directory"),
     ],
 )
@@ -243,7 +246,7 @@ def test_export_replaces_an_export_and_nothing_else(urmpipe: Any, tmp_path: Path
     ran = urmpipe("robot", "export", "urm6", "-o", "folder.urdf")
     assert ran.err == "error: folder.urdf: found a folder, allowed: the name of a file\n"
     assert urmpipe("robot", "export", "urm6", "-o", "arm.stl").err == (
-        "error: --output: found 'arm.stl', allowed: a name that ends in .urdf or .toml\n"
+        "error: output (--output): found 'arm.stl', allowed: a name that ends in .urdf or .toml\n"
     )
 
 
@@ -287,7 +290,7 @@ def test_a_pose_in_degrees_is_told_of(urmpipe: Any) -> None:
     ran = urmpipe("robot", "show", "urm6", "--q", "0,90,0,3,0,0")
     assert (ran.code, ran.err) == (
         0,
-        "warning: --q: these values look like degrees: found phi2 = 90 rad (5156.62 deg), allowed: rad\n",
+        "warning: q: these values look like degrees: found phi2 = 90 rad (5156.62 deg), allowed: rad\n",
     )
     assert urmpipe("robot", "show", "urm6", "--q", "0,3.14,0,3,0,0").err == ""
 

@@ -66,7 +66,7 @@ def test_c_is_written_and_replaces_only_an_export(urmpipe: Any, pendulum: str, t
     ran = urmpipe("robot", "equations", pendulum, "--form", "text", "-o", "swing.c")
     assert (ran.code, ran.err) == (
         2,
-        "error: --form: found text for swing.c, allowed: c, or another name\n",
+        "error: form (--form): found text for swing.c, allowed: c, or another name\n",
     )
     (tmp_path / "mine.c").write_text("int x;", encoding="utf-8")
     ran = urmpipe("robot", "equations", pendulum, "-o", "mine.c")
@@ -85,7 +85,8 @@ def test_a_mistaken_term_is_refused(urmpipe: Any, pendulum: str) -> None:
     with pytest.raises(api.OptionError) as error:
         api.equations("urm4", term="friction", form="pdf")  # type: ignore[arg-type]
     assert str(error.value).splitlines() == [
-        "form: found 'pdf', allowed: text, c", f"term: found 'friction', allowed: {allowed}",
+        "form (--form): found 'pdf', allowed: text, c", f"term (--term): found 'friction', allowed:"
+                                                        f" {allowed}",
     ]  # fmt: skip
 
 

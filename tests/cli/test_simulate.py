@@ -271,7 +271,8 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
         ),
         (
             ("one-drive", "--write-system", "mine.toml", "--step", "1ms", "--set", "C=2", "-o", "run.rrd"),
-            "error: --step: found for a system that is only written, allowed: when the system runs; edit the"
+            "error: step (--step): found for a system that is only written, allowed: when the system runs;"
+            " edit the"
             " file instead",
         ),
         (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
@@ -408,8 +409,8 @@ def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
 
 def test_a_step_and_a_duration_are_positive(following: Path) -> None:
     assert refusal(following, step=float("nan"), duration=0.0) == [
-        "step: found nan s, allowed: above 0",
-        "duration: found 0 s, allowed: above 0",
+        "step (--step): found nan s, allowed: above 0",
+        "duration (--duration): found 0 s, allowed: above 0",
     ]
 
 

@@ -126,9 +126,9 @@ def test_the_time_that_is_printed_is_that_of_the_steps(urmpipe: RunCommand, tmp_
 def test_the_time_that_a_call_may_take_is_above_0(urmpipe: RunCommand, tmp_path: Path) -> None:
     line = write(tmp_path, {"a": ENDS}, {ACTUAL: "a.y"})
     assert errors(urmpipe(*line, "--timeout", "0").err) == [
-        "error: --timeout: found '0', allowed: a positive time in s, such as 0.005 or 5ms"
+        "error: timeout (--timeout): found '0', allowed: a positive time in s, such as 0.005 or 5ms"
     ]
-    with pytest.raises(OptionError, match="timeout: found -1 s, allowed: above 0"):
+    with pytest.raises(OptionError, match=r"timeout \(--timeout\): found -1 s, allowed: above 0"):
         package.simulate(tmp_path / "system.toml", timeout=-1.0)
 
 
@@ -195,7 +195,7 @@ def test_a_meter_that_depends_on_other_blocks_alone_passes_and_strict_does_not(
     strict = urmpipe(*line, "--strict", "--draw", "system.svg")
     assert (strict.code, strict.out) == (2, "")
     assert errors(strict.err) == [
-        "error: --strict: found 1 warning, allowed: none",
+        "error: strict (--strict): found 1 warning, allowed: none",
         "error: a: column y: found nan at t = 0.2 s; values that are not finite: 4",
     ]
     assert not {"system.rrd", "system.svg"} & {one.name for one in tmp_path.iterdir()}

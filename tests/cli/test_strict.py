@@ -132,5 +132,7 @@ def test_in_python_a_tolerance_with_units_is_a_text(tmp_path: Path) -> None:
     assert result.verdict == "pass"
     assert result.tolerance == {"axis": 0.5, "angle": pytest.approx(np.pi / 12), **LEAST_SHARES}
     for text, allowed in (("'foo'", "a length in m, or axis="), ("3.5", "a unit: 3.5mm or 3.5m")):
-        with pytest.raises(OptionError, match=rf"^tolerance: found {text}, allowed: {allowed}"):
+        with pytest.raises(
+            OptionError, match=rf"^tolerance \(--tolerance\): found {text}, allowed: {allowed}"
+        ):
             urmpipe.compare(logs[0], logs[1], robot="ur5e", tolerance=text.strip("'"))

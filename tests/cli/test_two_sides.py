@@ -150,14 +150,14 @@ def test_a_place_is_asked_for_where_it_is_judged(tmp_path: Path) -> None:
     for name, q in (("asked", asked), ("done", done)):
         written(tmp_path / f"{name}.csv", ["t", *six("q{} [rad]")], T, q)
     said = refusal(LogError, urmpipe.compare, tmp_path / "asked.csv", tmp_path / "done.csv")
-    lacks = "no robot, so no forward kinematics; robot=NAME|FILE sets one;"
-    lacks += ' tolerance="joint=0.1deg" compares the joints only'
+    lacks = "no robot, so no forward kinematics; --robot NAME|FILE sets one;"
+    lacks += " --tolerance joint=0.1deg compares the joints only"
     assert said == f"asked.csv: {lacks}\ndone.csv: {lacks}"
     log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
     said = refusal(  # no tolerance of joints is a way out where the log is to be moved
         LogError, urmpipe.compare, log, sides=("target", "actual"), tolerance="joint=1deg", align="start"
     )
-    assert said == "log.csv: no robot, so no forward kinematics; robot=NAME|FILE sets one"
+    assert said == "log.csv: no robot, so no forward kinematics; --robot NAME|FILE sets one"
 
 
 def test_sides_that_are_not_there_are_refused(tmp_path: Path) -> None:
@@ -165,22 +165,24 @@ def test_sides_that_are_not_there_are_refused(tmp_path: Path) -> None:
     log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
     said = refusal(LogError, urmpipe.compare, log, sides=("desired", "actual"))
     assert said == (
-        f"{log}: sides: found no column with the word desired and without actual in its name, allowed: a word"
+        f"{log}: sides (--sides): found no column with the word desired and without actual in its name,"
+        " allowed: a word"
         " of them, such as q, target, actual"
     )
     said = refusal(LogError, urmpipe.compare, log, sides=("q", "rest"))
     assert said == (
-        f"{log}: sides: found no column without q in its name, allowed: a word of them, such as q, target,"
+        f"{log}: sides (--sides): found no column without q in its name, allowed: a word of them, such as"
+        " q, target,"
         " actual"
     )
     with pytest.raises(LogError):  # the columns of target have both words: of which side are they?
         urmpipe.compare(log, sides=("target", "q"), tolerance="joint=9rad")
     allowed = "allowed: two words for two sides of one log that is yet to be read"
     said = refusal(OptionError, urmpipe.compare, log, log, sides=("target", "actual"))
-    assert said == f"sides: found target,actual with several logs, {allowed}"
+    assert said == f"sides (--sides): found target,actual with several logs, {allowed}"
     for words in (("q", "q"), ("target", "Target")):
         said = refusal(OptionError, urmpipe.compare, log, sides=words)
-        assert said == f"sides: found {','.join(words)}, {allowed}"
+        assert said == f"sides (--sides): found {','.join(words)}, {allowed}"
 
 
 def test_a_name_never_stands_against_itself(tmp_path: Path) -> None:
@@ -201,12 +203,12 @@ def test_the_unit_of_a_column_reaches_the_logs_that_have_it(tmp_path: Path) -> N
     path = written(tmp_path / "path.csv", ["t", "x", "y", "z"], T, position)
     log = written(tmp_path / "log.csv", ["t", *six("q{} [rad]")], T, asked)
     said = refusal(LogError, urmpipe.compare, path, log, "ur5e")
-    assert 'unit={"x": "mm"' in said
+    assert "--unit x=mm" in said
     result = urmpipe.compare(path, log, "ur5e", unit={"x": "mm", "y": "mm", "z": "mm"})
     assert (result.verdict, result.assumptions) == ("pass", ())
     assert result.runs[0].run.provenance.options["read"] == {"unit": {"x": "mm", "y": "mm", "z": "mm"}}
     assert refusal(OptionError, urmpipe.compare, path, log, "ur5e", unit={"w": "mm"}) == (
-        "unit: found no column 'w', allowed: a column that a log has, and that is read"
+        "unit (--unit): found no column 'w', allowed: a column that a log has, and that is read"
     )
 
 
@@ -240,8 +242,8 @@ def test_a_log_with_both_sides_names_the_command_that_compares_them(tmp_path: Pa
     (unused,) = (
         one for one in urmpipe.ingest(log, robot="ur5e").log.inferences if one.what == "columns not used"
     )
-    assert [one.format("command line") for one in unused.hints] == ["urmpipe compare --sides target,actual"]
+    assert [str(one) for one in unused.hints] == ["urmpipe compare --sides target,actual"]
     assert refusal(LogError, urmpipe.compare, log) == (
         "rtde.csv: no robot is given, and no single one of the catalogue fits the recorded tool centre point"
-        " as it is; robot=NAME|FILE sets one; tool=[X, Y, Z] adds its tool"
+        " as it is; --robot NAME|FILE sets one; --tool X,Y,Z adds its tool"
     )

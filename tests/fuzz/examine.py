@@ -77,7 +77,7 @@ def examine(kind: Kind, path: Path, made: Path, rng: Random) -> Outcome:
     if error is None:
         return Outcome(seconds, peak, LARGE if peak > MEMORY else "")
     try:
-        lines = [one.format("command line") for one in findings_of(error)]
+        lines = [str(one) for one in findings_of(error)]
     except Exception as second:  # an error that cannot be told
         lines, error = [OWN_ERROR], second
     text = "".join(traceback.format_exception(error))[-20_000:]

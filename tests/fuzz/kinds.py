@@ -46,7 +46,7 @@ def told(result: Any) -> None:
     """Do what a command does with a result: its JSON, and its warnings as lines."""
     json.dumps(result.to_dict(), default=str)
     for one in result.warnings:
-        one.format("command line")
+        str(one)
 
 
 def log(path: Path, made: Path, rng: Random) -> None:
@@ -87,7 +87,7 @@ def robot(path: Path, made: Path, rng: Random) -> None:
         *start_warnings(chain, np.array(chain.start), "q"),
         *mass_warnings(chain),
     ):
-        one.format("command line")
+        str(one)
     json.dumps(chain_at(chain, chain.start).to_dict(), default=str)
     robot_toml(chain)
     urdf_text(chain)

@@ -72,16 +72,16 @@ def test_a_log_without_a_column_that_is_named_is_told_by_its_file(load: Load, tm
     with pytest.raises(LogError) as caught:
         load(PATH, LOG, LOG, joints=("a", "c"))
     assert str(caught.value).replace(f"{tmp_path}/", "").split("\n") == [
-        "log0.csv: joints: found no column 'a', allowed: x, y, z",
-        "log1.csv: joints: found no column 'c', allowed: a [rad], b [rad]",
-        "log2.csv: joints: found no column 'c', allowed: a [rad], b [rad]",
+        "log0.csv: joints (--joints): found no column 'a', allowed: x, y, z",
+        "log1.csv: joints (--joints): found no column 'c', allowed: a [rad], b [rad]",
+        "log2.csv: joints (--joints): found no column 'c', allowed: a [rad], b [rad]",
     ]
 
 
 def test_what_is_wrong_with_an_option_is_told_once(load: Load) -> None:
     with pytest.raises(OptionError) as caught:
         load(PATH, LOG, source="excel")
-    assert str(caught.value).startswith("source: found 'excel', allowed: coppeliasim, ")
+    assert str(caught.value).startswith("source (--source): found 'excel', allowed: coppeliasim, ")
     assert len(caught.value.findings) == 1
 
 

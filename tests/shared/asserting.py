@@ -8,7 +8,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 import pytest
 
-OTHER_TIME = '; time=COLUMN names the time column; time="none" leaves the time column out'
+OTHER_TIME = "; --time COLUMN names the time column; --time none leaves the time column out"
 """What every finding about a clock ends with."""
 
 INCREASE = f"allowed: times that increase from row to row{OTHER_TIME}"

@@ -22,7 +22,7 @@ from urmpipe.keyword_checks import (
 from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, Voice, map_collecting_errors
+from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, map_collecting_errors
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison, Unjudged, judge_others
@@ -93,7 +93,6 @@ def compare(
     csv: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
     defaults: Sequence[str] = (),
-    voice: Voice = "python",
     progress: Callable[[float], None] | None = None,
     **reading: Unpack[Reading],
 ) -> Comparison:
@@ -142,7 +141,6 @@ def compare(
         csv: A table to write, one row a log and quantity.
         inputs: Files besides the operands that are never replaced.
         defaults: Options that a file set, for the line of the verdict: "sync=auto from ../urmpipe.toml".
-        voice: In whose words `junit` tells what to give: python or command line.
         progress: Told the share of the recording that is written, 0..1.
         **reading: How to read the logs where they cannot tell by themselves: unit, time, joints, log_map and
             the others of `urmpipe.Reading`; it holds for every log.
@@ -160,7 +158,7 @@ def compare(
         "recording": output, "junit": junit, "statistics": csv,
     }  # fmt: skip
     told = None if junit is None else Path(junit)
-    with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as written:
+    with errors_in_junit(told, kept), guarded_outputs(outputs, kept) as written:
         level = _noise_level(noise, baseline)
         given = resolved(reading, robot, base, tool, base_link, tip_link)
         test = iso_options(
@@ -190,7 +188,7 @@ def compare(
         made = checked(made) if made else _compared(operands, load, options, checked, unjudged)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         shown = present(result)
-        written.write("junit", lambda part, path: write_junit(shown, part, path, voice))
+        written.write("junit", lambda part, path: write_junit(shown, part, path))
         if (rows := shown.rows) is not None:
             written.write("statistics", lambda part, path: write_table(rows(), part, path))
         return written.recorded(result, progress)

@@ -89,7 +89,7 @@ def accuracy(path: str, output: Path | None, terminal: Terminal, **options: Any)
     with terminal.progress(f"Running along {path}") as progress:
         result = urmpipe.accuracy(path, output=output, told=terminal.note, progress=progress, **options)
     terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
+    terminal.answer(result.to_dict, lambda: _print(result, replaces))
     return 1 if result.verdict == "fail" else 0
 
 

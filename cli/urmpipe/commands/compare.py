@@ -184,7 +184,6 @@ def compare(
             logs,
             output=target,
             defaults=deciding_defaults(ctx, options),
-            voice="command line",
             progress=progress,
             **options,
         )
@@ -192,7 +191,7 @@ def compare(
         terminal.warn(one.run.warnings, one.name)
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["csv"]}
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
+    terminal.answer(result.to_dict, lambda: _print(result, replaces, written))
     terminal.tell_failure(result)
     if result.errors:
         print_findings(result.errors, as_json=False)

@@ -66,7 +66,7 @@ def demo(output: Path, terminal: Terminal) -> int:
     got = {one.name: one.verdict for one in result.runs}
     as_expected = list(got.values()) == list(EXPECTED.values())
     terminal.answer(
-        lambda: result.to_dict("command line") | {"as_expected": as_expected, "report": str(report.path)},
+        lambda: result.to_dict() | {"as_expected": as_expected, "report": str(report.path)},
         lambda: _print(result, report, as_expected),
     )
     return 0 if as_expected else 1

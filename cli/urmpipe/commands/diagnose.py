@@ -86,7 +86,7 @@ def diagnose(
             reference, log, output=target, defaults=defaults, progress=progress, **options
         )
     terminal.warn(result.warnings)
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
+    terminal.answer(result.to_dict, lambda: _print(result, replaces))
     terminal.tell_failure(result)
     return 0 if result.verdict == "pass" else 1
 

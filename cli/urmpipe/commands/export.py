@@ -59,7 +59,7 @@ def export(recording: Path, output: Path | None, terminal: Terminal, **options: 
     """
     result = urmpipe.export(recording, output, **options)
     terminal.warn(result.warnings)
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result))
+    terminal.answer(result.to_dict, lambda: _print(result))
     return 0
 
 

@@ -119,9 +119,7 @@ def ik(
     with terminal.progress(f"Solving {targets}") as progress:
         result = urmpipe.ik(targets, output=output, progress=progress, **options)
     terminal.warn(result.warnings)
-    terminal.answer(
-        lambda: result.to_dict("command line"), lambda: _print(result, options["robot"], replaces)
-    )
+    terminal.answer(result.to_dict, lambda: _print(result, options["robot"], replaces))
     return 0 if result.verdict == "pass" else 1
 
 

@@ -82,7 +82,7 @@ def ingest(
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         run = urmpipe.ingest(logs, output=target, progress=progress, **options)
     terminal.warn(run.warnings)
-    terminal.answer(lambda: run.to_dict("command line"), lambda: _print(run, explain, replaces, options))
+    terminal.answer(run.to_dict, lambda: _print(run, explain, replaces, options))
     return 0
 
 

@@ -266,7 +266,7 @@ def drive(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
 def _answered(result: NetworkResult | NetworkMotion, terminal: Terminal, replaces: bool) -> int:
     """Print what was found, and return the exit code."""
     terminal.warn(result.warnings)
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
+    terminal.answer(result.to_dict, lambda: _print(result, replaces))
     return 0 if result.verdict == "pass" else 1
 
 

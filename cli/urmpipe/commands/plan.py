@@ -67,7 +67,7 @@ def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> 
     with terminal.progress(f"Planning {path}") as progress:
         result = urmpipe.plan(path, output=output, progress=progress, **options)
     terminal.warn(result.warnings)
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, options, replaces))
+    terminal.answer(result.to_dict, lambda: _print(result, options, replaces))
     return 1 if result.verdict == "fail" else 0
 
 

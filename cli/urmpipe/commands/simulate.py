@@ -123,7 +123,7 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
             system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
         )
     terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, draw))
+    terminal.answer(result.to_dict, lambda: _print(result, replaces, draw))
     if result.failed is not None:
         say(f"error: {result.failed}; the samples until then are in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0

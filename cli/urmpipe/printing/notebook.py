@@ -36,7 +36,7 @@ def _section(section: Section) -> Iterator[str]:
 
 
 def _facts(facts: tuple[Fact, ...]) -> str:
-    told = [(one.name, written(one.value, unit=True, voice="python")) for one in brief_facts(facts)]
+    told = [(one.name, written(one.value, unit=True)) for one in brief_facts(facts)]
     rows = (f"<tr><th>{escape_html(name)}</th><td>{escape_html(value)}</td></tr>" for name, value in told)
     return f"<table>{''.join(rows)}</table>" if told else ""
 

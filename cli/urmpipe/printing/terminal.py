@@ -71,7 +71,7 @@ def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
     """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
     named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
-        say(f"warning: {named}{warning.format('command line')}", err=True)
+        say(f"warning: {named}{warning}", err=True)
     if len(warnings) > LISTED:
         say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
 

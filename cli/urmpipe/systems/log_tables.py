@@ -14,11 +14,28 @@ from urmpipe.reading import resolved
 from urmpipe_fmus.block import Table
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import IN_MAP, IN_NO_FILE, Finding, Hint, LogError
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
 from urmpipe_pipeline.text import counted
+
+IN_MAP = (  # options of reading that a map states
+    *(
+        "decimal",
+        "delimiter",
+        "interval",
+        "joints",
+        "layout",
+        "period",
+        "poses",
+        "rotation",
+        "source",
+        "time",
+    ),
+    "unit",
+)
+NOT_IN_MAP = ("derivative", "repair", "skip_bad", "tsp")  # the others
 
 
 def read_table(
@@ -56,24 +73,25 @@ def read_mapped_table(
     """Return a log as a table, as `read_table` does, where a map alone says how to read it.
 
     Raises:
-        UrmpipeError: With everything that is wrong with the map or the files; hints say what a map tells.
+        UrmpipeError: With everything that is wrong with the map or the files; hints name the map.
     """
     try:
-        found = read_table(log, names, robot=robot, read=resolved({"log_map": log_map}).options)
+        table = read_table(log, names, robot=robot, read=resolved({"log_map": log_map}).options)
     except LogError as error:
-        raise LogError(*(replace(one, hints=_in_map(one.hints)) for one in error.findings)) from error
-    return found._replace(warnings=tuple(replace(one, hints=_in_map(one.hints)) for one in found.warnings))
+        findings = (replace(finding, hints=tuple(_name_map(finding.hints))) for finding in error.findings)
+        raise LogError(*findings) from error
+    warnings = (replace(warning, hints=tuple(_name_map(warning.hints))) for warning in table.warnings)
+    return table._replace(warnings=tuple(warnings))
 
 
-def _in_map(hints: Sequence[Hint]) -> tuple[Hint, ...]:
-    """Return hints with those of reading options as what a map says; what it cannot say is left out."""
-    said = (
-        Hint("log_map", None, f"with {hint.format('system file')} {hint.does}".strip())
-        if hint.parameter in IN_MAP and not hint.call
-        else hint
-        for hint in hints
-    )
-    return tuple(hint for hint in said if hint.parameter not in IN_NO_FILE)
+def _name_map(hints: Sequence[Hint]) -> Iterator[Hint]:
+    """Yield hints with a map in place of options that it states, and without those that it cannot state."""
+    for hint in hints:
+        if not hint.call and hint.parameter in IN_MAP:
+            writes = f"from urmpipe ingest {hint} {Hint('write_map')}"
+            yield Hint("log_map", None, f"{writes} {hint.does}".strip())
+        elif hint.call or hint.parameter not in NOT_IN_MAP:
+            yield hint
 
 
 def _motion(path: Path, robot: Chain | None, read: ReadOptions | None) -> LogTable:

@@ -192,7 +192,7 @@ def _interfaces(
 
 def _findings(table: str, error: UrmpipeError) -> list[Finding]:
     """Return an error as findings about a table or key of the system's file."""
-    return [Finding(finding.format("system file"), about=table) for finding in error.findings]
+    return [Finding(str(finding), about=table) for finding in error.findings]
 
 
 def _variable(interfaces: Mapping[str, Interface], port: Port) -> Variable:

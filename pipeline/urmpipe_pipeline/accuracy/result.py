@@ -11,7 +11,6 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_headline
-from urmpipe_models.errors import Voice
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion, Errors
@@ -156,7 +155,7 @@ class Accuracy(Result):
         ]
         return pd.DataFrame(rows)
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe accuracy --json` prints."""
         return {
             "schema": SCHEMA,
@@ -175,6 +174,6 @@ class Accuracy(Result):
             "loop_radius": self.loop_radius,
             "compiled": self.compiled,
             "verdict": self.verdict,
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 from urmpipe_models.display import format_count, format_headline
-from urmpipe_models.errors import Finding, UrmpipeError, Voice
+from urmpipe_models.errors import Finding, UrmpipeError
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, Verdict
 from urmpipe_pipeline.iso9283.criteria import Criterion
 from urmpipe_pipeline.iso9283.result import IsoTest
@@ -165,7 +165,7 @@ class Comparison(Result):
 
         return pd.DataFrame(list(self.rows()))
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe compare --json` prints."""
         return {
             "schema": SCHEMA,
@@ -173,14 +173,13 @@ class Comparison(Result):
             "assumptions": list(self.assumptions),
             "tolerance": dict(self.tolerance),
             "reference": self.reference.name,
-            "runs": [run.to_dict(voice) for run in self.runs],
+            "runs": [run.to_dict() for run in self.runs],
             "ranking": [run.name for run in self.ranking],
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "baseline": None if self.baseline is None else self.baseline.to_dict(),
             "iso": None if self.iso is None else self.iso.to_dict(),
             "unjudged": [
-                {"name": log.name, "errors": [one.to_dict(voice) for one in log.errors]}
-                for log in self.unjudged
+                {"name": log.name, "errors": [one.to_dict() for one in log.errors]} for log in self.unjudged
             ],
             "recording": str(self.recording) if self.recording else None,
         }

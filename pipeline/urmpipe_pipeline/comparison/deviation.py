@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Voice
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import ns_to_seconds
 from urmpipe_pipeline.runs.run import Run
@@ -340,7 +339,7 @@ class Deviation(Displayable):
         axis = {"t": self.t} if self.run.timed else {"row": self.sample + 1}
         return pd.DataFrame({**axis, **dict(zip(names, self.values, strict=True))})
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of one run."""
         worst, longest, timed = self.worst, self.longest_out, self.run.timed
         told = {name: one.to_dict() for name, one in self.statistics.items()}
@@ -372,6 +371,6 @@ class Deviation(Displayable):
             "longest_out": None if longest is None else asdict(longest),
             "speed_correlation": self.speed_correlation,
             "verdict": self.verdict,
-            "warnings": [one.to_dict(voice) for one in self.run.warnings],
-            "diagnosis": None if self.diagnosis is None else self.diagnosis.to_dict(voice),
+            "warnings": [one.to_dict() for one in self.run.warnings],
+            "diagnosis": None if self.diagnosis is None else self.diagnosis.to_dict(),
         }

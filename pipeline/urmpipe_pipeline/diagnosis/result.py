@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Voice
 from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.cause_texts import build_remedy, format_amount, format_cause, format_change
 from urmpipe_pipeline.diagnosis.causes import (
@@ -106,7 +105,7 @@ class Diagnosis(Result):
 
         return pd.DataFrame([one.to_dict() for one in self.causes], columns=list(_NO_CAUSE.to_dict()))
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe diagnose --json` prints."""
         return {
             "schema": SCHEMA,
@@ -123,7 +122,7 @@ class Diagnosis(Result):
             "origin": self.origin or None,
             "not_looked_for": [asdict(one) for one in self.not_looked_for],
             "remainder": asdict(self.remainder),
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
 

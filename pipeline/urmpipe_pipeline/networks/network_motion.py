@@ -17,7 +17,6 @@ import numpy as np
 
 from urmpipe_models.display import format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Voice
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.networks.closure import iter_chunks
 from urmpipe_models.networks.continuation import Passage
@@ -326,7 +325,7 @@ class NetworkMotion(Result):
             columns |= {name: self.forces.reactions[:, k] for k, name in enumerate(self.forces.names)}
         return pd.DataFrame(columns)
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe network drive --json` prints."""
         nearest = int(np.argmin(self.distance))
         known = bool(np.isfinite(self.distance).any())
@@ -350,7 +349,7 @@ class NetworkMotion(Result):
             else None,
             "point": {"body": self.body, "point": list(self.point)} if self.body else None,
             "forces": self._forces_dict(),
-            "warnings": [warning.to_dict(voice) for warning in self.warnings],
+            "warnings": [warning.to_dict() for warning in self.warnings],
             "output": str(self.output) if self.output else None,
         }
 

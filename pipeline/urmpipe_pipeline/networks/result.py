@@ -10,7 +10,6 @@ import numpy as np
 
 from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Voice
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.networks.assembly import Assembly, Gap
 from urmpipe_models.networks.file import Network
@@ -111,11 +110,11 @@ class NetworkResult(Result):
         ]
         return pd.DataFrame(rows, columns=None if rows else ["assembly", "residual", "mobility"])
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe network check --json` or `network solve --json` prints."""
-        return self._checked(voice) if self.command == "check" else self._solved(voice)
+        return self._checked() if self.command == "check" else self._solved()
 
-    def _checked(self, voice: Voice) -> dict[str, Any]:
+    def _checked(self) -> dict[str, Any]:
         """Return what a check found; what only an assembly has is None without one."""
         moves = self.mobility
         return {
@@ -138,11 +137,11 @@ class NetworkResult(Result):
             "residual": self.residual,
             "assemblies": self._assemblies(),
             "gaps": self._gaps(),
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "output": str(self.recording) if self.recording else None,
         }
 
-    def _solved(self, voice: Voice) -> dict[str, Any]:
+    def _solved(self) -> dict[str, Any]:
         """Return the assemblies, or how far from closing it is."""
         return {
             "schema": SCHEMA,
@@ -152,7 +151,7 @@ class NetworkResult(Result):
             "restarts": max(self.tried - 1, 0),
             "reason": self.reason,
             "gaps": self._gaps(),
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "output": str(self.recording) if self.recording else None,
         }
 

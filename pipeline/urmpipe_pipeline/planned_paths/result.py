@@ -12,7 +12,6 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_headline
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
-from urmpipe_models.errors import Voice
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.laws import Arcs, PathMotion
 from urmpipe_models.planning.path import LineArcPath, PathRows
@@ -184,7 +183,7 @@ class PlannedPath(Result):
                 columns |= dict(zip((f"{prefix}{name}" for name in names), values.T, strict=True))
         return pd.DataFrame(columns)
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe plan --json` prints."""
         return {
             "schema": SCHEMA,
@@ -205,7 +204,7 @@ class PlannedPath(Result):
                 for one in self.obstacles
             ],
             "verdict": self.verdict,
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "output": str(self.output) if self.output else None,
         }  # fmt: skip
 

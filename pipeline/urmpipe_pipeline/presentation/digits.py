@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from urmpipe_models.errors import Voice, format_hints
+from urmpipe_models.errors import format_hints
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
 
@@ -13,13 +13,12 @@ FINEST = 15
 """Digits of a share at most: more are not in it."""
 
 
-def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") -> str:
+def written(cell: Cell, *, unit: bool = False) -> str:
     """Return a cell as people read it.
 
     Args:
         cell: What is shown.
         unit: Whether its unit stands behind it; in a table it stands in the head.
-        voice: Who reads it: how parameters are spelled.
     """
     match cell:
         case Value():
@@ -27,7 +26,7 @@ def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") ->
         case Place():
             return f"({text.point(cell.position)})" + (" m" if unit else "")
         case Advice():
-            said = "; ".join(filter(None, (cell.words, *format_hints(cell.hints, voice))))
+            said = "; ".join(filter(None, (cell.words, *format_hints(cell.hints))))
         case Judged():
             said = (cell.verdict or "").upper()
         case Ref():

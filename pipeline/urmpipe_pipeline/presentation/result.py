@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from urmpipe_models.display import Displayable
-from urmpipe_models.errors import Voice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,5 +53,5 @@ class Result(Displayable):
         return figure
 
     @abstractmethod
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `--json` prints, its messages in somebody's words."""

@@ -152,7 +152,7 @@ def errors_table(errors: Sequence[Finding]) -> Table:
         f"Errors ({len(errors)})",
         (
             Column("place", "Place", [one.place() for one in errors]),
-            Column("message", "What", [one.sentence("command line") for one in errors]),
+            Column("message", "What", [one.sentence() for one in errors]),
         ),
     )
 
@@ -165,7 +165,7 @@ def warnings_table(warnings: Sequence[LogWarning]) -> Table:
             Column("kind", "Kind", [one.kind for one in warnings]),
             Column("about", "About", [": ".join(filter(None, (one.about, one.column))) for one in warnings]),
             Column("row", "Row", [Value(one.row) for one in warnings]),
-            Column("message", "What", [one.sentence("command line") for one in warnings]),
+            Column("message", "What", [one.sentence() for one in warnings]),
         ),
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, Voice
+from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.math3d import COLUMN_NAMES, is_angular
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, JointLog, LogWarning, ns_to_seconds
@@ -297,7 +297,7 @@ class Run(Result):
             units |= {f"{prefix}{name}": unit + order for name, unit in joints}
         return units | {f"p{axis}": "m" for axis in "xyz"} | dict.fromkeys(("rz", "ry", "rx"), "rad")
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe ingest --json` prints."""
         return {
             "schema": SCHEMA,
@@ -312,12 +312,12 @@ class Run(Result):
             "source": self.log.source,
             "robot": self.robot.name if self.robot else None,
             "units": dict(self.log.units),
-            "inferences": [one.to_dict(voice) for one in self.log.inferences],
+            "inferences": [one.to_dict() for one in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
             "derivative": self.derivative or None,
             "torques": [one.to_dict() for one in self.torque_summaries()],
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
 

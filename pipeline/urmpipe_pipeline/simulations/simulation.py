@@ -14,7 +14,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import CosimulationError, Voice
+from urmpipe_models.errors import CosimulationError
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
@@ -281,7 +281,7 @@ class Simulation(Result):
             columns |= dict(zip(one.names, one.columns.T, strict=True))
         return pd.DataFrame(columns)
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe simulate --json` prints."""
         t, energy = self.t, self.energy
         return {
@@ -300,7 +300,7 @@ class Simulation(Result):
             "verdict": self.verdict,
             "assumptions": list(self.assumptions),
             "verdicts": [one.to_dict() for one in self.verdicts],
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
 

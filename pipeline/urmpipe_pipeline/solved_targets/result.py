@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray, IntArray, TextArray
-from urmpipe_models.errors import Finding, LogError, Voice
+from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.ik.path import JointPath
 from urmpipe_models.ik.solutions import Solutions, Targets, pose_errors
 from urmpipe_pipeline.comparison.deviation import Verdict
@@ -207,7 +207,7 @@ class SolvedTargets(Result):
         columns["reason"] = [reason or "" for reason in np.array(self.reasons, dtype=np.object_)[target]]
         return pd.DataFrame(columns)
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe ik --json` prints."""
         found: dict[str, Any] = {
             "schema": SCHEMA,
@@ -221,7 +221,7 @@ class SolvedTargets(Result):
         }
         if self.path is not None:
             found |= self._way(self.path)
-        found["warnings"] = [one.to_dict(voice) for one in self.warnings]
+        found["warnings"] = [one.to_dict() for one in self.warnings]
         return found | {"output": str(self.output) if self.output else None}
 
     def _way(self, path: JointPath) -> dict[str, Any]:

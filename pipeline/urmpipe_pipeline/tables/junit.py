@@ -24,7 +24,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Literal
 
-from urmpipe_models.errors import HIDDEN, Finding, OutputError, UrmpipeError, Voice
+from urmpipe_models.errors import HIDDEN, Finding, OutputError, UrmpipeError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import JUNIT_HEADER, guarded_output
@@ -36,36 +36,36 @@ UNHOLDABLE = re.compile(f"[{HIDDEN}]|[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010
 """What XML may not hold, or a reader may turn into something else: line ends and tabs in attributes."""
 
 
-def write_junit(shown: Presentation, part: Path, path: Path, voice: Voice = "python") -> None:
+def write_junit(shown: Presentation, part: Path, path: Path) -> None:
     """Write the checks of a presentation as JUnit XML and read it back.
 
     Raises:
         OutputError: If it did not read back as it was written.
     """
     root = ET.Element("testsuites", name=_plain(shown.name))
-    root.extend(_suites(shown.body, shown.created[:19], (), voice))
+    root.extend(_suites(shown.body, shown.created[:19], ()))
     _write(root, part, path)
 
 
 @contextmanager
-def errors_in_junit(path: Path | None, inputs: Sequence[Path], voice: Voice = "python") -> Iterator[None]:
+def errors_in_junit(path: Path | None, inputs: Sequence[Path]) -> Iterator[None]:
     """Write an error of the body to a JUnit file, too, as `write_errors` does, and raise it on."""
     try:
         yield
     except UrmpipeError as error:
         if path is not None:
-            write_errors(path, inputs, error.findings, voice)
+            write_errors(path, inputs, error.findings)
         raise
 
 
-def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding], voice: Voice) -> None:
+def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]) -> None:
     """Write why there is no verdict to a JUnit file, one test case a finding: no earlier verdict stays.
 
     A file that is no JUnit file of urmpipe's, or an input, is left as it is.
     """
     root = ET.Element("testsuites", name="urmpipe compare")
     suite = ET.SubElement(root, "testsuite", name="urmpipe compare")
-    _add_errors(suite, findings, voice)
+    _add_errors(suite, findings)
     _count(suite)
     with suppress(OutputError), guarded_output(path, inputs, "junit") as part:
         _write(root, part, path)
@@ -83,18 +83,16 @@ def _write(root: ET.Element, part: Path, path: Path) -> None:
         raise OutputError(Finding("differs when read back", str(path)))
 
 
-def _suites(
-    section: Section, timestamp: str, above: tuple[LogWarning, ...], voice: Voice
-) -> Iterator[ET.Element]:
+def _suites(section: Section, timestamp: str, above: tuple[LogWarning, ...]) -> Iterator[ET.Element]:
     """Yield the test suite of a section that judges something, and those of the sections below it."""
     warnings = (*section.warnings, *above)
     if section.checks or section.properties or section.errors:
-        yield _suite(section, timestamp, warnings, voice)
+        yield _suite(section, timestamp, warnings)
     for one in section.sections:
-        yield from _suites(one, timestamp, warnings, voice)
+        yield from _suites(one, timestamp, warnings)
 
 
-def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning], voice: Voice) -> ET.Element:
+def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning]) -> ET.Element:
     suite = ET.Element("testsuite", name=_plain(section.title))
     if section.properties:
         properties = ET.SubElement(suite, "properties")
@@ -104,9 +102,9 @@ def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning], voi
         case = _case(suite, check.about or section.title, check.name)
         if check.verdict == "fail":
             _reason(case, "failure", check.kind, check.words)
-    _add_errors(suite, section.errors, voice, section.title)
+    _add_errors(suite, section.errors, section.title)
     if warnings:
-        told = (f"{one.kind}: {one.format(voice)}" for one in warnings)
+        told = (f"{one.kind}: {one}" for one in warnings)
         ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, told))
     _count(suite)
     if timestamp:
@@ -114,11 +112,11 @@ def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning], voi
     return suite
 
 
-def _add_errors(suite: ET.Element, findings: Sequence[Finding], voice: Voice, about: str = "") -> None:
+def _add_errors(suite: ET.Element, findings: Sequence[Finding], about: str = "") -> None:
     """Add a test case for each error, of a class for all or of its file's name."""
     for number, finding in enumerate(findings, start=1):
         case = _case(suite, about or finding.file or "urmpipe compare", f"can be compared ({number})")
-        _reason(case, "error", BAD_INPUT, finding.format(voice))
+        _reason(case, "error", BAD_INPUT, str(finding))
 
 
 def _count(suite: ET.Element) -> None:

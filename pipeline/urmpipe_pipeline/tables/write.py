@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Displayable, format_count, format_headline
-from urmpipe_models.errors import Finding, OutputError, Voice, map_collecting_errors
+from urmpipe_models.errors import Finding, OutputError, map_collecting_errors
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import EXPORT_HEADER, all_or_none, guarded_output, know_own, refuse_output
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
@@ -97,7 +97,7 @@ class Exported(Displayable):
 
         return pd.DataFrame([(str(one.path), one.rows) for one in self.files], columns=["file", "rows"])
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe export --json` prints."""
         return {
             "schema": 1,
@@ -106,7 +106,7 @@ class Exported(Displayable):
             "rows": self.rows,
             "columns": [{"name": name, "unit": unit} for name, unit in self.columns],
             "left_out": self.left_out,
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [one.to_dict() for one in self.warnings],
         }
 
 

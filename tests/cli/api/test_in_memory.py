@@ -58,7 +58,7 @@ def test_units_names_and_period_of_arrays() -> None:
 
 def test_what_was_not_said_in_degrees_is_asked_about() -> None:
     said = refusal(urmpipe.LogError, urmpipe.ingest, t=T, q=np.degrees(5 * Q), robot="ur5e")
-    assert 'unit={"q1": "deg"' in said
+    assert "--unit q1=deg" in said
 
 
 def test_joints_that_slide_are_in_m() -> None:

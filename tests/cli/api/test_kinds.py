@@ -144,7 +144,7 @@ def test_what_is_of_a_wrong_kind_is_refused_by_its_keyword(
             continue
         with pytest.raises(urmpipe.OptionError) as error:
             FUNCTIONS[function](**{**given(function, run, tmp_path), keyword: odd})
-        told = [str(one) for one in error.value.findings if str(one).startswith(f"{keyword}: found ")]
+        told = [str(one) for one in error.value.findings if one.parameter == keyword]
         assert len(told) == 1, f"{what}: {error.value}"
         found, _, allowed = told[0].partition(", allowed: ")
         assert len(found) < len(keyword) + 80, what

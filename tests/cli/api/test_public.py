@@ -56,9 +56,9 @@ def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.R
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.compare(run, run, time="none", tsp=0.01, derivative="savgol")
     assert str(error.value) == (
-        "time: found with an ingested log, allowed: with a log; a run or a recording is"
-        " used as ingested\ntsp: found with an ingested log, allowed: with a log; a run or"
-        " a recording is used as ingested\nderivative: found with an ingested log,"
+        "time (--time): found with an ingested log, allowed: with a log; a run or a recording is"
+        " used as ingested\ntsp (--tsp): found with an ingested log, allowed: with a log; a run or"
+        " a recording is used as ingested\nderivative (--derivative): found with an ingested log,"
         " allowed: with a log; a run or a recording is used as ingested"
     )
     with pytest.raises(urmpipe.UrmpipeError, match="allowed: 7"):
@@ -118,9 +118,9 @@ def test_a_frame_is_numbers_a_matrix_or_a_transform(given: Any) -> None:
     ],
 )
 def test_what_is_no_frame_is_refused(given: Any, found: str) -> None:
-    with pytest.raises(urmpipe.OptionError, match="tool: ") as error:
+    with pytest.raises(urmpipe.OptionError, match="tool") as error:
         urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=given)
-    assert str(error.value).startswith(f"tool: {found}")
+    assert str(error.value).startswith(f"tool (--tool): {found}")
 
 
 @pytest.mark.parametrize(("length", "times"), [(150.0, 130), (11.5, 10)])
@@ -128,7 +128,8 @@ def test_a_tool_in_mm_is_refused(length: float, times: int) -> None:
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=(0.0, 0.0, length))
     assert str(error.value) == (
-        f"tool: found {length:g} m from the tip, {times} times the length of ur5e, allowed: up to 10 times"
+        f"tool (--tool): found {length:g} m from the tip, {times} times the length of ur5e, allowed: up to"
+        " 10 times"
         " it; a number without a unit is in m"
     )
 
@@ -151,13 +152,14 @@ def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.ingest("log.csv", progress=True, **wrong)  # type: ignore[arg-type]
     assert str(error.value).splitlines() == [
-        "robot: found 6, allowed: a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)",
-        "tsp: found '5ms', allowed: a number, in s",
-        "strict: found 1, allowed: True or False",
-        "output: found '', allowed: a path: text or a Path, not empty",
+        "robot (--robot): found 6, allowed: a name, a TOML or URDF file, or a Chain, such as"
+        " urmpipe.load_robot(NAME)",
+        "tsp (--tsp): found '5ms', allowed: a number, in s",
+        "strict (--strict): found 1, allowed: True or False",
+        "output (--output): found '', allowed: a path: text or a Path, not empty",
         "progress: found True, allowed: a function of the completed share, 0 to 1, such as print",
-        "log_map: found {}, allowed: a map (TOML), or what `read_map` returned",
-        "skip_bad: found 1, allowed: True or False",
+        "log_map (--log-map): found {}, allowed: a map (TOML), or what `read_map` returned",
+        "skip_bad (--skip-bad): found 1, allowed: True or False",
     ]
 
 
@@ -192,7 +194,9 @@ def test_robot_and_log_are_told_together() -> None:
 
 
 def test_an_unknown_backend_is_refused() -> None:
-    with pytest.raises(urmpipe.OptionError, match=r"^backend: found 'cc', allowed: native, python$"):
+    with pytest.raises(
+        urmpipe.OptionError, match=r"^backend \(--backend\): found 'cc', allowed: native, python$"
+    ):
         urmpipe.build_fmu("dc_drive", backend="cc")  # type: ignore[arg-type]
 
 

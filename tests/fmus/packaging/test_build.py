@@ -71,7 +71,7 @@ def test_without_a_compiler_it_is_python_and_a_line_says_why(tmp_path: Path) -> 
     assert (made.backend, made.platforms) == ("python", ("linux64", "win64"))
     assert made.note == f"arm.fmu runs on Python, as no native one can be built here: {reason}"
     assert refusal(FmuError, build_fmu, arm, tmp_path, backend="native") == (
-        f"backend: found native, which cannot be built here: {reason}, allowed: python"
+        f"backend (--backend): found native, which cannot be built here: {reason}, allowed: python"
     )
 
 
@@ -79,8 +79,9 @@ def test_without_a_compiler_it_is_python_and_a_line_says_why(tmp_path: Path) -> 
 @pytest.mark.parametrize("platforms", [["win64"], ["linux64", "win64"]])
 def test_platforms_that_cannot_be_compiled_here_need_python(tmp_path: Path, platforms: list[str]) -> None:
     assert refusal(FmuError, build_fmu, unit_of("arm"), tmp_path, platforms=platforms) == (
-        f"platforms: found {', '.join(platforms)}, which cannot be compiled here: ziglang is not installed"
-        " (pip install 'urmpipe[cross]'); backend=\"python\" packages an FMU that needs Python with NumPy"
+        f"platforms (--platforms): found {', '.join(platforms)}, which cannot be compiled here: ziglang is"
+        " not installed"
+        " (pip install 'urmpipe[cross]'); --backend python packages an FMU that needs Python with NumPy"
     )
     assert list(tmp_path.iterdir()) == []
     made = build_fmu(unit_of("arm"), tmp_path, backend="python", platforms=platforms)

@@ -156,7 +156,7 @@ def test_the_pieces_that_no_speed_can_be_constant_on() -> None:
 
 def test_ruckig_missing_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ruckig", None)
-    message = "law: found jerk without ruckig, allowed: with ruckig: pip install urmpipe[planning]"
+    message = "law (--law): found jerk without ruckig, allowed: with ruckig: pip install urmpipe[planning]"
     assert refusal(OptionError, jerk_law, PATH, 0.5, 6.0, 60.0, "tangential") == message
 
 

@@ -26,7 +26,7 @@ def panda(shared: Path) -> Path:
 def test_the_fingers_of_a_gripper(panda: Path) -> None:
     assert refusal(RobotError, read_urdf, panda) == (
         f"{panda}: found panda_finger_joint2 on the arm beside the way to panda_leftfinger, as of a gripper;"
-        " tip_link=LINK chooses one: panda_hand, panda_hand_tcp, panda_leftfinger, panda_rightfinger"
+        " --tip-link LINK chooses one: panda_hand, panda_hand_tcp, panda_leftfinger, panda_rightfinger"
     )
     message = refusal(RobotError, read_urdf, panda, tip_link="panda_rightfinger")
     assert "joint panda_finger_joint2: mimics panda_finger_joint1, which is not on the chain" in message

@@ -157,7 +157,8 @@ def test_positions_that_leave_the_rotation_open_are_refused(
     reference: FloatArray, log: FloatArray, said: str
 ) -> None:
     assert refusal(LogError, aligned, path_run(reference), path_run(log, name="log"), "rigid") == (
-        f"log.csv: align: rigid: found {said}, which leaves the rotation open, allowed: start, tool, none"
+        f"log.csv: align (--align): rigid: found {said}, which leaves the rotation open, allowed: start,"
+        " tool, none"
     )
 
 
@@ -219,7 +220,8 @@ def test_a_tool_without_an_orientation_is_refused(quat: FloatArray | None, mode:
     with pytest.raises(LogError) as error:
         aligned(path_run(position, turn.as_quat()), path_run(position, quat, name="log"), mode)
     assert str(error.value) == (
-        f"log.csv: align: {mode}: found no orientation of the log, allowed: joints with a robot, or a"
+        f"log.csv: align (--align): {mode}: found no orientation of the log, allowed: joints with a robot,"
+        " or a"
         " recorded orientation"
     )
 
@@ -230,7 +232,7 @@ def test_a_tool_that_hardly_turns_is_refused_since_a_base_explains_as_much() -> 
     with pytest.raises(LogError) as error:
         aligned(path_run(position + SHIFT), path_run(position, turned.as_quat(), name="log"), "tool")
     assert str(error.value) == (
-        "log.csv: align: tool: found a tool that turns by 0.9000 deg in all, which an offset of the"
+        "log.csv: align (--align): tool: found a tool that turns by 0.9000 deg in all, which an offset of the"
         " base explains as well, allowed: a log that turns it; start, none"
     )
 
@@ -356,7 +358,8 @@ def test_poses_that_any_base_and_tool_fit_are_refused(rows: int, found: str) -> 
     position, rotation = there(run.log.tcp_position), there(run.log.tcp_rotation)
     few = run_of(run.q[:rows], run.robot, position[:rows], rotation[:rows], "matrix")
     assert refusal(LogError, compare_recorded, few, CompareOptions(align="base+tool")) == (
-        f"log.csv: align: base+tool: found {found}, which some base and tool fit, allowed: 4 or more"
+        f"log.csv: align (--align): base+tool: found {found}, which some base and tool fit, allowed: 4 or"
+        " more"
     )
 
 
@@ -384,7 +387,7 @@ def test_what_poses_do_not_tell_of_base_and_tool_is_said(turns: FloatArray, said
     result = compare_runs(path_run(measured), [log], CompareOptions(align="base+tool"))
     assert result.runs[0].statistics["norm"].max < ROUNDING
     told = [(one.kind, str(one)) for one in result.warnings]
-    assert told == [("frames-open", f"log: align: the compared poses {said}")]
+    assert told == [("frames-open", f"log: align (--align): the compared poses {said}")]
     assert (result.runs[0].alignment.unobservable[0].seen < 1e-4) == ("do not" in said)
 
 

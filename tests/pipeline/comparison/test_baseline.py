@@ -268,8 +268,11 @@ def test_a_noise_is_of_all_lengths_or_of_kinds() -> None:
     )
     with pytest.raises(OptionError) as error:
         parse_noise("lots,angle=-1")
-    assert str(error.value) == (f"noise: found 'lots', {allowed}\nnoise: found 'angle=-1', {allowed}")
+    assert str(error.value) == (
+        f"noise (--noise): found 'lots', {allowed}\nnoise (--noise): found 'angle=-1', {allowed}"
+    )
     assert refusal(OptionError, complete_noise, {"axis": -1.0}) == (
-        "noise: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad"
+        "noise (--noise): found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle,"
+        " joint in rad"
         " (m of a joint that slides); 0 or positive"
     )

@@ -122,7 +122,8 @@ def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
     log = run_of(q, recorded=positions_over_log(URM6, q))
     for sync in ("auto", 0.25):
         assert refusal(OptionError, compare_recorded, log, CompareOptions(sync=sync)) == (
-            f"sync: found {sync} for one log, allowed: start, since its joints and its recorded tool centre"
+            f"sync (--sync): found {sync} for one log, allowed: start, since its joints and its recorded"
+            " tool centre"
             " point share the same rows"
         )
 
@@ -184,7 +185,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(points_over_log(URM6, q)[:, -1])
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [run_of(q, robot=None)])
-    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; robot=NAME|FILE sets one")
+    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; --robot NAME|FILE sets one")
     with pytest.raises(LogError) as error:
         compare_recorded(run_of(q))
     assert str(error.value) == (
@@ -199,7 +200,8 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
         compare_runs(wanted, [run_of(q)], CompareOptions(sync=99.0))
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
     assert refusal(OptionError, CompareOptions, {"axis": -1.0}) == (
-        "tolerance: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in"
+        "tolerance (--tolerance): found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of"
+        " angle, joint in"
         " rad (m of a joint that slides); positive; coverage, judged 0 to 1"
     )
 
@@ -228,7 +230,7 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
 def test_an_unknown_tool_centre_point_is_refused() -> None:
     with pytest.raises(OptionError) as error:
         CompareOptions(tcp="x")  # type: ignore[arg-type]
-    assert str(error.value) == "tcp: found x, allowed: fk, recorded"
+    assert str(error.value) == "tcp (--tcp): found x, allowed: fk, recorded"
 
 
 def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:

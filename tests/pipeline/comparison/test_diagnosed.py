@@ -160,7 +160,7 @@ def test_without_a_cause_nothing_is_mended(paths: Compared) -> None:
     assert not any(path.name == "without the causes" for path in scene_of(present(result)).paths)
 
 
-ALIGNED = "align: found rigid, allowed: none with a diagnosis: base and tool are possible causes"
+ALIGNED = "align (--align): found rigid, allowed: none with a diagnosis: base and tool are possible causes"
 
 
 def test_an_alignment_is_refused_with_a_diagnosis() -> None:

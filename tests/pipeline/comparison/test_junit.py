@@ -159,7 +159,7 @@ def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path:
     seen = "it shows 50 of 100 samples of path (50.0 %), longest unseen: 0.245 s from t = 0.250 s"
     seen += " of the reference"
     for_all = "large-tolerance: a tolerance of 150 mm (norm) accepts any deviation: 0.15 is in m;"
-    for_all += ' tolerance="norm=0.15mm" if mm was meant; tolerance="norm=0.15m" if not'
+    for_all += " --tolerance norm=0.15mm if mm was meant; --tolerance norm=0.15m if not"
     assert told == [f"not-covered: short: {seen}\n{for_all}", for_all]
     result = paths(logs, tolerance=half)
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]

@@ -138,7 +138,8 @@ def assert_not_compared(reference: Run, reason: str) -> None:
     said = [w.message for w in result.warnings if w.kind == "joints-not-compared"]
     assert said == [f"no joint is compared: {reason}"]
     assert refusal(LogError, held, reference, log, joint=0.1) == (
-        f"log.csv: tolerance: joint: found that {reason}, allowed: the same joints on both sides"
+        f"log.csv: tolerance (--tolerance): joint: found that {reason}, allowed: the same joints on both"
+        " sides"
     )
 
 
@@ -146,8 +147,10 @@ def test_all_that_cannot_be_judged_is_refused_at_once() -> None:
     with pytest.raises(LogError) as error:
         held(path_run(np.column_stack([T, T, T])), arm_run(joints(), NAMES), joint=0.1, angle=0.1)
     assert str(error.value) == (
-        "log.csv: tolerance: angle: found a side without an orientation, allowed: joints with a robot,"
-        " or a recorded orientation\nlog.csv: tolerance: joint: found that a side has no joints,"
+        "log.csv: tolerance (--tolerance): angle: found a side without an orientation, allowed: joints"
+        " with a robot,"
+        " or a recorded orientation\nlog.csv: tolerance (--tolerance): joint: found that a side has no"
+        " joints,"
         " allowed: the same joints on both sides"
     )
     assert compare_runs(path_run(np.column_stack([T, T, T])), [arm_run(joints(), NAMES)]).warnings == ()

@@ -94,7 +94,7 @@ def test_what_is_about_motions_has_no_effect(log: Path) -> None:
     asked: dict[str, Any] = {"tsp": 0.01, "derivative": "savgol", "interval": (-6.3, 6.3), "repair": True}
     run = urmpipe.ingest(log, poses=True, period=0.1, **asked)
     said = "no effect: the rows are still poses, which have no time"
-    assert {str(one) for one in run.warnings} == {f"{name}: {said}" for name in ("period", *asked)}
+    assert {str(one) for one in run.warnings} == {f"{name} (--{name}): {said}" for name in ("period", *asked)}
     np.testing.assert_array_equal(run.q, Q)
 
 
@@ -135,7 +135,7 @@ def test_poses_are_held_against_as_many_poses(tmp_path: Path, log: Path) -> None
     assert str(error.value) == f"fewer.csv: found {ROWS - 1} rows, allowed: {allowed}"
     with pytest.raises(OptionError) as wrong:
         urmpipe.compare(log, other, sync=1.0)
-    assert str(wrong.value) == "sync: found 1.0 of still poses, allowed: start, row by row"
+    assert str(wrong.value) == "sync (--sync): found 1.0 of still poses, allowed: start, row by row"
 
 
 def test_a_change_since_a_baseline_of_poses_has_no_time(tmp_path: Path, log: Path) -> None:
@@ -153,7 +153,7 @@ def test_poses_are_not_held_against_a_motion(tmp_path: Path, log: Path) -> None:
     with pytest.raises(LogError) as error:
         urmpipe.compare(path, log)
     said = "poses.csv: found still poses beside a motion, allowed: still poses on both sides, or motions"
-    assert str(error.value) == f"{said}; poses=True takes the rows of every log as still poses"
+    assert str(error.value) == f"{said}; --poses takes the rows of every log as still poses"
     result = urmpipe.compare(path, log, poses=True)
     assert result.runs[0].statistics["norm"].max < 1e-9
 
@@ -236,8 +236,8 @@ def test_a_tool_measured_from_outside_says_nothing_of_the_base(tmp_path: Path) -
         urmpipe.compare(log, robot="ur5e")
     found = "a tool that was measured in a frame of its own (tracker_x, tracker_y, tracker_z)"
     assert str(error.value) == (
-        f"poses.csv: align: found {found}, allowed: base+tool, rigid, start;"
-        ' align="base+tool" finds the frames of base and tool'
+        f"poses.csv: align (--align): found {found}, allowed: base+tool, rigid, start;"
+        " --align base+tool finds the frames of base and tool"
     )
     assert urmpipe.compare(log, robot="ur5e", align="rigid").verdict == "pass"
 

@@ -33,8 +33,8 @@ Motion = Callable[[FloatArray], FloatArray]
 
 JOINTS = tuple(f"q{k}" for k in range(1, 7))
 ALLOWED = (
-    'allowed: one motion that does not repeat itself, half of it in both; sync="start" aligns the'
-    " first samples; sync=SECONDS sets the offset"
+    "allowed: one motion that does not repeat itself, half of it in both; --sync start aligns the"
+    " first samples; --sync SECONDS sets the offset"
 )
 CLEAN = 1e-5
 """In [s]: a fiftieth of the tenth of a period of 5 ms that is asked for. Lines between samples 5 to 10 ms
@@ -270,10 +270,10 @@ def test_no_motion_tells_no_offset() -> None:
     still = np.ones((len(t), 6))
     moving, resting = joints(smooth(7, 6)(t), t, "wanted"), joints(still, t)
     assert refused(moving, resting) == (
-        f"log.csv: sync: auto: found no motion of the joints in this log, {ALLOWED}"
+        f"log.csv: sync (--sync): auto: found no motion of the joints in this log, {ALLOWED}"
     )
     assert refused(resting, moving) == (
-        f"wanted.csv: sync: auto: found no motion of the joints in log, {ALLOWED}"
+        f"wanted.csv: sync (--sync): auto: found no motion of the joints in log, {ALLOWED}"
     )
     one, other = np.random.default_rng(1).normal(scale=1e-4, size=(2, len(t), 6))
     assert "found low similarity of the joints to" in refused(joints(one, t), joints(other, t))
@@ -283,7 +283,8 @@ def test_a_motion_that_repeats_itself_names_the_offsets() -> None:
     t = times(0.0, 10.0, 0.005)
     swing = np.column_stack([np.sin(np.pi * t), np.cos(np.pi * t)])  # every 2 s
     assert refused(joints(swing, t, "wanted"), joints(swing[100:], t[100:])) == (
-        "log.csv: sync: auto: found a motion of the joints that several offsets to wanted explain equally"
+        "log.csv: sync (--sync): auto: found a motion of the joints that several offsets to wanted explain"
+        " equally"
         " well (similarity): 0.5 s (1.000), -1.5 s (1.000), 2.5 s (1.000), -3.5 s (1.000), 4.5 s (1.000),"
         f" {ALLOWED}"
     )
@@ -300,7 +301,9 @@ def test_a_steady_motion_tells_no_offset_but_its_ramps_do() -> None:
     t = times(0.0, 10.0, 0.005)
     steady = joints(np.outer(t, [1.0, -0.5]), t, "wanted")
     said = refused(steady, joints(np.outer(t, [1.0, -0.5]), t))
-    assert said.startswith("log.csv: sync: auto: found no clear best offset to wanted by the joints: about ")
+    assert said.startswith(
+        "log.csv: sync (--sync): auto: found no clear best offset to wanted by the joints: about "
+    )
     assert said.endswith(f" s with a similarity of 1.000, {ALLOWED}")
     ramp = np.outer(np.clip(t - 2.0, 0.0, 6.0), [1.0, -0.5])
     assert synchronise(joints(ramp, t), joints(ramp[50:], t[50:]), "auto").offset == 0.25
@@ -316,11 +319,11 @@ def test_a_turn_on_a_circle_tells_an_offset_only_where_the_frames_are_known() ->
 def test_two_motions_without_likeness_are_told() -> None:
     t = times(0.0, 20.0, 0.005)
     said = refused(joints(smooth(8, 6)(t), t, "wanted"), joints(smooth(9, 6)(t), t))
-    assert said.startswith("log.csv: sync: auto: found low similarity of the joints to wanted: ")
+    assert said.startswith("log.csv: sync (--sync): auto: found low similarity of the joints to wanted: ")
     assert said.endswith(f" at best, 0.8 is needed, {ALLOWED}")
 
 
-LOW = "log.csv: sync: auto: found low similarity of the "
+LOW = "log.csv: sync (--sync): auto: found low similarity of the "
 
 
 @pytest.mark.slow
@@ -330,7 +333,7 @@ def test_random_motions_are_not_taken_for_each_other() -> None:
         make = (smooth, moves)[seed % 2]
         for side, channels in ((joints, 6), (path, 3)):
             one, other = (side(make(1000 + 2 * seed + k, channels)(t), t) for k in (0, 1))
-            assert refused(one, other).startswith(("log.csv: sync: auto: found no ", LOW))
+            assert refused(one, other).startswith(("log.csv: sync (--sync): auto: found no ", LOW))
 
 
 def test_logs_without_samples_to_speak_of_are_refused() -> None:
@@ -340,7 +343,7 @@ def test_logs_without_samples_to_speak_of_are_refused() -> None:
     for log in (joints(q[:1], t[:1]), joints(np.full_like(q, np.nan), t)):
         assert "found no motion of the joints in this log" in refused(whole, log)
     for rows in (2, 3, 5):
-        assert refused(whole, joints(q[:rows], t[:rows])).startswith("log.csv: sync: auto: found ")
+        assert refused(whole, joints(q[:rows], t[:rows])).startswith("log.csv: sync (--sync): auto: found ")
 
 
 def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
@@ -351,7 +354,7 @@ def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
     crossed[::2, 0] = crossed[1::4, 1] = np.nan  # each joint has rates, but never both
     for log in (holes, crossed):
         assert refused(joints(q, t, "wanted"), joints(log, t)) == (
-            f"log.csv: sync: auto: found no offset at which the joints move as in wanted, {ALLOWED}"
+            f"log.csv: sync (--sync): auto: found no offset at which the joints move as in wanted, {ALLOWED}"
         )
 
 
@@ -407,9 +410,11 @@ def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> 
 @pytest.mark.slow
 def test_an_arm_that_counts_one_joint_backwards_makes_another_motion(demo: dict[str, Trajectory]) -> None:
     assert refused(demo["path"], demo["counter_rotating"]) == (
-        "counter_rotating.csv: sync: auto: found low similarity of the position to path: -1.36 s with a"
+        "counter_rotating.csv: sync (--sync): auto: found low similarity of the position to path: -1.36 s"
+        " with a"
         f" similarity of 0.598 at best, 0.8 is needed, {ALLOWED}"
     )
-    assert "counter_rotating.csv: sync: auto: found no clear best offset to coppeliasim by the joints" in (
-        refused(demo["coppeliasim"], demo["counter_rotating"])
+    assert (
+        "counter_rotating.csv: sync (--sync): auto: found no clear best offset to coppeliasim by the joints"
+        in (refused(demo["coppeliasim"], demo["counter_rotating"]))
     )

@@ -77,7 +77,7 @@ def test_a_unit_is_a_shift_of_the_decimal_point(number: int) -> None:
 )
 def test_a_large_number_needs_its_unit(clear: str, unclear: str, both: str) -> None:
     assert parse_tolerance(clear) == {clear.rpartition("=")[0] or "axis": float(clear.rpartition("=")[2])}
-    said = f"tolerance: found {unclear}, allowed: a unit: {both}"
+    said = f"tolerance (--tolerance): found {unclear}, allowed: a unit: {both}"
     assert refusal(OptionError, parse_tolerance, unclear) == said
 
 
@@ -112,31 +112,33 @@ def test_a_degree_is_that_of_pi() -> None:
     ],
 )
 def test_what_is_no_tolerance_is_one_line(part: str, said: str) -> None:
-    assert refusal(OptionError, parse_tolerance, part) == f"tolerance: found {said}, {ALLOWED}"
+    assert refusal(OptionError, parse_tolerance, part) == f"tolerance (--tolerance): found {said}, {ALLOWED}"
 
 
 def test_an_angle_alone_and_a_decimal_comma_are_told_how_to_be_written() -> None:
     with pytest.raises(OptionError) as error:
         parse_tolerance("0.5deg")
     assert str(error.value) == (
-        f"tolerance: found '0.5deg', {ALLOWED};"
-        ' tolerance="angle=0.5deg" or tolerance="joint=0.5deg" specifies the kind'
+        f"tolerance (--tolerance): found '0.5deg', {ALLOWED};"
+        " --tolerance angle=0.5deg or --tolerance joint=0.5deg specifies the kind"
     )
     with pytest.raises(OptionError) as error:
         parse_tolerance("3,5mm")
-    assert str(error.value) == ("tolerance: found '3,5mm', allowed: a point before the decimals, 3.5mm")
+    assert str(error.value) == (
+        "tolerance (--tolerance): found '3,5mm', allowed: a point before the decimals, 3.5mm"
+    )
 
 
 def test_everything_that_is_wrong_is_told_at_once() -> None:
     with pytest.raises(OptionError) as error:
         parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm,angle= 1", "noise", zero=True)
     assert [str(one) for one in error.value.findings] == [
-        f"noise: found 'foo=2', {NOISE}",
-        f"noise: found 'axis=3mm' twice, {NOISE}",
-        f"noise: found 'norm=x', {NOISE}",
-        f"noise: found '', {NOISE}",
-        f"noise: found 'norm=5mm' twice, {NOISE}",
-        "noise: found angle= 1, allowed: a unit: angle=1deg or angle=1rad",
+        f"noise (--noise): found 'foo=2', {NOISE}",
+        f"noise (--noise): found 'axis=3mm' twice, {NOISE}",
+        f"noise (--noise): found 'norm=x', {NOISE}",
+        f"noise (--noise): found '', {NOISE}",
+        f"noise (--noise): found 'norm=5mm' twice, {NOISE}",
+        "noise (--noise): found angle= 1, allowed: a unit: angle=1deg or angle=1rad",
     ]
 
 
@@ -150,10 +152,10 @@ def test_a_tolerance_in_numbers_is_checked_whole() -> None:
     with pytest.raises(OptionError) as error:
         check_tolerance({"foo": 1.0, "axis": 0.0, "norm": math.nan, "path": "1mm", "judged": 1.1})  # type: ignore[dict-item]
     assert [str(one) for one in error.value.findings] == [
-        f"tolerance: found {found}, {NUMBERS}; positive; coverage, judged 0 to 1"
+        f"tolerance (--tolerance): found {found}, {NUMBERS}; positive; coverage, judged 0 to 1"
         for found in ("foo=1.0", "axis=0.0", "norm=nan", "path=1mm", "judged=1.1")
     ]
-    assert refusal(OptionError, check_tolerance, {}) == f"tolerance: found nothing, {NUMBERS}"
+    assert refusal(OptionError, check_tolerance, {}) == f"tolerance (--tolerance): found nothing, {NUMBERS}"
 
 
 def test_a_coordinate_goes_before_the_axes_and_a_joint_of_that_name_does_not() -> None:

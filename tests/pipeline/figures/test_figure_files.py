@@ -77,13 +77,16 @@ def test_a_name_is_one_that_every_system_takes(title: str, part: str, stem: str)
 
 def test_all_that_is_wrong_with_options_is_told_at_once() -> None:
     assert refused(formats=("jpg", "pdf"), width="12 miles", font=math.nan, dpi=5) == (
-        "formats: found jpg, allowed: pdf, svg, png\n"
-        "figure_width: found '12 miles', allowed: column, page, or 40 mm to 1 m, such as 85mm or 3.5in\n"
-        "figure_font: found nan, allowed: 4 to 32, in pt\n"
-        "figure_dpi: found 5, allowed: 50 to 1200"
+        "formats (--formats): found jpg, allowed: pdf, svg, png\n"
+        "figure_width (--figure-width): found '12 miles', allowed: column, page, or 40 mm to 1 m, such as"
+        " 85mm or 3.5in\n"
+        "figure_font (--figure-font): found nan, allowed: 4 to 32, in pt\n"
+        "figure_dpi (--figure-dpi): found 5, allowed: 50 to 1200"
     )
-    assert refused(formats=()) == "formats: found nothing, allowed: pdf, svg, png"
-    assert refused(width=85.0).startswith("figure_width: found 85.0, allowed: column, page, or 40 mm to 1 m")
+    assert refused(formats=()) == "formats (--formats): found nothing, allowed: pdf, svg, png"
+    assert refused(width=85.0).startswith(
+        "figure_width (--figure-width): found 85.0, allowed: column, page, or 40 mm to 1 m"
+    )
 
 
 @pytest.mark.slow
@@ -181,7 +184,8 @@ def test_figures_are_chosen_by_title_part_and_pattern(tmp_path: Path) -> None:
         names("Path*", "Torque", "log/*")
     there = "allowed: Speed <over> time, Path in space, System"
     assert str(caught.value) == (
-        f"figure_names: found 'Torque', {there}\nfigure_names: found 'log/*', {there}"
+        f"figure_names (--figure-names): found 'Torque', {there}\nfigure_names (--figure-names): found"
+        f" 'log/*', {there}"
     )
 
 
@@ -221,7 +225,7 @@ def test_a_file_is_no_folder(tmp_path: Path) -> None:
     path.write_text("mine")
     with pytest.raises(OutputError) as caught:
         written(waves(), path)
-    assert str(caught.value) == f"{path}: figures: found a file, allowed: a folder"
+    assert str(caught.value) == f"{path}: figures (--figures): found a file, allowed: a folder"
 
 
 def test_without_matplotlib_one_line_says_how_to_install_it(
@@ -231,7 +235,7 @@ def test_without_matplotlib_one_line_says_how_to_install_it(
     with pytest.raises(OutputError) as caught:
         write_report([waves()], tmp_path / "page.html", figures=FigureOptions(tmp_path / "new" / "figures"))
     assert str(caught.value) == (
-        "figures: found no matplotlib, which draws them, allowed: pip install 'urmpipe[figures]'"
+        "figures (--figures): found no matplotlib, which draws them, allowed: pip install 'urmpipe[figures]'"
     )
     assert [*tmp_path.iterdir()] == []
 

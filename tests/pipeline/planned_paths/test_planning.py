@@ -406,30 +406,32 @@ def refused(arm: Chain | None = None, **timing: Any) -> list[str]:
 
 def test_values_that_make_no_sense_are_refused_together() -> None:
     assert refused(law="fast", arcs="both", velocity=0.0, acceleration=math.inf, jerk=-1, tsp=math.nan) == [
-        "law: found 'fast', allowed: trapezoid, jerk, limits",
-        "arcs: found 'both', allowed: tangential, total",
-        "velocity: found 0.0, allowed: a finite number of m/s above 0",
-        "acceleration: found inf, allowed: a finite number of m/s2 above 0",
-        "jerk: found -1, allowed: a finite number of m/s3 above 0",
-        "tsp: found nan, allowed: a finite number of s above 0",
-        "jerk: found a jerk with the law fast, allowed: with the law jerk",
+        "law (--law): found 'fast', allowed: trapezoid, jerk, limits",
+        "arcs (--arcs): found 'both', allowed: tangential, total",
+        "velocity (--velocity): found 0.0, allowed: a finite number of m/s above 0",
+        "acceleration (--acceleration): found inf, allowed: a finite number of m/s2 above 0",
+        "jerk (--jerk): found -1, allowed: a finite number of m/s3 above 0",
+        "tsp (--tsp): found nan, allowed: a finite number of s above 0",
+        "jerk (--jerk): found a jerk with the law fast, allowed: with the law jerk",
     ]
-    assert refused(law="jerk") == ["jerk: found no jerk with the law jerk, allowed: a number of m/s3"]
+    assert refused(law="jerk") == [
+        "jerk (--jerk): found no jerk with the law jerk, allowed: a number of m/s3"
+    ]
     assert refused(law="limits", arcs="total") == [
-        "arcs: found total with the law limits, allowed: with the laws trapezoid and jerk"
+        "arcs (--arcs): found total with the law limits, allowed: with the laws trapezoid and jerk"
     ]
 
 
 def test_the_law_of_limits_names_the_key_that_it_lacks() -> None:
-    assert refused(law="limits") == ["law: found limits without a robot, allowed: with a robot"]
+    assert refused(law="limits") == ["law (--law): found limits without a robot, allowed: with a robot"]
     assert refused(limited("ur5e", acceleration=[5.0] * 4 + [math.inf] * 2), law="limits") == [
-        "robot: found ur5e without the largest acceleration of wrist_2_joint, wrist_3_joint,"
+        "robot (--robot): found ur5e without the largest acceleration of wrist_2_joint, wrist_3_joint,"
         " allowed: a robot file with the key acceleration in limits, in rad/s2 or m/s2"
     ]
 
 
 def test_times_are_in_ns() -> None:
-    assert refused(tsp=4e-10) == ["tsp: found 4e-10, allowed: 1e-09 s or more: times are in ns"]
+    assert refused(tsp=4e-10) == ["tsp (--tsp): found 4e-10, allowed: 1e-09 s or more: times are in ns"]
 
 
 def test_a_period_longer_than_a_plan_has_both_ends() -> None:
@@ -441,5 +443,5 @@ def test_too_many_samples_are_refused() -> None:
     with pytest.raises(OptionError) as raised:
         planned(None, CONTOUR, tsp=1e-7)
     assert str(raised.value) == (
-        "tsp: found 1e-07 s, allowed: a period that makes up to 1000000 samples of 4.78032 s"
+        "tsp (--tsp): found 1e-07 s, allowed: a period that makes up to 1000000 samples of 4.78032 s"
     )

@@ -1,4 +1,4 @@
-"""How a cell is written: digits that a judgement needs, units, advice in the voice of who reads it."""
+"""How a cell is written: digits that a judgement needs, units, advice."""
 
 from __future__ import annotations
 
@@ -69,10 +69,9 @@ def test_a_cell_is_written_with_its_unit_or_without(cell: Cell, with_unit: str, 
     assert (written(cell, unit=True), written(cell)) == (with_unit, without)
 
 
-def test_advice_is_spelled_for_who_reads_it() -> None:
+def test_advice_ends_with_its_hint() -> None:
     advice = Advice("late", (Hint("sync", "auto", "finds an offset"),))
     assert written(advice) == "late; --sync auto finds an offset"
-    assert written(advice, voice="python") == 'late; sync="auto" finds an offset'
     assert written(Advice()) == NOTHING
 
 

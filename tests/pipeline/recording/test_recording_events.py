@@ -21,11 +21,11 @@ def test_events_stand_at_their_times_in_order_and_begin_with_them(tmp_path: Path
     ]  # fmt: skip
     path = recorded(shown(figure(panel(toy())), events=lambda: events), tmp_path)
     assert rows_of(path, EVENTS, TEXT) == {
-        0: [f"gap: {warning.format('command line')}"],
+        0: [f"gap: {warning}"],
         5_000_000: ["0.0050 s  a?b"],
         20_000_000: ["0.0200 s  last"],
     }
-    assert "--tsp 0.01" in warning.format("command line")
+    assert "--tsp 0.01" in str(warning)
     assert columns(path, EVENTS, "TextLog:level") == [["WARN"], ["INFO"], ["ERROR"]]
 
 

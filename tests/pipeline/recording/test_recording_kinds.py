@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from recorded import times_of
 from same_results import assert_same
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, TextArray
-from urmpipe_models.errors import Voice
 from urmpipe_pipeline import results
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation, Section
@@ -49,7 +48,7 @@ class Accuracy(Result):
     def to_frame(self) -> pd.DataFrame:
         return pd.DataFrame(self.error)
 
-    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         return {"name": self.name}
 
 

@@ -109,11 +109,14 @@ def test_the_recording_of_a_simulation_is_compared_as_it_is(
         "log-to-delta (log)", "log-to-delta (chain)",
     ]  # fmt: skip
     assert refusal(LogError, load_runs, [path]) == (
-        f'{path}: found 2 blocks with a motion, allowed: one; use block="chain" or block="log"'
+        f"{path}: found 2 blocks with a motion, allowed: one; use --block chain or --block log"
     )
     for blocks in (["a", "b"], ["chain", "log", "chain"]):
         refused = refusal(OptionError, load_runs, [path], block=blocks)
-        assert refused.startswith("block: found 'a'") or "with 1 simulation, allowed: a block" in refused
+        assert (
+            refused.startswith("block (--block): found 'a'")
+            or "with 1 simulation, allowed: a block" in refused
+        )
     assert load_comparison(path) is None
 
 

@@ -128,7 +128,7 @@ def test_steps_of_one_kind_are_one_warning_and_all_in_the_audit() -> None:
     assert len(found.entries) == 384
     (warning,) = found.warnings
     assert (warning.kind, warning.row) == ("large-step", 2)
-    assert warning.format("command line") == (
+    assert str(warning) == (
         "row 2: 384 steps of q1 and q3 by more than 90 deg are not wraps and are kept; the largest, of q1 by"
         " 126.1 deg, is to row 122; urmpipe ingest --audit FILE.csv lists all"
     )
@@ -146,7 +146,7 @@ def test_samples_on_wraps_are_one_warning() -> None:
     worst = max(off, key=lambda entry: abs(entry.step))
     (warning,) = found.warnings
     assert (warning.kind, warning.row) == ("in-between", wraps[0] + 1)
-    assert warning.format("command line") == (
+    assert str(warning) == (
         f"row {wraps[0] + 1}: {len(wraps)} samples of q1 lie between the ends of wraps, where a linear"
         f" resampling left them, off the line of their neighbours, at most that of q1 in row {worst.row} by"
         f" {abs(worst.step):.4g} rad; --repair puts them there; urmpipe ingest --audit FILE.csv lists all"
@@ -192,7 +192,7 @@ def test_jumps_of_one_and_of_two_turns_in_one_joint_are_asked_for() -> None:
         audit_log(log_of(q))
     assert str(error.value) == (
         "log, column q1: found 2 steps of about 4 pi and 2 of about 2 pi, allowed: wraps of one"
-        ' interval; interval={"q1": (LOW, HIGH)} specifies it'
+        " interval; --interval q1=LOW:HIGH specifies it"
     )
     assert len(audit_log(log_of(q), interval={"q1": (-FULL_TURN, FULL_TURN)}).entries) == 4
 
@@ -222,7 +222,8 @@ def test_an_interval_holds_for_one_joint_or_for_all_in_the_unit_of_the_file() ->
         audit_log(log, interval={"": (-90.0, 90.0)})
     outside = [np.flatnonzero(np.abs(column / DEG) > 90.0018) for column in q.T]
     assert str(error.value).splitlines() == [
-        f"log, row {rows[0] + 1}, column {name}: interval: found {len(rows)} values outside, first"
+        f"log, row {rows[0] + 1}, column {name}: interval (--interval): found {len(rows)} values outside,"
+        " first"
         f" {q[rows[0], j] / DEG:.6g} deg in row"
         f" {rows[0] + 1}, allowed: -90..90 deg"
         for j, (name, rows) in enumerate(zip(("q1", "q2"), outside, strict=True))
@@ -232,10 +233,10 @@ def test_an_interval_holds_for_one_joint_or_for_all_in_the_unit_of_the_file() ->
 @pytest.mark.parametrize(
     ("interval", "said"),
     [
-        ({"": (1.0, 1.0)}, f"interval: found 1:1, {ALLOWED}"),
-        ({"q1": (0.0, math.inf)}, f"interval: found q1=0:inf, {ALLOWED}"),
-        ({"": (math.nan, 1.0)}, f"interval: found nan:1, {ALLOWED}"),
-        ({"q7": (0.0, 6.0)}, "interval: found q7, allowed: joints that turn: q1"),
+        ({"": (1.0, 1.0)}, f"interval (--interval): found 1:1, {ALLOWED}"),
+        ({"q1": (0.0, math.inf)}, f"interval (--interval): found q1=0:inf, {ALLOWED}"),
+        ({"": (math.nan, 1.0)}, f"interval (--interval): found nan:1, {ALLOWED}"),
+        ({"q7": (0.0, 6.0)}, "interval (--interval): found q7, allowed: joints that turn: q1"),
     ],
 )  # fmt: skip
 def test_intervals_that_make_no_sense_are_refused(

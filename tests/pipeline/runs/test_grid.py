@@ -124,7 +124,7 @@ def test_a_grid_that_would_fill_the_memory_is_refused() -> None:
     t = np.append(5 * MS * np.arange(10), 1_700_000_000_000 * MS)
     assert refusal(LogError, make_grid, log_at(t)) == (
         "log, row 11: found 340000000001 samples every 5 ms for 11 rows, 1.7e+09 s pass before row 11,"
-        " allowed: 986895 samples; a clock without such a gap; tsp=SECONDS sets a longer period"
+        " allowed: 986895 samples; a clock without such a gap; --tsp SECONDS sets a longer period"
     )
     with pytest.raises(LogError, match="found 45000001 samples every 1e-06 ms for 10 rows"):
         make_grid(log_at(5 * MS * np.arange(10)), 1e-9)

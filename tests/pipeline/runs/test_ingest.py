@@ -186,13 +186,13 @@ def test_a_real_controller_log_agrees_with_the_catalogue() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"tsp": 0.0}, "tsp: found 0 s, allowed: a positive time below 1e+09 s"),
-        ({"tsp": -0.005}, "tsp: found -0.005 s, allowed: a positive time below 1e+09 s"),
-        ({"tsp": math.nan}, "tsp: found nan s, allowed: a positive time below 1e+09 s"),
-        ({"derivative": "savgo"}, "derivative: found savgo, allowed: central, savgol"),
+        ({"tsp": 0.0}, "tsp (--tsp): found 0 s, allowed: a positive time below 1e+09 s"),
+        ({"tsp": -0.005}, "tsp (--tsp): found -0.005 s, allowed: a positive time below 1e+09 s"),
+        ({"tsp": math.nan}, "tsp (--tsp): found nan s, allowed: a positive time below 1e+09 s"),
+        ({"derivative": "savgo"}, "derivative (--derivative): found savgo, allowed: central, savgol"),
         (
             {"read": ReadOptions(period=1e300)},
-            "period: found 1e+300 s, allowed: less than 2.30584e+09 s for 2 rows",
+            "period (--period): found 1e+300 s, allowed: less than 2.30584e+09 s for 2 rows",
         ),
     ],
 )  # fmt: skip

@@ -259,7 +259,8 @@ def test_the_real_log_with_an_outlier_says_so() -> None:
     (warning,) = [w for w in run.warnings if w.kind in KINDS]
     assert warning == LogWarning(
         "outlier-first",
-        "an outlier, off the motion of the other rows: joint1 by 0.6856 rad (other steps: at most 0.09092);"
+        "an outlier, off the motion of the other rows: joint1 by 0.6856 rad (other steps: at most"
+        " 0.09092);"
         " it is kept; remove it from the file if the arm was not there",
         1,
     )

@@ -76,7 +76,7 @@ def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
             for k, header in enumerate(headers)
         )
         (warning,) = recorded_tcp_warnings(UR5E, replace(exchanged, columns=columns))
-        assert warning.format("command line").endswith(f"--joints {option} exchanges them")
+        assert str(warning).endswith(f"--joints {option} exchanges them")
 
 
 def test_a_joint_that_is_counted_the_other_way_is_found() -> None:
@@ -125,7 +125,7 @@ def test_a_tool_that_was_not_told_is_found() -> None:
 def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) -> None:
     recorded = positions_over_log(UR5E.placed(base=from_offset(base)), Q)
     (warning,) = missing_tool_warning(UR5E, log(Q, recorded))
-    told = warning.format("command line")
+    told = str(warning)
     assert told.endswith(
         f" mm (rms) from the recorded TCP; --robot ur5e --base {said} brings them within 0.00 mm"
     )
@@ -138,7 +138,7 @@ def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool(
     )
     up = np.linalg.inv(poses_over_log(UR5E, still[:1])[1][0])[:, 2] * 0.15
     shown = ",".join(f"{value:g}" for value in np.round(up, 4) + 0.0)
-    assert warning.format("command line") == (
+    assert str(warning) == (
         "the kinematics of ur5e stay 150.0 mm (rms) from the recorded TCP, and the log moves too"
         " little to show why: perhaps a tool or a base is missing; --robot ur5e --tool"
         f" {shown} brings them within {1e3 * np.linalg.norm(np.round(up, 4) - up):.2f} mm here"
@@ -146,10 +146,10 @@ def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool(
     few = still[:3]  # too few poses for a tool, and not one tool for all of them
     scattered = positions_over_log(UR5E, few) + np.array([[0.15], [0.25], [0.2]])
     (warning,) = missing_tool_warning(UR5E, log(few, scattered))
-    assert warning.format("command line").endswith("base is missing; --tool X,Y,Z or --base X,Y,Z sets it")
+    assert str(warning).endswith("base is missing; --tool X,Y,Z or --base X,Y,Z sets it")
     tooled = UR5E.placed(tool=translation(0.0, 0.0, 0.1))
     (warning,) = missing_tool_warning(tooled, log(still, positions_over_log(UR5E, still)))
-    assert warning.format("command line") == (
+    assert str(warning) == (
         "the kinematics of ur5e stay 100.0 mm (rms) from the recorded TCP, and the log moves too"
         " little to show why: perhaps the tool, 100.0 mm long, is another, or a base is missing;"
         " --robot ur5e --tool 0,0,0 brings them within 0.00 mm here"
@@ -254,7 +254,7 @@ def test_the_rotation_of_a_tool_is_in_the_hint_and_helps() -> None:
     for turned in (False, True):
         (warning,) = missing_tool_warning(UR5E, recorded, turned=turned)
         (hint,) = warning.hints
-        assert hint.format("command line") == "--robot ur5e --tool 0.02,0,0.15,0.3,-0.2,1.5708"
+        assert str(hint) == "--robot ur5e --tool 0.02,0,0.15,0.3,-0.2,1.5708"
         assert isinstance(hint.value, list)
         given = UR5E.placed(tool=from_offset([float(value) for value in hint.value]))
         assert missing_tool_warning(given, recorded, turned=turned) == []
@@ -265,7 +265,7 @@ def test_only_a_turned_tool_is_found_where_orientations_are_judged() -> None:
     recorded = replace(log(Q, positions_over_log(UR5E, Q)), **turning(UR5E.placed(tool=tool), Q))
     assert missing_tool_warning(UR5E, recorded) == []
     (warning,) = missing_tool_warning(UR5E, recorded, turned=True)
-    assert warning.format("command line") == (
+    assert str(warning) == (
         "the kinematics of ur5e stay 0.0 mm and 28.65 deg (rms) from the recorded TCP;"
         " --robot ur5e --tool 0,0,0,0,0,0.5 brings them within 0.00 mm and 0.0 deg"
     )
@@ -275,7 +275,7 @@ def test_an_arm_from_a_file_is_not_called_by_a_name_of_the_catalogue() -> None:
     own = replace(UR5E, tip=translation(0.0, 0.0, 0.01))
     recorded = positions_over_log(own.placed(tool=translation(0.0, 0.0, 0.15)), Q)
     (warning,) = missing_tool_warning(own, log(Q, recorded))
-    assert warning.hints[0].format("python") == "tool=[0, 0, 0.15]"
+    assert str(warning.hints[0]) == "--tool 0,0,0.15"
 
 
 # The first rows

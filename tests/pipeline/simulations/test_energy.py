@@ -127,7 +127,7 @@ def test_a_residual_above_5_percent_of_blocks_that_act_on_each_other_is_a_warnin
     assert (warning.kind, str(warning)) == (
         "coarse-step",
         "blocks see each other's values held over 1 ms: residual of the energy balance: found 4 J, 40.0 %"
-        " of the largest energy, allowed: 5 %; step=0.0001 makes it smaller",
+        " of the largest energy, allowed: 5 %; --step 0.0001 makes it smaller",
     )
 
 

@@ -58,11 +58,11 @@ def test_a_block_is_named_where_several_move(make_simulation: MakeSimulation) ->
     simulation = make_simulation(5)
     assert moving_blocks(simulation) == ("chain", "log")
     assert refusal(LogError, run_of_block, simulation) == (
-        'log-to-delta: found 2 blocks with a motion, allowed: one; use block="chain" or block="log"'
+        "log-to-delta: found 2 blocks with a motion, allowed: one; use --block chain or --block log"
     )
     for other in ("nosuch", "meter"):
         assert refusal(OptionError, run_of_block, simulation, other) == (
-            f"block: found '{other}', allowed: chain, log, which have a motion in log-to-delta"
+            f"block (--block): found '{other}', allowed: chain, log, which have a motion in log-to-delta"
         )
     alone = run_of_block(replace(simulation, signals=simulation.signals[1:]))
     assert alone.name == "log-to-delta (chain)"

@@ -195,11 +195,11 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     assert said(vector) == []
 
 
-MAP = 'log_map=FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = '--log-map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
 
 
 def _forms(*forms: str) -> str:
-    return " or ".join(f'rotation="{form}"' for form in forms) + " specifies it"
+    return " or ".join(f"--rotation {form}" for form in forms) + " specifies it"
 
 
 @pytest.mark.parametrize("names", ["W,P,R", "alpha,beta,gamma", "r11,r12,r13,r21", "j1,j2,j3,j4,j5,j6"])
@@ -215,7 +215,8 @@ def test_columns_that_may_be_an_orientation_are_not_left_out_in_silence(read: Re
 
 def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
     assert wrong("x,y,z,W,P,R\n1,2,3,0,0,0\n", rotation="rpy") == [
-        "targets.csv: rotation: found rpy given for x, y, z and no orientation, allowed: its columns beside"
+        "targets.csv: rotation (--rotation): found rpy given for x, y, z and no orientation, allowed: its"
+        " columns beside"
         f" them; {MAP}"
     ]
     assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", orientation=("u", "v", "w")) == [
@@ -255,7 +256,7 @@ def test_more_columns_without_names_need_an_even_time_or_the_form_of_the_orienta
     without = (
         "columns without names, allowed: x, y, z alone or with an orientation; name the columns in a header"
     )
-    first = 'time="1" if the first is the time'
+    first = "--time 1 if the first is the time"
     assert wrong(six) == [
         f"targets.csv: found 6 {without}; {_forms('vector', 'rpy', 'zyx', 'xyz', 'zyz', 'zxz')}"
     ]
@@ -284,5 +285,5 @@ def test_of_columns_without_names_the_form_tells_the_time_by_their_number(read: 
     assert_turned(targets, [np.eye(3)] * 3)
     assert wrong("".join(row[:15] + "\n" for row in rows)) == [
         "targets.csv:1: found a first column that increases from row to row, which may be the time or"
-        ' a counter; time="1" or time="none" specifies it'
+        " a counter; --time 1 or --time none specifies it"
     ]

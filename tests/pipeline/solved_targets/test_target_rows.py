@@ -18,7 +18,7 @@ Read = Callable[..., TargetFile]
 Wrong = Callable[..., list[str]]
 
 
-MAP = 'log_map=FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = '--log-map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
 
 
 def said(targets: TargetFile) -> list[tuple[str, str]]:
@@ -178,7 +178,7 @@ def test_numbered_quaternions_of_which_some_are_none_are_asked_for_their_form(
     text = "x,y,z,q1,q2,q3,q4\n0.3,0.1,0.5,0.5,0,0,0\n0.3,0.1,0.5,1,0,0,0\n"
     assert wrong(text) == [
         "targets.csv: found q1, q2, q3, q4, which may be quat_wxyz or quat_xyzw, allowed: one form;"
-        ' rotation="quat_wxyz" or rotation="quat_xyzw" specifies it'
+        " --rotation quat_wxyz or --rotation quat_xyzw specifies it"
     ]
     targets = read(text, rotation="quat_wxyz")
     assert list(targets.faults) == [1]
@@ -321,7 +321,7 @@ def test_times_that_repeat_or_run_backwards_are_an_error_of_the_file(wrong: Wron
         f"targets.csv:6, column t: found 0.2 s again, {INCREASE}",
     ]
     assert wrong("t,x,y,z\n,1,1,1\n-,1,1,1\n") == [
-        'targets.csv, column t: found no time in any of 2 rows, allowed: at least one; time="none"'
+        "targets.csv, column t: found no time in any of 2 rows, allowed: at least one; --time none"
         " leaves the column out"
     ]
 
@@ -348,14 +348,14 @@ def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
             "t,q1,q2,q3\n0,1,2,3\n1,1,2,3\n",
             [
                 "targets.csv: found no position in q1, q2, q3, allowed: x, y, z; name them so in the"
-                ' header; log_map=FILE.toml names them: [tcp] position = ["A", "B", "C"]'
+                ' header; --log-map FILE.toml names them: [tcp] position = ["A", "B", "C"]'
             ],
         ),
         (
             "x [ft],y [ft],z [m]\n1,2,3\n",
             [
                 "targets.csv, column x [ft]: found the unit 'ft', allowed: rad, deg, m, mm, cm;"
-                ' convert the values; unit={"x": "mm"} keeps the values unchanged'
+                ' convert the values; --unit x=mm keeps the values unchanged'
             ],
         ),
         (
@@ -392,6 +392,8 @@ def test_a_file_that_is_wrong_as_a_whole_is_refused(wrong: Wrong, text: str, lin
 
 def test_options_that_make_no_sense_are_refused(wrong: Wrong) -> None:
     text = "x,y,z\n1,2,3\n"
-    assert wrong(text, -1.0) == ["tsp: found -1 s, allowed: a positive time of 1e-9 s or more"]
-    assert wrong(text, period=0.0) == ["period: found 0 s, allowed: a positive time of 1e-9 s or more"]
-    assert wrong(text, unit={"u": "mm"}) == ["unit: found no column 'u', allowed: x, y, z"]
+    assert wrong(text, -1.0) == ["tsp (--tsp): found -1 s, allowed: a positive time of 1e-9 s or more"]
+    assert wrong(text, period=0.0) == [
+        "period (--period): found 0 s, allowed: a positive time of 1e-9 s or more"
+    ]
+    assert wrong(text, unit={"u": "mm"}) == ["unit (--unit): found no column 'u', allowed: x, y, z"]

@@ -88,7 +88,7 @@ def test_a_wrong_row_far_behind_the_head(wrong: Wrong) -> None:
     assert wrong("\n".join(["t,q1,q2", *rows])) == [
         "log.csv:30002: found 2 cells, allowed: 3",
         f"log.csv:35002, column q1: found 'abc', {NUMBER}",
-        "log.csv: 2 of 40000 rows cannot be read; skip_bad=True leaves them out",
+        "log.csv: 2 of 40000 rows cannot be read; --skip-bad leaves them out",
     ]
 
 

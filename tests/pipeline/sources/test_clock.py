@@ -95,8 +95,8 @@ def test_seconds_and_nanoseconds_apart(read: Read) -> None:
 def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> None:
     text = clocked("t", "0", "600", "1200")
     assert wrong(text) == [
-        'log.csv:2, column t: found steps of 600, which may be ms or us; unit={"t": "ms"} or'
-        f' unit={{"t": "us"}} specifies it{OTHER_TIME}'
+        "log.csv:2, column t: found steps of 600, which may be ms or us; --unit t=ms or"
+        f" --unit t=us specifies it{OTHER_TIME}"
     ]
     assert read(text, unit={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
 
@@ -120,7 +120,7 @@ def test_without_a_time_the_period_is_given_or_that_of_the_paper(read: Read, wro
     assert [warning.kind for warning in log.warnings] == ["assumed-unit"]
     for period in (0.0, -1.0, float("nan"), float("inf")):
         assert wrong(text, period=period) == [
-            f"period: found {period:g} s, allowed: a positive time of 1e-9 s or more"
+            f"period (--period): found {period:g} s, allowed: a positive time of 1e-9 s or more"
         ]
 
 
@@ -156,13 +156,14 @@ def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
     assert read(text, time="b").t_ns.tolist() == [0, 100_000_000]
     assert read(text, time="2").t_ns.tolist() == [0, 100_000_000]
     assert read(clocked("t", "0", "0"), time="none").t_ns.tolist() == [0, 5_000_000]
-    assert wrong(text, time="c") == ["time: found no column 'c', allowed: a, b, q1"]
+    assert wrong(text, time="c") == ["time (--time): found no column 'c', allowed: a, b, q1"]
 
 
 def test_two_columns_of_one_name(wrong: Wrong, read: Read) -> None:
     text = "time,time,q1\n0,0.5,1\n1,0.6,2\n"
     assert wrong(text) == [
-        "log.csv:1, column time: found as columns 1, 2, allowed: once; time=COLUMN selects one: give"
+        "log.csv:1, column time: found as columns 1, 2, allowed: once; --time COLUMN selects one:"
+        " give"
         " its number"
     ]
     assert read(text, time="2").period == 0.1
@@ -200,8 +201,8 @@ def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
     """Windows counts 100 ns since 1601: no unit that is known, and as s an age."""
     text = clocked("t [s]", "133500000000000000", "133500000000050000")
     assert wrong(text) == [
-        'log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0; unit={"t":'
-        f' "ns"}} applies this{OTHER_TIME}'
+        "log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0; --unit t=ns"
+        f" applies this{OTHER_TIME}"
     ]
     assert read(text, unit={"t": "ns"}).t_ns.tolist() == [0, 50_000]
     assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
@@ -247,7 +248,7 @@ def test_irregular_repeats_are_one_error(wrong: Wrong) -> None:
     rows = [0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3]
     assert wrong(clocked("t [s]", *map(str, rows))) == [
         "log.csv:3, column t [s]: found 0 s again, as 10 of 14 rows repeat a time: too coarse to"
-        f" rebuild a clock, {INCREASE}; period=SECONDS sets the time between rows then"
+        f" rebuild a clock, {INCREASE}; --period SECONDS sets the time between rows then"
     ]
 
 
@@ -268,21 +269,21 @@ def test_a_counter_since_boot_is_not_taken_for_unix_time(
 ) -> None:
     text = clocked("time", *(str(start + k * step) for k in range(4)))
     found = f"found times of our years in steps of {step:g}, which may be {units[0]} or {units[1]}"
-    asked = " or ".join(f'unit={{"time": "{unit}"}}' for unit in units)
+    asked = " or ".join(f"--unit time={unit}" for unit in units)
     assert wrong(text) == [f"log.csv:2, column time: {found}; {asked} specifies it{OTHER_TIME}"]
     assert read(text, unit={"time": units[1]}).period == 0.005
 
 
 def test_minutes_days_and_dates_in_numbers_are_not_taken_for_seconds(read: Read, wrong: Wrong) -> None:
     minutes = clocked("Time [min]", "0", "0.1", "0.2")
-    even = f"{OTHER_TIME}; period=SECONDS sets the time between rows then"
+    even = f"{OTHER_TIME}; --period SECONDS sets the time between rows then"
     said = f"found the unit 'min', allowed: s, ms, us, ns; convert the times{even}"
     assert wrong(minutes) == [f"log.csv:2, column Time [min]: {said}"]
     assert read(minutes, time="none", period=6.0).period == 6.0
     excel = clocked("Time", *(f"{44297.5 + k * 0.005 / 86400:.12f}" for k in range(4)))
     said = "found 44297.5 in steps of 5.79e-08, as Excel's days since 1900, allowed: times in s, ms, us, ns"
     hint = "convert them: (t - 25569) * 86400 is Unix time in s"
-    as_s = 'unit={"Time": "s"} keeps them unchanged'
+    as_s = "--unit Time=s keeps them unchanged"
     assert wrong(excel) == [f"log.csv:2, column Time: {said}; {hint}; {as_s}{even}"]
     hours = clocked("Time", *(f"{10.5 + k * 0.005 / 3600:.12f}" for k in range(4)))
     said = "found steps of 1.39e-06, as of days or hours, allowed: times in s, ms, us, ns; convert them"
@@ -309,7 +310,7 @@ def test_times_of_day_in_numbers_are_refused_where_they_leap(
 ) -> None:
     text = clocked("Time", *times)
     said = f"found {times[2]} after {times[1]}, as a time of day hhmmss goes on, allowed: a clock of one unit"
-    hint = f'write it as hh:mm:ss; unit={{"Time": "s"}} takes it as no time of day{OTHER_TIME}'
+    hint = f"write it as hh:mm:ss; --unit Time=s takes it as no time of day{OTHER_TIME}"
     assert wrong(text) == [f"log.csv:4, column Time: {said}; {hint}"]
     assert read(text, unit={"Time": "s"}).t[1:].tolist()[0] == 1.0
 

@@ -94,7 +94,7 @@ def test_without_a_header_each_ramp_may_be_the_time_and_is_asked_about_once(
     q[:, :columns] = np.linspace(0.1, 1.1, ROWS)[:, np.newaxis] * np.arange(1, columns + 1)
     text = table([], q=q)
     (said,) = wrong(text)
-    assert all(f'time="{column}"' in said for column in (*range(1, columns + 1), "none"))
+    assert all(f"--time {column}" in said for column in (*range(1, columns + 1), "none"))
     assert read(text, time="none", unit={"": "rad"}).q.shape == (ROWS, 6)
 
 
@@ -110,7 +110,7 @@ def test_no_question_where_the_robot_or_the_user_tells_the_joints(
 @pytest.mark.parametrize("clock", [range(ROWS), range(1, ROWS + 1)])
 def test_a_counter_is_asked_about(wrong: Wrong, clock: range) -> None:
     (said,) = wrong(table([clock]))
-    assert 'which may be the time, a counter or a joint; time="1" or time="none" specifies it' in said
+    assert "which may be the time, a counter or a joint; --time 1 or --time none specifies it" in said
 
 
 @pytest.mark.parametrize(
@@ -247,7 +247,7 @@ def test_other_epochs_are_named(
     text = table([clock], names=names)
     (said,) = wrong(text, **({} if names else {"time": "1"}))
     assert f"as {kind}, allowed: times in s, ms, us, ns; convert them: {cure} is Unix time" in said
-    assert 'time="none" leaves the time column out' in said
+    assert "--time none leaves the time column out" in said
     assert read(text, time="none", joints=[2, 3, 4, 5, 6, 7], period=0.01).q.shape == (ROWS, 6)
 
 
@@ -283,7 +283,7 @@ def test_a_stamp_of_a_chunk_is_spread_over_its_rows(
 def test_chunks_without_a_header_are_asked_about(wrong: Wrong, read: Read) -> None:
     text = table([seconds(chunked(COUNTS))])
     (said,) = wrong(text)
-    assert 'time="1" or time="none" specifies it' in said
+    assert "--time 1 or --time none specifies it" in said
     np.testing.assert_allclose(np.diff(read(text, time="1").t_ns), 4 * MS, atol=1000)
 
 
@@ -330,7 +330,7 @@ def test_what_is_named_like_a_time_and_is_none_is_one_finding(
 ) -> None:
     text = table([seconds(times)], names=["t"])
     (said,) = wrong(text)
-    assert 'time=COLUMN names the time column; time="none" leaves the time column out; period=' in said
+    assert "--time COLUMN names the time column; --time none leaves the time column out; --period " in said
     assert read(text, time="none", period=0.01).period == 0.01
 
 
@@ -366,7 +366,7 @@ def test_a_file_of_times_that_does_not_fit(write: Write) -> None:
     said = refusal(LogError, read_log, [path], ReadOptions(time=f"{clock}:stamp"))
     assert said == f"{clock}: found 2 times, allowed: {ROWS}, as q.csv has rows"
     said = refusal(LogError, read_log, [path], ReadOptions(time=f"{clock}:clock"))
-    assert said == "time: found no column 'clock', allowed: stamp"
+    assert said == "time (--time): found no column 'clock', allowed: stamp"
     said = refusal(OptionError, read_log, [path, path], ReadOptions(time=f"{clock}:stamp"))
     assert said.endswith(" for 2 tables, allowed: FILE:COLUMN for one table")
 

@@ -74,7 +74,7 @@ def test_joints_sampled_at_other_times_are_an_error(wrong: Wrong) -> None:
 
 def test_two_arms_are_ambiguous(wrong: Wrong, read: Read) -> None:
     text = f"{JOINTS}\n{JOINTS.replace('/urm/', '/other/')}"
-    said = "allowed: once; joints=[A, B, C] selects them: give their numbers"
+    said = "allowed: once; --joints A,B,C selects them: give their numbers"
     assert wrong(text) == [
         f"log.csv:2, column joint 1 (deg): found as columns 2, 5, {said}",
         f"log.csv:2, column joint 2 (deg): found as columns 3, 6, {said}",
@@ -103,7 +103,7 @@ def test_bytes_that_are_no_utf_8_do_not_shift_the_lines(wrong: Wrong) -> None:
     said = wrong(text, joints=("2", "3", "5", "6"))
     line = 2 + rows + 1 + 2 + 3  # two header lines, the rows, a blank line, two header lines, row 3
     assert said[0].startswith(f"log.csv:{line}, column noise1 (deg): found '")
-    assert said[1:] == ["log.csv: 1 of 3000 rows cannot be read; skip_bad=True leaves them out"]
+    assert said[1:] == ["log.csv: 1 of 3000 rows cannot be read; --skip-bad leaves them out"]
 
 
 def test_robot_names_order_the_joints(read: Read, arm: Arm) -> None:

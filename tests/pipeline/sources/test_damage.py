@@ -168,7 +168,7 @@ def test_a_last_cell_that_is_cut_is_no_value(read: Read, wrong: Wrong, encoding:
     said = "where the file ends, allowed: as many decimals as in the other rows"
     assert wrong(cut, encoding=encoding) == [
         f"log.csv:{line}: found '{cut[-4:]}' {said}",
-        "log.csv: 1 of 300 rows cannot be read; skip_bad=True leaves them out",
+        "log.csv: 1 of 300 rows cannot be read; --skip-bad leaves them out",
     ]
     assert read(cut, encoding=encoding, skip_bad=True).rows == 299
     assert read(text + "\n# 0.5", encoding=encoding).rows == 300
@@ -227,7 +227,7 @@ def test_rows_that_cannot_be_read_are_left_out_if_asked_for(read: Read, wrong: W
         "log.csv:503: found 1 cell ('(paused)'), allowed: 3",
     ]
     assert wrong(joined(*lines)) == [
-        *said, "log.csv: 3 of 1000 rows cannot be read; skip_bad=True leaves them out"
+        *said, "log.csv: 3 of 1000 rows cannot be read; --skip-bad leaves them out"
     ]  # fmt: skip
     log = read(joined(*lines), skip_bad=True)
     kept = np.delete(np.arange(1000), [100, 500, 501])
@@ -256,7 +256,7 @@ def test_no_more_than_one_row_in_a_hundred_is_left_out(read: Read, wrong: Wrong)
     assert read(joined(*lines), skip_bad=True).rows == 297
     lines[221] = "torn"
     assert wrong(joined(*lines), skip_bad=True)[-1] == (
-        "log.csv: skip_bad: 4 of 300 rows cannot be read, allowed: 1% of them"
+        "log.csv: skip_bad (--skip-bad): 4 of 300 rows cannot be read, allowed: 1% of them"
     )
 
 

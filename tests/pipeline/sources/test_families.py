@@ -137,7 +137,7 @@ def test_a_file_of_which_nothing_is_used_is_told(write: Callable[..., Path]) -> 
     q = write(table("q1 q2 q3"), "q.csv")
     others = write(table("seq stamp_s load"), "times.csv")
     (warning,) = [one for one in read_log([q, others]).warnings if one.kind == "file-not-used"]
-    takes = f'time="{others}:COLUMN" takes the times from one of its columns'
+    takes = f"--time {others}:COLUMN takes the times from one of its columns"
     assert str(warning) == f"none of the columns of times.csv is used; {takes}"
 
 
@@ -154,7 +154,7 @@ def test_columns_by_a_range_of_numbers(read: Read) -> None:
     text = table("a b c d e")
     assert read(text, joints=["2-4"], time="none").joints == ("b", "c", "d")
     assert read(text, joints=["5", "1-2"], time="none").joints == ("e", "a", "b")
-    with pytest.raises(LogError, match="joints: found no column '6', allowed: a, b, c, d, e"):
+    with pytest.raises(LogError, match=r"joints \(--joints\): found no column '6', allowed: a, b, c, d, e"):
         read(text, joints=["4-9"])
     assert read(table("2-3 q1 q2"), joints=["2-3"]).joints == ("2-3",)
 

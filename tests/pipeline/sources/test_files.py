@@ -20,7 +20,7 @@ from urmpipe_pipeline.sources import ReadOptions, read_log
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
 
-ALLOWED = "allowed: a text table; robot=NAME|FILE takes a robot"
+ALLOWED = "allowed: a text table; --robot NAME|FILE takes a robot"
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ ALLOWED = "allowed: a text table; robot=NAME|FILE takes a robot"
     [
         ("arm.urdf", f"the model of a robot, {ALLOWED}"),
         ("arm.csv", f"the model of a robot, {ALLOWED}"),
-        ("arm.toml", f"a TOML file, {ALLOWED}; log_map=FILE.toml takes a map"),
+        ("arm.toml", f"a TOML file, {ALLOWED}; --log-map FILE.toml takes a map"),
     ],
 )
 def test_a_robot_is_no_log(wrong: Wrong, name: str, said: str) -> None:
@@ -65,7 +65,9 @@ def test_missing_folder_empty_binary(wrong: Wrong, tmp_path: Path) -> None:
 
 
 def test_unknown_source_and_no_file(tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match=r"^source: found 'vendor', allowed: coppeliasim, .*, path, table$"):
+    with pytest.raises(
+        OptionError, match=r"^source \(--source\): found 'vendor', allowed: coppeliasim, .*, path, table$"
+    ):
         read_log([tmp_path / "log.csv"], ReadOptions(source="vendor"))
     with pytest.raises(OptionError, match=r"^found no log file, allowed: one, or several"):
         read_log([])
@@ -96,10 +98,11 @@ def test_a_source_that_tells_a_unit_or_nothing_else_is_not_doubted(read: Read, s
 
 def test_signs_that_are_none(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1\n", delimiter="x") == [
-        "delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the character itself"
+        "delimiter (--delimiter): found 'x', allowed: comma, semicolon, tab, spaces, bar, or the character"
+        " itself"
     ]
     assert wrong("t,q1\n0,1\n", decimal=";") == [
-        "decimal: found ';', allowed: point, comma, or the character itself"
+        "decimal (--decimal): found ';', allowed: point, comma, or the character itself"
     ]
 
 

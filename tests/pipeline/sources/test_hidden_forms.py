@@ -20,8 +20,8 @@ Q = np.c_[0.4 * np.sin(K / 9), 1 + 0.2 * np.cos(K / 7)]
 TURNS = Rotation.from_rotvec(np.linspace(0, 1, 40)[:, np.newaxis] * [0.3, 0.4, 1.0])
 NUMBER = "a number, or an empty, Null or NaN cell where a sample is missing"
 MAY_BE = (
-    "the time, a counter or a joint; time=\"1\" or time=\"none\" specifies it;"
-    " joints=[A, B, C] names the joint columns"
+    "the time, a counter or a joint; --time 1 or --time none specifies it;"
+    " --joints A,B,C names the joint columns"
 )  # fmt: skip
 
 
@@ -136,7 +136,7 @@ def test_joints_whose_values_have_length_1_in_most_rows_hide_no_orientation(read
 def test_a_row_that_hides_a_pose_without_a_header(wrong: Wrong, at: int) -> None:
     lines = text(np.c_[Q, Q[:, :1], TURNS.as_quat()].round(6))
     cells = lines[at - 1].split(",")
-    joints = "joints=[A, B, C] names the joint columns, in the robot's order"
+    joints = "--joints A,B,C names the joint columns, in the robot's order"
     found = "found no orientation in columns 4, 5, 6, 7, allowed: one in every row, as in most"
     assert wrong(with_line(lines, at, ",".join([*cells[:-1], "0.2"]))) == [f"log.csv:{at}: {found}; {joints}"]
     matrix = np.tile(np.eye(4), (40, 1, 1))

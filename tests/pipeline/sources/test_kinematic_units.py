@@ -63,11 +63,11 @@ def test_a_header_that_says_degrees_over_radians(read: Read) -> None:
     (warning,) = log.warnings
     assert warning.kind == "unit-contradiction"
     miss = positions_over_log(UR5E, np.radians(Q)) - FLANGE
-    every = ", ".join(f'"q{k}": "deg"' for k in range(1, 7))
+    every = " ".join(f"--unit q{k}=deg" for k in range(1, 7))
     off = 1e3 * np.sqrt((miss**2).sum(axis=1).mean())
     assert str(warning) == (
         "q1, q2, q3, q4, q5, q6: deg (its name) contradicts the kinematics: taken as rad: with it the arm"
-        f" comes within 0.00 mm (rms) of the recorded TCP, as deg within {off:.2f} mm; unit={{{every}}}"
+        f" comes within 0.00 mm (rms) of the recorded TCP, as deg within {off:.2f} mm; {every}"
         " overrides this"
     )
 
@@ -78,9 +78,9 @@ def test_a_unit_given_for_every_angle_does_not_reach_what_the_kinematics_give(re
     np.testing.assert_allclose(log.q, Q, atol=PRINTED)
     (warning,) = log.warnings
     assert (warning.kind, warning.assumption) == ("unit-not-reached", "")
-    every = ", ".join(f'"q{k}": "deg"' for k in range(1, 7))
+    every = " ".join(f"--unit q{k}=deg" for k in range(1, 7))
     assert str(warning) == (
-        "q1, q2, q3, q4, q5, q6: deg does not reach them: the kinematics give rad; unit={" + every + "} does"
+        f"q1, q2, q3, q4, q5, q6: deg does not reach them: the kinematics give rad; {every} does"
     )
 
 
@@ -105,8 +105,8 @@ def test_a_unit_that_the_data_contradict_is_asked_for(
     (said,) = wrong(table)
     assert re.fullmatch(
         rf"log\.csv: found q1, .*, q6 in {unit} by name or source, but \d+ steps? of about {turn} from one"
-        rf" row to the next, allowed: a unit that fits the data; unit={{\"q1\": \"{other}\", .*}} or"
-        rf" unit={{\"q1\": \"{unit}\", .*}} specifies it",
+        rf" row to the next, allowed: a unit that fits the data; --unit q1={other} .* or"
+        rf" --unit q1={unit} .* specifies it",
         said,
     )
     for name in (other, unit):

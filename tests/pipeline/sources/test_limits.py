@@ -65,7 +65,7 @@ def test_too_many_joints(wrong: Wrong) -> None:
     names = ",".join(["t", *(f"q{k}" for k in range(1, 502))])
     rows = "".join(f"{0.01 * r:.2f}" + ",0.1" * 501 + "\n" for r in range(3))
     assert wrong(f"{names}\n{rows}") == [
-        "log.csv: found 501 joints, allowed: 500 at most; use joints=[A, B, C]"
+        "log.csv: found 501 joints, allowed: 500 at most; use --joints A,B,C"
     ]
 
 

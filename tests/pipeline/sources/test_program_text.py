@@ -108,8 +108,8 @@ def test_plc_sample_time_in_doubt_is_asked_for(read: Read, wrong: Wrong) -> None
     """4 may be in s or in ms; what is printed reads the file."""
     text = f"Ts : LREAL := 4.0;\n{plc()}"
     assert wrong(text) == [
-        "log.csv:1: found Ts := 4.0 and no unit, allowed: a time between rows in s; period=4 reads it in s;"
-        " period=0.004 reads it in ms"
+        "log.csv:1: found Ts := 4.0 and no unit, allowed: a time between rows in s; --period 4 reads it in s;"
+        " --period 0.004 reads it in ms"
     ]
     log = read(text, unit="deg", period=0.004)
     assert log.period == 0.004
@@ -121,7 +121,7 @@ def test_plc_sample_time_in_doubt_is_asked_for(read: Read, wrong: Wrong) -> None
 def test_plc_sample_times_that_differ(wrong: Wrong) -> None:
     assert wrong(f"sample_time : REAL := 0.004;\ncycle_time : REAL := 0.001;\n{plc()}") == [
         "log.csv:1: found sample_time := 0.004 and cycle_time := 0.001, allowed: one time between rows;"
-        " period=0.004 takes sample_time; period=0.001 takes cycle_time"
+        " --period 0.004 takes sample_time; --period 0.001 takes cycle_time"
     ]
 
 
@@ -276,7 +276,7 @@ def test_rapid_joints_and_poses_that_are_no_rows_of_one_table(read: Read, wrong:
     text = module(f"CONST jointtarget home:={jointtarget(Q[0])};", *points)
     assert wrong(text) == [
         "log.csv:3: found 1 jointtarget and 80 robtargets, which are not rows of one table, allowed: one of"
-        ' the two; source="table" takes the 1 jointtarget; source="path" takes the 80 robtargets'
+        " the two; --source table takes the 1 jointtarget; --source path takes the 80 robtargets"
     ]
     path = read(text, source="path", period=0.01)
     assert path.tcp_position is not None

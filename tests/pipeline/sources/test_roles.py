@@ -16,8 +16,8 @@ Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
 Arm = Callable[..., Chain]
 
-OPTION = "joints=[A, B, C] names the joint columns, in the robot's order"
-RECORD = "record every joint; robot=NAME|FILE gives another arm"
+OPTION = "--joints A,B,C names the joint columns, in the robot's order"
+RECORD = "record every joint; --robot NAME|FILE gives another arm"
 
 
 def table(names: Sequence[str]) -> str:
@@ -147,10 +147,10 @@ def test_joints_as_the_user_says(read: Read, wrong: Wrong) -> None:
     assert read(text, joints=("stick", "2")).joints == ("stick", "boom")
     assert read(text, joints=("stick [deg]", "BOOM")).joints == ("stick", "boom")
     assert wrong(text, joints=("stick", "arm")) == [
-        "joints: found no column 'arm', allowed: boom [deg], stick [deg], other"
+        "joints (--joints): found no column 'arm', allowed: boom [deg], stick [deg], other"
     ]
     assert wrong(text, joints=("stick", "3")) == [
-        "log.csv: joints: found stick [deg], stick [deg], allowed: each column once"
+        "log.csv: joints (--joints): found stick [deg], stick [deg], allowed: each column once"
     ]
 
 
@@ -158,7 +158,7 @@ def test_without_a_word_for_joints_the_user_must_say(wrong: Wrong, arm: Arm) -> 
     text = table(["t", "boom", "stick", "bucket"])
     assert wrong(text) == [
         "log.csv: found no joint columns in boom, stick, bucket, allowed: such as q1, q2, ... or J1, J2, ...;"
-        f' joints=["boom", "stick", "bucket"] takes these; {OPTION}'
+        f" --joints boom,stick,bucket takes these; {OPTION}"
     ]
     assert wrong(text, arm(2)) == [
         f"log.csv: found no joint columns in boom, stick, bucket, allowed: 2 for robot arm; {OPTION}"
@@ -189,7 +189,7 @@ def test_a_missing_number_is_named(wrong: Wrong, arm: Arm) -> None:
     ]
     assert wrong(table(["t", "J1", "J2", "J4"]), arm(4)) == [
         "log.csv: found joint columns J1, J2, J4 and none with number 3, allowed: the 4 joints of the robot;"
-        " record the missing one; robot=NAME|FILE gives another arm"
+        " record the missing one; --robot NAME|FILE gives another arm"
     ]
     assert wrong(table(["t", "J1", "J2", "Jthree", "J4"]), arm(4)) == [
         "log.csv: found joint columns J1, J2, J4 and none with number 3, allowed: the 4 joints of the robot;"
@@ -201,38 +201,38 @@ def test_a_missing_name_is_named(wrong: Wrong, arm: Arm) -> None:
     names = ["shoulder_pan", "shoulder_lift", "wrist_1", "wrist_2", "wrist_3"]
     found = f"log.csv: found joint columns {', '.join(names)} and none for elbow, allowed:"
     assert wrong(table(["t", *names]), arm(6)) == [
-        f"{found} 6 for robot arm; record the missing one; robot=NAME|FILE gives another arm"
+        f"{found} 6 for robot arm; record the missing one; --robot NAME|FILE gives another arm"
     ]
     assert wrong(table(["t", *names, "forearm", "other"]), arm(6)) == [
         f"{found} 6 for robot arm; record the missing one; {OPTION}"
     ]
     assert wrong(table(["t", *names])) == [
         f"{found} such as q1, q2, ... or J1, J2, ...; record the missing one;"
-        ' joints=["shoulder_pan", "shoulder_lift", "wrist_1", "wrist_2", "wrist_3"] takes these;'
+        " --joints shoulder_pan,shoulder_lift,wrist_1,wrist_2,wrist_3 takes these;"
         f" {OPTION}"
     ]
     own = ["base_yaw", "lower_arm", "upper_arm", "hand"]
     assert wrong(table(["t", *own[:3]]), arm(4, names=tuple(own))) == [
         "log.csv: found joint columns base_yaw, lower_arm, upper_arm and none for hand, allowed: 4 for robot"
-        " arm; record the missing one; robot=NAME|FILE gives another arm"
+        " arm; record the missing one; --robot NAME|FILE gives another arm"
     ]
 
 
 def test_two_groups_are_ambiguous_unless_one_fits_the_robot(wrong: Wrong, read: Read, arm: Arm) -> None:
     names = ["left_q1", "left_q2", "right_q1", "right_q2"]
     said = "found several groups of joint columns: left_q1, left_q2; right_q1, right_q2, allowed: one"
-    answers = 'joints=["left_q1", "left_q2"] or joints=["right_q1", "right_q2"] takes these'
+    answers = "--joints left_q1,left_q2 or --joints right_q1,right_q2 takes these"
     assert wrong(table(["t", *names])) == [f"log.csv: {said}; {answers}; {OPTION}"]
     assert read(table(["t", *names, "right_q3"]), arm(3)).joints == ("right_q1", "right_q2", "right_q3")
 
 
 def test_names_that_stand_twice(wrong: Wrong) -> None:
     assert wrong(table(["t", "q1", "q2", "q2", "note", "note"])) == [
-        "log.csv:1, column q2: found as columns 3, 4, allowed: once; joints=[A, B, C] selects them: give"
+        "log.csv:1, column q2: found as columns 3, 4, allowed: once; --joints A,B,C selects them: give"
         " their numbers"
     ]
     assert wrong(table(["t", "q1 [deg]", "q1 [rad]"])) == [
-        "log.csv:1, column q1 [deg]: found as columns 2, 3, allowed: once; joints=[A, B, C] selects"
+        "log.csv:1, column q1 [deg]: found as columns 2, 3, allowed: once; --joints A,B,C selects"
         " them: give their numbers"
     ]
 

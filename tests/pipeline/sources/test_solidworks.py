@@ -64,7 +64,7 @@ def test_a_plot_that_is_missing_between_others_is_an_error(write: Write, arm: Ar
     files = [write(plot(VALUES[1], n=n), f"joint{n}.csv") for n in (1, 2, 4)]
     assert refusal(LogError, read_log, files) == (
         f"{tmp_path}: found plots with the numbers 1, 2, 4 and none with 3, allowed: a plot for each joint;"
-        " add the missing one; joints=[A, B, C] names the joint columns, in the robot's order"
+        " add the missing one; --joints A,B,C names the joint columns, in the robot's order"
     )
     assert read_log(files, robot=arm(3)).q.shape == (3, 3)
 

@@ -221,7 +221,7 @@ def test_without_header_a_first_column_that_may_be_a_time_is_asked_for(
 ) -> None:
     robot = arm(joints) if joints else None
     said = "found a first column that increases from row to row, which may be the time, a counter or a joint"
-    hint = 'time="1" or time="none" specifies it; joints=[A, B, C] names the joint columns'
+    hint = "--time 1 or --time none specifies it; --joints A,B,C names the joint columns"
     assert wrong(text, robot) == [f"log.csv:1: {said}; {hint}"]
     first = [float(line.partition(",")[0]) for line in text.splitlines()]
     others = text.partition("\n")[0].count(",")

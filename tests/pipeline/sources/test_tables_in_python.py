@@ -208,7 +208,7 @@ def test_numbers_as_text_are_read_and_other_texts_named() -> None:
     assert refusal(LogError, log_of, frame, unit="rad").splitlines() == [
         "log, row 6, column q2: found 'oops', allowed: a number, or an empty, Null or NaN cell where a sample"
         " is missing",
-        "log: 1 of 300 rows cannot be read; skip_bad=True leaves them out",
+        "log: 1 of 300 rows cannot be read; --skip-bad leaves them out",
     ]
     log = log_of(frame, unit="rad", skip_bad=True)
     assert (log.q == np.delete(Q[:, :2], 5, axis=0)).all()
@@ -218,12 +218,18 @@ def test_numbers_as_text_are_read_and_other_texts_named() -> None:
     ("frame", "said"),
     [
         (pd.DataFrame(), "log: found a table without rows, allowed: one row per sample"),
-        (pd.DataFrame({"t": [], "q1": []}), "log: found a table without rows, allowed: one row per sample"),
+        (
+            pd.DataFrame({"t": [], "q1": []}),
+            "log: found a table without rows, allowed: one row per sample",
+        ),
         (
             pd.DataFrame({"a": ["x", "y"], "b": [{}, []]}),
             "log: found no number in a, b, allowed: one column per joint",
         ),
-        (pd.DataFrame({"t": [0.0, 0.1], "q1": [object(), object()]}), "log: found no joint columns in q1"),
+        (
+            pd.DataFrame({"t": [0.0, 0.1], "q1": [object(), object()]}),
+            "log: found no joint columns in q1",
+        ),
     ],
 )
 def test_tables_without_joints_are_one_line(frame: pd.DataFrame, said: str) -> None:

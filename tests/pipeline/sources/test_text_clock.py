@@ -169,7 +169,7 @@ def test_an_order_that_nothing_tells_is_asked_for(read: Read, wrong: Wrong) -> N
     text = clocked("01/02/2021 23:59:59", "02/02/2021 00:00:01", "03/02/2021 00:00:02")
     assert wrong(text) == [
         "log.csv:2, column timestamp: found '01/02/2021 23:59:59', which may be date and time, day"
-        ' first or date and time, month first; unit={"timestamp": "dmy"} or unit={"timestamp": "mdy"}'
+        " first or date and time, month first; --unit timestamp=dmy or --unit timestamp=mdy"
         f" specifies it{OTHER_TIME}"
     ]
     assert read(text, unit={"timestamp": "dmy"}).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
@@ -177,7 +177,7 @@ def test_an_order_that_nothing_tells_is_asked_for(read: Read, wrong: Wrong) -> N
     header = text.replace("timestamp", "Date (dd/mm/yyyy)")
     assert read(header).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert wrong(text, unit={"timestamp": "ms"}) == [
-        f"unit: found ms for the time 'timestamp', allowed: dmy, mdy{OTHER_TIME}"
+        f"unit (--unit): found ms for the time 'timestamp', allowed: dmy, mdy{OTHER_TIME}"
     ]
 
 
@@ -207,8 +207,8 @@ def test_digits_behind_a_colon_that_nothing_tells_are_asked_for(read: Read, wron
     text = clocked("10:11:32:100", "10:11:32:105", "10:11:32:110", name="Time")
     assert wrong(text) == [
         "log.csv:2, column Time: found '10:11:32:100', which may be time of day, decimals behind the"
-        ' last colon or time of day, microseconds behind the last colon; unit={"Time": "s"} or'
-        f' unit={{"Time": "us"}} specifies it{OTHER_TIME}'
+        " last colon or time of day, microseconds behind the last colon; --unit Time=s or"
+        f" --unit Time=us specifies it{OTHER_TIME}"
     ]
     assert read(text, unit={"Time": "us"}).t_ns.tolist() == [0, 5 * US, 10 * US]
     assert read(text, unit={"Time": "ms"}).t_ns.tolist() == [0, 5 * MS, 10 * MS]

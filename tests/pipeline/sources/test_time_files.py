@@ -89,7 +89,7 @@ def test_two_clocks_are_one_too_many(write: Write) -> None:
     joints, clock = write("t,q1,q2\n0,1,2\n1,2,3\n", "q.csv"), write("0\n0.005\n", "time.csv")
     assert refusal(LogError, read, joints, clock) == (
         f"{joints}:1, column t: found a time here and in time.csv, allowed: one clock;"
-        ' time=COLUMN selects the column; time="none" leaves both out'
+        " --time COLUMN selects the column; --time none leaves both out"
     )
 
 

@@ -88,7 +88,7 @@ def test_rows_that_begin_with_a_name_are_joints(names: list[str], head: str, rea
     assert log.period == 0.02
     (found,) = [one for one in log.inferences if one.what == "layout"]
     assert (found.value, found.otherwise()) == (
-        "transposed", 'layout="table" takes each row as a sample',
+        "transposed", '--layout table takes each row as a sample',
     )  # fmt: skip
 
 
@@ -216,7 +216,7 @@ def test_other_layouts_are_refused(wrong: object) -> None:
     with pytest.raises(OptionError) as error:
         ReadOptions(layout=wrong)  # type: ignore[arg-type]
     assert str(error.value) == (
-        f"layout: found {wrong!r}, allowed: table, transposed, flat:N or flat-by-joint:N,"
+        f"layout (--layout): found {wrong!r}, allowed: table, transposed, flat:N or flat-by-joint:N,"
         " with N numbers a sample"
     )
 

@@ -92,7 +92,7 @@ def test_a_doubt_says_what_decides(read: Read) -> None:
     (warning,) = read(csv(joints(" [deg]", 2), Q[:, :2])).warnings
     assert str(warning) == (
         "q1, q2: deg (its name) is doubted: values of no more than 1.2 may be rad as well;"
-        ' unit={"q1": "rad", "q2": "rad"} or unit={"q1": "deg", "q2": "deg"} specifies it'
+        " --unit q1=rad --unit q2=rad or --unit q1=deg --unit q2=deg specifies it"
     )
 
 
@@ -175,7 +175,7 @@ def test_one_column_that_lies_is_named(read: Read, wrong: Wrong) -> None:
     assert said.startswith(
         "log.csv: found q3 in deg by name or source, but 2 steps of about 6.28 from one row"
     )
-    assert said.endswith('unit={"q3": "rad"} or unit={"q3": "deg"} specifies it')
+    assert said.endswith("--unit q3=rad or --unit q3=deg specifies it")
 
 
 def test_the_kinematics_name_the_one_joint_that_lies(read: Read) -> None:

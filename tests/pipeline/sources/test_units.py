@@ -52,13 +52,13 @@ def test_units_in_names(read: Read, name: str, unit: str) -> None:
 
 def test_a_unit_that_is_not_known_is_refused(wrong: Wrong) -> None:
     text = "t,q1,q2\n0,30,30\n0.1,31,30\n"
-    assert wrong(text, unit={"": "gon"}) == ["unit: found 'gon', allowed: rad, deg"]
+    assert wrong(text, unit={"": "gon"}) == ["unit (--unit): found 'gon', allowed: rad, deg"]
     assert wrong(text, unit={"q1": "gon"}) == [
-        "unit: found 'gon', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
+        "unit (--unit): found 'gon', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
     assert wrong("t,q1 [gon]\n0,30\n0.1,31\n") == [
         "log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm;"
-        ' convert the values; unit={"q1": "deg"} keeps the values unchanged'
+        " convert the values; --unit q1=deg keeps the values unchanged"
     ]
 
 
@@ -99,16 +99,16 @@ def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
     assert log.q[0].tolist() == [30.0, 0.5 * DEG, 0.005]
     assert log.period == 0.6
     assert not log.warnings
-    assert wrong(text, unit={"": "mm"}) == ["unit: found 'mm', allowed: rad, deg"]
+    assert wrong(text, unit={"": "mm"}) == ["unit (--unit): found 'mm', allowed: rad, deg"]
     assert wrong(text, unit={"q1": "inch"}) == [
-        "unit: found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
+        "unit (--unit): found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
-    assert wrong(text, unit={"q9": "deg"}) == ["unit: found no column 'q9', allowed: t, q1, q2, q3"]
+    assert wrong(text, unit={"q9": "deg"}) == ["unit (--unit): found no column 'q9', allowed: t, q1, q2, q3"]
     assert wrong(text, unit={"q1": "s", "t": "s"}) == [
-        "column q1: unit: found the unit s (given as an option), allowed: rad, deg, m, mm, cm"
+        "column q1: unit (--unit): found the unit s (given as an option), allowed: rad, deg, m, mm, cm"
     ]
     assert wrong(text, unit={"t": "deg"}) == [
-        "unit: found deg for the time 't', allowed: s, ms, us, ns" + OTHER_TIME
+        "unit (--unit): found deg for the time 't', allowed: s, ms, us, ns" + OTHER_TIME
     ]
 
 
@@ -122,7 +122,7 @@ def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
     text = "t,J1 [counts]\n0,30\n0.1,31\n"
     assert wrong(text) == [
         "log.csv, column J1 [counts]: found the unit 'counts', allowed: rad, deg, m, mm, cm;"
-        ' convert the values; unit={"J1": "deg"} keeps the values unchanged'
+        " convert the values; --unit J1=deg keeps the values unchanged"
     ]
     assert read(text, unit={"J1": "deg"}).q[0, 0] == 30 * DEG
 
@@ -130,7 +130,7 @@ def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
 def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
     text = "t,J1,J2\n[s],[counts],[counts]\n0,30,1\n0.1,31,1\n"
     said = "found the unit 'counts', allowed: rad, deg, m, mm, cm; convert the values;"
-    said += ' unit={"J1": "deg"} keeps the values unchanged'
+    said += " --unit J1=deg keeps the values unchanged"
     assert wrong(text) == [f"log.csv, column J1: {said}"]
     assert read(text, unit={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
     powers = read("t,J1,tau1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
@@ -182,8 +182,8 @@ def test_the_robots_limits_tell_degrees(read: Read, arm: Arm, wrong: Wrong) -> N
 
 def test_slow_large_values_may_be_either(wrong: Wrong) -> None:
     assert wrong(csv_of(np.linspace(0, 60, 1000)[:, np.newaxis])) == [
-        'log.csv: found values up to 60 in q1 and no unit, allowed: rad or deg; unit="rad" or'
-        ' unit="deg" specifies it'
+        "log.csv: found values up to 60 in q1 and no unit, allowed: rad or deg; --unit rad or"
+        " --unit deg specifies it"
     ]
 
 
@@ -219,7 +219,7 @@ def test_positions_are_not_rescaled_because_they_look_too_far(read: Read) -> Non
     )
     assert str(warning) == (
         "no unit is given for x, y, z: the positions are taken as m, though values of 658 reach further than"
-        ' any arm; unit={"x": "mm", "y": "mm", "z": "mm"} or unit={"x": "m", "y": "m", "z": "m"} specifies it'
+        " any arm; --unit x=mm --unit y=mm --unit z=mm or --unit x=m --unit y=m --unit z=m specifies it"
     )
     for hint, per_m in zip(warning.hints, (1e3, 1.0), strict=True):
         told = read(table, unit=hint.value)
@@ -268,7 +268,7 @@ def test_a_position_without_unit_is_like_the_others(read: Read) -> None:
 
 def test_a_rate_in_an_unknown_unit_is_refused_as_a_joint_is(wrong: Wrong) -> None:
     said = "found the unit 'rpm', allowed: rad, deg, m, mm, cm; convert the values;"
-    said += ' unit={"qd1": "deg"} keeps the values unchanged'
+    said += " --unit qd1=deg keeps the values unchanged"
     assert wrong("t,q1 [rad],qd1 [rpm]\n0,1,2\n1,2,3\n") == [f"log.csv, column qd1 [rpm]: {said}"]
 
 
@@ -291,7 +291,7 @@ def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wro
     assert read(f"t,q1 [rad]\n{rows}").q[0, 0] == 1e308
     assert wrong(f"t,q1\n{rows}") == [
         "log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; convert ticks and counts;"
-        ' unit="rad" or unit="deg" specifies it'
+        " --unit rad or --unit deg specifies it"
     ]
 
 
@@ -302,7 +302,7 @@ def test_a_unit_given_for_every_angle_does_not_reach_columns_whose_names_tell_an
     assert [(one.kind, str(one), one.assumption, one.role) for one in log.warnings] == [
         (
             "unit-not-reached",
-            'q1, q2: rad does not reach them: their names say deg; unit={"q1": "rad", "q2": "rad"} does',
+            "q1, q2: rad does not reach them: their names say deg; --unit q1=rad --unit q2=rad does",
             "q1, q2 are in deg",
             "joint",
         )
@@ -331,10 +331,11 @@ def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None
         ReadOptions(joints="q1", position=3, unit=3, interval=2.0)  # type: ignore[arg-type]
     columns = "allowed: columns by name or number, such as ['q1', 'q2'] or [2, 3]"
     assert str(caught.value).split("\n") == [
-        f"joints: found 'q1', {columns}",
+        f"joints (--joints): found 'q1', {columns}",
         f"position: found 3, {columns}",
-        "unit: found 3, allowed: a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}",
-        "interval: found 2.0, allowed: two ends for all joints that turn, or a mapping, such as"
+        "unit (--unit): found 3, allowed: a unit of every angle, such as 'deg', or a mapping, such as"
+        " {'q1': 'deg'}",
+        "interval (--interval): found 2.0, allowed: two ends for all joints that turn, or a mapping, such as"
         " {'q1': (-180.0, 180.0)}",
     ]
 
@@ -348,7 +349,7 @@ def test_each_option_of_reading_refuses_what_is_of_a_wrong_kind(name: str) -> No
             continue
         with pytest.raises(OptionError) as caught:
             ReadOptions(**{name: odd})
-        assert re.fullmatch(rf"{name}: found .{{1,60}}, allowed: .+", str(caught.value))
+        assert re.fullmatch(rf"{name}( \(--[a-z-]+\))?: found .{{1,60}}, allowed: .+", str(caught.value))
 
 
 def test_lists_of_signs_and_offsets_are_taken(read: Read) -> None:

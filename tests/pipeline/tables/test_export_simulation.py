@@ -124,7 +124,7 @@ def test_each_of_two_arms_leaves_in_its_own_file(make_simulation: MakeSimulation
 def test_without_an_arm_there_is_no_trajectory(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     simulation = replace(make_simulation(5), arms=())
     assert refusal(RecordingError, export_result, simulation, tmp_path / "a.tum", ExportOptions("tum")) == (
-        'log-to-delta: no block of kinematics, so no pose; to="csv" writes its signals'
+        "log-to-delta: no block of kinematics, so no pose; --to csv writes its signals"
     )
     assert list(tmp_path.iterdir()) == []
 
@@ -132,8 +132,11 @@ def test_without_an_arm_there_is_no_trajectory(make_simulation: MakeSimulation, 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (ExportOptions("csv", "file"), "rows: found file with a simulation, allowed: simulated"),
-        (ExportOptions("tum", tcp="recorded"), "tcp: found recorded with a simulation, allowed: none"),
+        (ExportOptions("csv", "file"), "rows (--rows): found file with a simulation, allowed: simulated"),
+        (
+            ExportOptions("tum", tcp="recorded"),
+            "tcp (--tcp): found recorded with a simulation, allowed: none",
+        ),
     ],
 )
 def test_what_only_a_run_has_is_refused(

@@ -28,24 +28,29 @@ def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
     with pytest.raises(kind) as caught:
         work()
     assert len(caught.value.findings) == 1
-    return caught.value.findings[0].sentence("command line")
+    return caught.value.findings[0].sentence()
 
 
 def test_options_that_make_no_sense() -> None:
     options: Any = ExportOptions
-    assert said(OptionError, lambda: options("xlsx")) == "--to: found xlsx, allowed: csv, parquet, mat, tum"
+    assert (
+        said(OptionError, lambda: options("xlsx")) == "to (--to): found xlsx, allowed: csv, parquet, mat, tum"
+    )
     rows = "grid, file, velocities, samples, criteria"
-    assert said(OptionError, lambda: options("csv", "own")) == f"--rows: found own, allowed: {rows}"
-    assert said(OptionError, lambda: options("tum", None, "ik")) == "--tcp: found ik, allowed: fk, recorded"
+    assert said(OptionError, lambda: options("csv", "own")) == f"rows (--rows): found own, allowed: {rows}"
+    assert (
+        said(OptionError, lambda: options("tum", None, "ik"))
+        == "tcp (--tcp): found ik, allowed: fk, recorded"
+    )
     assert said(OptionError, lambda: options("csv", tcp="fk")) == (
-        "--tcp: found fk with a table (csv), allowed: with trajectories; --to tum writes them"
+        "tcp (--tcp): found fk with a table (csv), allowed: with trajectories; --to tum writes them"
     )
 
 
 def test_recorded_poses_stand_at_the_rows_of_the_file(run: Run, tmp_path: Path) -> None:
     work = lambda: export_result(run, tmp_path / "a.tum", ExportOptions("tum", "grid", "recorded"))  # noqa: E731
     assert said(OptionError, work) == (
-        "--rows: found grid with recorded poses, which stand at other rows, allowed: file"
+        "rows (--rows): found grid with recorded poses, which stand at other rows, allowed: file"
     )
 
 
@@ -53,14 +58,14 @@ def test_the_suffix_tells_the_format_unless_it_is_given() -> None:
     assert [format_of(None, Path(f"a.{to.upper()}")) for to in FORMATS] == list(FORMATS)
     assert format_of("csv", Path("a.txt")) == "csv"
     assert said(OptionError, lambda: format_of(None, Path("a.txt"))) == (
-        "--to: found the output a.txt, allowed: csv, parquet, mat, tum, or an output with that suffix"
+        "to (--to): found the output a.txt, allowed: csv, parquet, mat, tum, or an output with that suffix"
     )
     assert format_of(None, None) == "csv"
 
 
 def test_a_comparison_has_the_samples_that_it_compared(comparison: Comparison, tmp_path: Path) -> None:
     work = lambda: export_result(comparison, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
-    assert said(OptionError, work) == "--rows: found file with a comparison, allowed: compared"
+    assert said(OptionError, work) == "rows (--rows): found file with a comparison, allowed: compared"
 
 
 def test_a_trajectory_needs_poses(run: Run, tmp_path: Path) -> None:

@@ -46,7 +46,5 @@ def events_view(
 
 
 def _words(one: Event) -> str:
-    said = (
-        one.words if isinstance(one.words, str) else f"{one.words.kind}: {one.words.format('command line')}"
-    )
+    said = one.words if isinstance(one.words, str) else f"{one.words.kind}: {one.words}"
     return text.encodable(said)

@@ -112,7 +112,7 @@ def _all_warnings(section: Section, about: str | None = None) -> Iterator[LogWar
 
 def _warnings(warnings: Sequence[LogWarning]) -> Iterator[str]:
     """Yield the first warnings as a list."""
-    every = list(dict.fromkeys(one.format("command line") for one in warnings))
+    every = list(dict.fromkeys(map(str, warnings)))
     if every:
         yield from ("", f"Warnings: {len(every)}", "")
     yield from (f"- {plain(one)}" for one in every[:LISTED])

@@ -133,7 +133,7 @@ class Verdict:
         return False
 
     def __str__(self) -> str:
-        told = ", ".join(hint.format("command line") for hint in self.last.answers) if self.last else ""
+        told = ", ".join(str(hint) for hint in self.last.answers) if self.last else ""
         return f"{self.kind}: {'/'.join(self.about)} {told}\n{self.first.said}"
 
 

@@ -36,7 +36,7 @@ def test_a_strangers_file_is_read_right_or_asked_about(
     assert verdict.good, verdict
     assert not verdict.unit_first, verdict
     if verdict.last is not None and not one.arm:  # the command line takes what it prints
-        words = shlex.split(" ".join(hint.format("command line") for hint in verdict.last.answers))
+        words = shlex.split(" ".join(str(hint) for hint in verdict.last.answers))
         robot = ["--robot", one.robot] if one.robot else []
         code = run(["ingest", str(tmp_path / next(iter(one.files))), *words, *robot, "--explain", "-q"])
         assert code != 2, capsys.readouterr().err
