@@ -13,11 +13,11 @@ from urmpipe.keyword_checks import PathLike
 from urmpipe_models.errors import Finding, OptionError, format_value, map_collecting_errors
 from urmpipe_pipeline.outputs import (
     DRAWING_HEADER,
-    NOUNS,
+    OUTPUT_RULES,
     OutputKind,
-    all_or_none,
-    guarded_output,
-    refuse_output,
+    atomic_group,
+    check_output,
+    safe_output,
 )
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.recording import preload_writer
@@ -45,7 +45,7 @@ class Outputs:
         """
         path = self._named.get(kind)
         if path is not None:
-            with guarded_output(path, self._inputs, kind) as part:
+            with safe_output(path, self._inputs, kind) as part:
                 write(part, path)
 
     def recorded(self, result: Made, progress: Callable[[float], None] | None) -> Made:
@@ -79,10 +79,10 @@ def guarded_outputs(named: Mapping[OutputKind, PathLike | None], inputs: Sequenc
     """
     targets = {kind: Path(path) for kind, path in named.items() if path is not None}
     _refuse_shared(targets)
-    map_collecting_errors(lambda one: refuse_output(one[1], inputs, one[0]), targets.items())
+    map_collecting_errors(lambda one: check_output(one[1], inputs, one[0]), targets.items())
     if "recording" in targets:
         preload_writer()
-    with all_or_none():
+    with atomic_group():
         yield Outputs(targets, inputs)
 
 
@@ -102,7 +102,7 @@ def output_kind(output: Path | None, log: OutputKind) -> OutputKind | None:
         return None
     kind = {".csv": log, ".rrd": "recording"}.get(output.suffix.lower())
     if kind is None:
-        allowed = f"a name that ends in .csv (a {NOUNS.get(log, log)}) or .rrd (a recording)"
+        allowed = f"a name that ends in .csv (a {OUTPUT_RULES[log].noun}) or .rrd (a recording)"
         raise OptionError(Finding(parameter="output", found=format_value(str(output)), allowed=allowed))
     return kind
 

@@ -1,4 +1,4 @@
-"""The variables of a MAT file, in a process of its own: see `isolated`. It stands alone, to start quickly."""
+"""The variables of a MAT file, for `subprocess_reader`. It imports nothing else, to start quickly."""
 
 from __future__ import annotations
 

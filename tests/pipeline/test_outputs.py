@@ -14,13 +14,13 @@ import pytest
 import urmpipe_pipeline.recording  # each knows its own files
 import urmpipe_pipeline.tables  # noqa: F401
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.outputs import OutputKind, guarded_output, is_report
+from urmpipe_pipeline.outputs import OutputKind, safe_output
 
 REPORT = '<!doctype html>\n<html lang="en"><head>\n<meta name="generator" content="urmpipe 0.1.0">\n'
 
 
 def write(path: Path, text: str = "new", inputs: Sequence[Path] = (), kind: OutputKind = "report") -> None:
-    with guarded_output(path, inputs, kind) as part:
+    with safe_output(path, inputs, kind) as part:
         assert part.parent == path.parent
         assert part.suffix == ".part"
         assert not part.exists()
@@ -65,7 +65,6 @@ def test_an_output_has_the_usual_permissions(tmp_path: Path) -> None:
 def test_a_report_of_ours_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     path.write_text(REPORT)
-    assert is_report(path)
     write(path)
     assert path.read_text() == "new"
 
@@ -201,7 +200,7 @@ def test_a_device_is_not_replaced() -> None:
 def test_a_failing_writer_leaves_what_is_there(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     path.write_text(REPORT)
-    with pytest.raises(ZeroDivisionError), guarded_output(path, (), "report") as part:
+    with pytest.raises(ZeroDivisionError), safe_output(path, (), "report") as part:
         part.write_text("half")
         raise ZeroDivisionError
     assert [(one, one.read_text()) for one in tmp_path.iterdir()] == [(path, REPORT)]
@@ -210,7 +209,7 @@ def test_a_failing_writer_leaves_what_is_there(tmp_path: Path) -> None:
 def test_an_error_of_the_file_system_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     path.write_text(REPORT)
-    with pytest.raises(OutputError) as caught, guarded_output(path, (), "report") as part:
+    with pytest.raises(OutputError) as caught, safe_output(path, (), "report") as part:
         part.write_text("half")
         raise OSError(28, "No space left on device")
     assert str(caught.value) == f"{path}: cannot be written: No space left on device"
@@ -219,7 +218,7 @@ def test_an_error_of_the_file_system_is_one_line(tmp_path: Path) -> None:
 
 def test_a_writer_that_wrote_nothing_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
-    with pytest.raises(OutputError) as caught, guarded_output(path, (), "report"):
+    with pytest.raises(OutputError) as caught, safe_output(path, (), "report"):
         pass
     assert str(caught.value) == f"{path}: cannot be written: No such file or directory"
 
@@ -235,7 +234,7 @@ def test_a_folder_that_may_not_be_written_is_one_line(tmp_path: Path) -> None:
 
 def test_two_writers_of_one_output_do_not_meet(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
-    with ThreadPoolExecutor() as pool, guarded_output(path, (), "report") as one:
+    with ThreadPoolExecutor() as pool, safe_output(path, (), "report") as one:
         one.write_text("one")
         pool.submit(write, path).result()
         assert path.read_text() == "new"

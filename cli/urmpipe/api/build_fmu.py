@@ -14,7 +14,7 @@ from urmpipe.systems.units import Backend, unit_of
 from urmpipe_fmus.block import BlockModel
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.operands import log_files
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import safe_output
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build.fmu import BuiltFmu
@@ -63,7 +63,7 @@ def build_fmu(
         raise OutputError(Finding(f"found no folder, allowed: {allowed}", str(path)))
     target = path / f"{made.name}.fmu" if path.is_dir() else path
     inputs = [file for one in (unit, robot, log) for file in _files(one)]
-    with guarded_output(target, inputs, "fmu") as part:
+    with safe_output(target, inputs, "fmu") as part:
         built = build(made, part, backend=backend, platforms=tuple(one_or_many(platforms)), on_message=told)
         return replace(built, path=target)
 

@@ -19,7 +19,7 @@ from urmpipe_models.ik.solutions import DEFAULT_SEARCH, SearchOptions
 from urmpipe_models.ik.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import guarded_output, refuse_output
+from urmpipe_pipeline.outputs import check_output, safe_output
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
 from urmpipe_pipeline.solved_targets.request import JointValues, Request, refuse_unsolvable, start_of
@@ -113,7 +113,7 @@ def ik(
         *paths(inputs),
     ]
     if path is not None and kind is not None:
-        refuse_output(path, kept, kind)
+        check_output(path, kept, kind)
     result = solve_targets(request, solving)
     refuse_warnings(strict, result.warnings)
     if path is None:
@@ -151,7 +151,7 @@ def _write_joints(result: SolvedTargets, path: Path, kept: Sequence[Path]) -> No
     Raises:
         OutputError: If it may not be written there, or did not read back as it was written.
     """
-    with guarded_output(path, kept, "joints") as part:
+    with safe_output(path, kept, "joints") as part:
         write_joint_log(
             part, path, joints=result.robot.coordinates, units=result.joint_units, q=result.q, row=result.row,
             t_ns=result.clock_ns,

@@ -19,7 +19,7 @@ from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
 from urmpipe_models.planning.laws import Arcs
 from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import PATH_ROW, guarded_output, refuse_output
+from urmpipe_pipeline.outputs import PATH_ROW, check_output, safe_output
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planning import plan_path
@@ -112,7 +112,7 @@ def plan(
     request, given, _, kind = map_collecting_errors(lambda make: make(), parts)
     kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
     if written is not None:
-        refuse_output(written, kept, kind)
+        check_output(written, kept, kind)
     share = PLANNING if written else 1.0
     planning = None if progress is None else lambda done: progress(share * done)
     result = plan_path(given, request, planning)
@@ -158,7 +158,7 @@ def _given(path: PathLike | PathRows, reading: Mapping[str, Any]) -> GivenPath:
 def _write_log(result: PlannedPath, path: Path, kept: Sequence[Path]) -> None:
     """Write a plan as a log: times, joints, and the path as the recorded tool centre point."""
     joints = result.joints
-    with guarded_output(path, kept, "plan") as part:
+    with safe_output(path, kept, "plan") as part:
         write_joint_log(
             part, path, joints=result.robot.coordinates if result.robot else (), units=result.joint_units,
             q=np.empty((len(result), 0)) if joints is None else joints.q, row=result.row, t_ns=result.t_ns,

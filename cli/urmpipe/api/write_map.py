@@ -9,7 +9,7 @@ from pathlib import Path
 from urmpipe.arm_placing import offset_of
 from urmpipe.keyword_checks import PathLike, paths, public
 from urmpipe_models.robots.catalogue import robot_names
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import map_of, read_map
 
@@ -30,7 +30,7 @@ def write_map(
         UrmpipeError: If it may not be written there.
     """
     path = Path(output)
-    with guarded_output(path, paths(inputs), "map") as part:
+    with safe_output(path, paths(inputs), "map") as part:
         write_map_part(run, part, path, robot)
     return path
 

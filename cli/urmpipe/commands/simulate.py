@@ -173,10 +173,10 @@ def _write(system: str, path: Path, terminal: Terminal) -> int:
     from urmpipe.printing.terminal import say
     from urmpipe_fmus.cosim import system_text
     from urmpipe_models.errors import shell_quote
-    from urmpipe_pipeline.outputs import guarded_output
+    from urmpipe_pipeline.outputs import safe_output
 
     text = system_text(system)
-    with guarded_output(path, [], "system") as part:
+    with safe_output(path, [], "system") as part:
         part.write_text(text, encoding="utf-8")
     logs = "".join(f" --set {name}=FILE.csv" for name in own_logs(system))
     said = f"System: {path}  (change it, then: urmpipe simulate {shell_quote(path)}{logs})"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from urmpipe_models.errors import Finding, OptionError, OutputError, format_value, map_collecting_errors
 from urmpipe_pipeline.figures.listing import Listed, Plot, chosen, listed
 from urmpipe_pipeline.figures.size import COARSEST, FINEST, Size, size_of
-from urmpipe_pipeline.outputs import DRAWING_HEADER, all_or_none, guarded_output, refuse_output
+from urmpipe_pipeline.outputs import DRAWING_HEADER, atomic_group, check_output, safe_output
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.text import unique
@@ -129,13 +129,13 @@ def write_figures(
         for suffixes in [("svg",) if isinstance(one.content, Drawing) else options.formats]
     ]
     files = [file for _, some in wanted for file in some]
-    with _made_folder(options.folder), all_or_none():
-        map_collecting_errors(lambda file: refuse_output(file.path, inputs, "figure"), files)
+    with _made_folder(options.folder), atomic_group():
+        map_collecting_errors(lambda file: check_output(file.path, inputs, "figure"), files)
         done = 0
         for one, some in wanted:
             save = _saver(one, options)
             for file in some:
-                with guarded_output(file.path, inputs, "figure") as part:
+                with safe_output(file.path, inputs, "figure") as part:
                     save(part, file.path.suffix[1:])
                 done += 1
                 if progress:

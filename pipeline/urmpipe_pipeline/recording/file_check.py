@@ -14,8 +14,8 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
 
-from urmpipe_pipeline import isolated
-from urmpipe_pipeline.outputs import know_own
+from urmpipe_pipeline import subprocess_reader
+from urmpipe_pipeline.outputs import register_owner_check
 
 if TYPE_CHECKING:
     from rerun.chunk import RrdReader, StoreEntry
@@ -55,7 +55,7 @@ def is_ours(path: Path) -> bool:
         return False
 
 
-know_own("recording", is_ours)
+register_owner_check("recording", is_ours)
 
 
 def open_reader(path: Path) -> RrdReader:
@@ -78,7 +78,7 @@ def own_entries(reader: RrdReader) -> list[StoreEntry]:
 
 def find_crash(path: Path) -> str:
     """Return how reading a recording ends the process that reads it; empty if it does not."""
-    return isolated.abort_of(path, __name__, meanwhile=("rerun.chunk",))
+    return subprocess_reader.find_crash(path, __name__, meanwhile=("rerun.chunk",))
 
 
 def read_through(path: str) -> None:

@@ -21,8 +21,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError, RecordingError
-from urmpipe_pipeline.isolated import believe
-from urmpipe_pipeline.outputs import guarded_output, interrupts_held_back
+from urmpipe_pipeline.outputs import defer_interrupts, safe_output
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.recording.codec import CodecError, Encoded, StoredArray, encode
 from urmpipe_pipeline.recording.file_check import APPLICATION_ID
@@ -30,6 +29,7 @@ from urmpipe_pipeline.recording.layout import PROPERTY, SLICE, array_columns, ch
 from urmpipe_pipeline.recording.reader import Store
 from urmpipe_pipeline.recording.views.blueprint import send_views
 from urmpipe_pipeline.recording.views.plots import LONG
+from urmpipe_pipeline.subprocess_reader import mark_safe
 from urmpipe_pipeline.text import encodable
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def write_result(
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
-    with guarded_output(path, inputs, "recording") as part:
+    with safe_output(path, inputs, "recording") as part:
         try:
             encoded = encode(result)
         except CodecError as error:
@@ -75,7 +75,7 @@ def write_result(
             return packed, metadata
 
         written, metadata = write_into(part, send)
-        believe(part)
+        mark_safe(part)
         verify(part, path, written, metadata)
 
 
@@ -315,5 +315,5 @@ def _write(part: Path, send: Callable[[Sink], Result], *, piped: bool) -> Result
             return send(sink)
         finally:
             rr.set_strict_mode(strict_before)
-            with interrupts_held_back():
+            with defer_interrupts():
                 sink.finish()

@@ -18,7 +18,7 @@ from markupsafe import Markup, escape
 
 from urmpipe_models.errors import escape_control_characters
 from urmpipe_pipeline.figures.files import FigureFile, FigureOptions, figure_stem, write_figures
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.page import Page, lay_out
 from urmpipe_pipeline.report.spec import DARK
@@ -72,7 +72,7 @@ def write_report(
         OptionError: If there is nothing to report, or no figure of a name.
         OutputError: If it may not be written there, or the figures cannot be drawn.
     """
-    with guarded_output(path, inputs, kind="report") as part:
+    with safe_output(path, inputs, kind="report") as part:
         part.write_bytes(
             render_report(presentations).encode("utf-8", "replace")
         )  # a file name may hold bytes of no text

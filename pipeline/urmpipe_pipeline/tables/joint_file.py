@@ -41,7 +41,7 @@ def write_joint_log(
     value of a joint is left out, and the others keep their times.
 
     Args:
-        part: Where to write it, as `guarded_output` gives it for the kind "joints", "plan" or "motion".
+        part: Where to write it, as `safe_output` gives it for the kind "joints", "plan" or "motion".
         path: The name it is to have, for messages.
         joints: Names of the joints, in the robot's order; none for a path alone.
         units: Of each: rad or m.

@@ -27,7 +27,7 @@ from typing import Literal
 from urmpipe_models.errors import HIDDEN, Finding, OutputError, UrmpipeError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import JUNIT_HEADER, guarded_output
+from urmpipe_pipeline.outputs import JUNIT_HEADER, safe_output
 from urmpipe_pipeline.presentation.section import Presentation, Section
 
 BAD_INPUT = "bad-input"
@@ -67,7 +67,7 @@ def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]
     suite = ET.SubElement(root, "testsuite", name="urmpipe compare")
     _add_errors(suite, findings)
     _count(suite)
-    with suppress(OutputError), guarded_output(path, inputs, "junit") as part:
+    with suppress(OutputError), safe_output(path, inputs, "junit") as part:
         _write(root, part, path)
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.errors import Finding, Hint, OutputError
-from urmpipe_pipeline.isolated import believe
 from urmpipe_pipeline.outputs import EXPORT_HEADER
+from urmpipe_pipeline.subprocess_reader import mark_safe
 
 DESCRIPTION = 116
 """Bytes at the start of a MAT file that are free text."""
@@ -37,7 +37,7 @@ def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) ->
     with path.open("r+b") as file:
         file.write(f"MATLAB 5.0 MAT-file, {EXPORT_HEADER}".encode().ljust(DESCRIPTION))
     found = differences(name, struct, path)
-    believe(path)
+    mark_safe(path)
     return found
 
 

@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Any
 from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.errors import Finding, OutputError, map_collecting_errors
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import EXPORT_HEADER, all_or_none, guarded_output, know_own, refuse_output
+from urmpipe_pipeline.outputs import (
+    EXPORT_HEADER,
+    atomic_group,
+    check_output,
+    register_owner_check,
+    safe_output,
+)
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
@@ -40,7 +46,7 @@ def is_export(path: Path) -> bool:
     return EXPORT_HEADER.encode() in head and head.startswith((b"# ", b"MATLAB 5.0"))
 
 
-know_own("export", is_export)
+register_owner_check("export", is_export)
 
 POSE_COLUMNS = (
     ("t", "s"), ("x", "m"), ("y", "m"), ("z", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""),
@@ -198,10 +204,10 @@ def write_all(
     if to == "csv" and targets[0].is_file():
         found = "found a file, allowed: a new name; an existing CSV file is never replaced"
         raise OutputError(Finding(found, str(targets[0])))
-    map_collecting_errors(lambda path: refuse_output(path, inputs, "export"), targets)
-    with all_or_none():
+    map_collecting_errors(lambda path: check_output(path, inputs, "export"), targets)
+    with atomic_group():
         for path, write in zip(targets, writers, strict=True):
-            with guarded_output(path, inputs, "export") as part:
+            with safe_output(path, inputs, "export") as part:
                 wrong = write(part)
             if wrong:
                 said = f"differs when read back: {', '.join(wrong)}"

@@ -18,7 +18,7 @@ from made_runs import off
 from urmpipe_models.errors import Finding, LogError, OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 
@@ -27,7 +27,7 @@ Compared = Callable[..., Comparison]
 
 def written(result: Comparison, path: Path) -> ET.Element:
     """Write a JUnit file as the command does, and parse it."""
-    with guarded_output(path, [], "junit") as part:
+    with safe_output(path, [], "junit") as part:
         write_junit(present(result), part, path)
     root = ET.parse(path).getroot()
     assert_consumers_take_it(root)

@@ -26,7 +26,7 @@ from urmpipe_pipeline.comparison.iso import IsoOptions
 from urmpipe_pipeline.iso9283.criteria import UNITS, judged
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.iso9283.tables import meaning, tolerance_words, value_of, worst_first
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.presentation.section import Judged, Presentation, Section, Table
 from urmpipe_pipeline.report.render import render_report
 from urmpipe_pipeline.results import present, read_recording, write_recording
@@ -200,7 +200,7 @@ def test_junit_has_a_case_each_tolerance_and_every_value(
     result: Comparison, iso: IsoTest, shown: Presentation, tmp_path: Path
 ) -> None:
     path = tmp_path / "verdict.xml"
-    with guarded_output(path, [], "junit") as part:
+    with safe_output(path, [], "junit") as part:
         write_junit(shown, part, path)
     root = ET.parse(path).getroot()
     assert (root.get("tests"), root.get("failures")) == ("4", "1")

@@ -15,7 +15,7 @@ from made_plans import CONTOUR, FAILED, SMALL, limited, planned
 from presented import cells, facts, figures
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
 from urmpipe_pipeline.planned_paths.parts import MANY, obstacle_words
 from urmpipe_pipeline.planned_paths.presenter import CHECKS
@@ -165,7 +165,7 @@ def test_what_is_in_the_way_is_headline_fact_check_and_event(kind: ObstacleKind,
     ]
     errors = [(event.t_ns, event.words) for event in shown.body.events() if event.level == "error"]
     assert errors == [(round(one.t * 1e9), f"{one.kind}: {one.words}") for one in plan.obstacles]
-    with guarded_output(tmp_path / "plan.xml", [], "junit") as part:
+    with safe_output(tmp_path / "plan.xml", [], "junit") as part:
         write_junit(shown, part, tmp_path / "plan.xml")
     root = ET.parse(tmp_path / "plan.xml").getroot()
     cases = {case.get("name"): case.find("failure") for case in root.iter("testcase")}

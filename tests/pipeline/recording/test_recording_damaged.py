@@ -46,7 +46,9 @@ def test_a_byte_that_aborts_the_reader_is_one_line(make_run: MakeRun, tmp_path: 
         if said.startswith("found a damaged recording (reading"):
             break
     assert said == ABORTED
-    line = module_command("urmpipe_pipeline.isolated", "urmpipe_pipeline.recording.file_check", str(one))
+    line = module_command(
+        "urmpipe_pipeline.subprocess_reader", "urmpipe_pipeline.recording.file_check", str(one)
+    )
     ended = subprocess.run(line, env=module_environment(), capture_output=True, timeout=100, check=False)
     assert ended.returncode == -signal.SIGABRT  # else nothing would need a process of its own
 

@@ -15,7 +15,7 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OutputError
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions, read_log
@@ -39,7 +39,7 @@ def write(path: Path, robot: Chain, q: FloatArray, t_ns: IntArray | None, inputs
     """Write a joint log of a robot, its targets being the rows from 1."""
     units = ["m" if joint.kind == "prismatic" else "rad" for joint in robot.moving]
     rows = np.arange(1, len(q) + 1)
-    with guarded_output(path, inputs, "joints") as part:
+    with safe_output(path, inputs, "joints") as part:
         return write_joint_log(part, path, joints=robot.coordinates, units=units, q=q, row=rows, t_ns=t_ns)
 
 

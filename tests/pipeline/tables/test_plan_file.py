@@ -14,7 +14,7 @@ from plan_logs import PATHS, planned, planned_alone, written_plan
 from urmpipe_models.errors import OutputError
 from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.outputs import PATH_ROW, TARGET_ROW, guarded_output
+from urmpipe_pipeline.outputs import PATH_ROW, TARGET_ROW, safe_output
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.tables.joint_file import write_joint_log
 
@@ -88,14 +88,14 @@ def test_only_a_plan_is_replaced_by_a_plan_and_a_joint_log_by_a_joint_log(tmp_pa
     assert header(path) == f"t (s),x (m),y (m),z (m),{PATH_ROW}"
     assert len(pd.read_csv(path)) == len(alone)
     other = tmp_path / "solved.csv"
-    with guarded_output(other, [], "joints") as part:
+    with safe_output(other, [], "joints") as part:
         write_joint_log(part, other, joints=["q1"], units=["rad"], q=np.zeros((2, 1)), row=np.array([1, 2]))
     assert other.read_text(encoding="utf-8").startswith(f"q1 (rad),{TARGET_ROW}\n")
     with pytest.raises(OutputError, match="found a file that is not a plan of urmpipe, allowed: a new name"):
         written_plan("sliding", other)
     with (
         pytest.raises(OutputError, match="found a file that is not a joint log of urmpipe"),
-        guarded_output(path, [], "joints"),
+        safe_output(path, [], "joints"),
     ):
         pass
 

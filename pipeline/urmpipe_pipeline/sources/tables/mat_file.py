@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline import mat_variables
-from urmpipe_pipeline.isolated import AbortError, read_apart
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import UNIT
@@ -25,6 +24,7 @@ from urmpipe_pipeline.sources.tables.form import spread_names
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked
 from urmpipe_pipeline.sources.tables.own_tables import ORDERS, RECORDED, with_roles
+from urmpipe_pipeline.subprocess_reader import ReaderCrashError, read_in_subprocess
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Powers of ten from a unit of times to [ns]."""
@@ -73,8 +73,8 @@ def _loaded(path: Path) -> dict[str, Any]:
     """Return the variables of a file, structs as dictionaries: damaged bytes can end SciPy's process."""
     refuse_unpacked(path, _unpacked(path))
     try:
-        found, reason = read_apart(path, mat_variables.__name__)
-    except AbortError as error:
+        found, reason = read_in_subprocess(path, mat_variables.__name__)
+    except ReaderCrashError as error:
         found, reason = {}, str(error)
     if reason:
         found_out = f"found a MAT file that cannot be read ({reason}), allowed: a whole one"
