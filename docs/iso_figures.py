@@ -18,8 +18,8 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.command_path import CommandCorner, CommandPath
 from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path
 from urmpipe_pipeline.iso9283.criteria import accuracy, repeatability
-from urmpipe_pipeline.iso9283.motion import Rest, motion_of
-from urmpipe_pipeline.iso9283.poses import settling
+from urmpipe_pipeline.iso9283.motion import Rest, build_motion
+from urmpipe_pipeline.iso9283.poses import settling_and_overshoot
 
 Place: TypeAlias = Sequence[float] | FloatArray
 """Where something is, to the right and up, shape (2,); what follows counts for nothing."""
@@ -165,8 +165,8 @@ def _settled() -> list[str]:
     band, t = 0.12, np.linspace(0.0, 1.0, 401)
     swing = np.maximum(t - 0.15, 0.0)
     away = -np.exp(-9.0 * swing) * np.cos(22.0 * swing)
-    motion = motion_of("swing", t, _in_space(away[:, np.newaxis]), None, timed=True)
-    found = settling(motion, 0, Rest(300, 400), band)
+    motion = build_motion("swing", t, _in_space(away[:, np.newaxis]), None, timed=True)
+    found = settling_and_overshoot(motion, 0, Rest(300, 400), band)
     assert found is not None
     lasting, beyond = found
     begins, most = float(t[int(np.argmax(np.abs(away) <= band))]), float(t[int(np.argmax(away))])
@@ -191,9 +191,11 @@ def _settled() -> list[str]:
 def paths() -> list[str]:
     """Return a path with its planes and cycles, and one plane seen along the path."""
     command = np.array([*([x, 0.0] for x in range(0, 340, 10)), *([330.0, y] for y in range(10, 210, 10))])
-    path = CommandPath(motion_of("path", np.arange(0.0, len(command)), _in_space(command), None, timed=True))
-    planes, (corner,) = path.planes(7), path.corners
-    before, behind = path.stations(np.array(corner.zone)).point
+    path = CommandPath(
+        build_motion("path", np.arange(0.0, len(command)), _in_space(command), None, timed=True)
+    )
+    planes, (corner,) = path.even_planes(7), path.corners
+    before, behind = path.planes_at(np.array(corner.zone)).point
     cycles = [_beside(command, shift) for shift in (2.0, 8.0, -3.0, 13.0, 5.0)]
     across = 26.0 * np.cross(planes.normal, [0.0, 0.0, 1.0])
     here, plane = Panel(0.0, (20.0, 240.0)), Panel(430.0, (110.0, 225.0), (5.0, 5.0))
@@ -257,7 +259,7 @@ def _corner() -> CornerPath:
         done.append(place)
     mean = _in_space(np.array(done))
     east, north, _ = np.eye(3)
-    corner = CommandCorner(np.zeros(3), east, north, 60.0, 60.0, (0.0, 120.0), (54.0, 66.0), straight=True)
+    corner = CommandCorner(np.zeros(3), east, north, 60.0, 60.0, (0.0, 120.0), (54.0, 66.0), is_straight=True)
     command = np.array([-60.0 * east, np.zeros(3), 60.0 * north])
     return corner_path("corner 1", corner, command, mean[(mean[:, 0] > -60.0) & (mean[:, 1] < 60.0)])
 

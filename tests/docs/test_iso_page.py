@@ -14,8 +14,9 @@ import urmpipe
 from asserting import there
 from pages import DOCS, command_lines, lay_files, snippets, text_of
 from urmpipe.main import run
-from urmpipe_pipeline.comparison.iso import ENOUGH, IsoOptions
+from urmpipe_pipeline.comparison.iso import STANDARD_CYCLES
 from urmpipe_pipeline.iso9283.criteria import UNITS
+from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 
 PAGE = text_of("docs/iso.md")
 DRAWN = runpy.run_path(str(DOCS / "iso_figures.py"))
@@ -50,7 +51,7 @@ def test_every_criterion_has_a_row() -> None:
 
 
 def test_numbers_of_the_page_are_those_of_the_code() -> None:
-    assert f"takes {ENOUGH['poses']} for poses and {ENOUGH['paths']} for paths" in PAGE
+    assert f"takes {STANDARD_CYCLES['poses']} for poses and {STANDARD_CYCLES['paths']} for paths" in PAGE
     assert f"cut it: {IsoOptions().planes}, or `--planes N`" in PAGE
     assert f"±{IsoOptions().band * 1e3:g} mm by default" in PAGE
 

@@ -12,7 +12,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.iso import IsoOptions, judge_cycles
+from urmpipe_pipeline.comparison.iso import evaluate_test
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import (
     SyncOption,
@@ -35,6 +35,7 @@ from urmpipe_pipeline.comparison.warnings import (
     weak_evidence,
 )
 from urmpipe_pipeline.diagnosis.diagnose import Compared, Limit, diagnose
+from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
 from urmpipe_pipeline.presentation.meshes import missing_visuals
 from urmpipe_pipeline.provenance import build_provenance
@@ -207,7 +208,7 @@ def _test(
     """Return the comparison of the cycles of a test after ISO 9283."""
     assert options.iso is not None
     sync = "start" if options.sync is None else options.sync
-    found = judge_cycles(asked, done, options.iso, sync, options.tolerance)
+    found = evaluate_test(asked, done, options.iso, sync, options.tolerance)
     reference, runs = asked.run, [one.run for one in done]
     told = [*(one.of(reference.name) for one in reference.warnings), *found.warnings, *same]
     if len(runs) == 1:  # its cycles are parts of it

@@ -14,7 +14,7 @@ from urmpipe_pipeline.comparison.baseline_section import baseline_section, crite
 from urmpipe_pipeline.comparison.comparison import BaselineComparison, Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.verdict import UNITS
-from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict
+from urmpipe_pipeline.iso9283.criteria import Criterion, combine_verdicts
 from urmpipe_pipeline.iso9283.figures import (
     CYCLES_COLOUR,
     TUBE_COLOUR,
@@ -40,7 +40,7 @@ from urmpipe_pipeline.iso9283.tables import (
     decisive,
     failed_cycles_words,
     failed_table,
-    failed_words,
+    format_failed_cycle,
     leg_table,
     meaning,
     not_judged_findings,
@@ -132,7 +132,7 @@ def _decisive_facts(test: IsoTest) -> Iterator[Fact]:
         yield Fact("Failed cycles", Value(len(test.failed_cycles)))
     one = decisive(test)
     if one is not None and (one.verdict == "fail" or not test.failed_cycles):
-        used = text.portion(one.used or 0.0)
+        used = text.portion(one.utilisation or 0.0)
         yield Fact("Decided by", f"{amount_words(one)} ({used} the tolerance)", meaning(one.name))
         yield Fact("Where", where(test, one))
 
@@ -248,7 +248,7 @@ def _section(
     )  # fmt: skip
     return Section(
         part,
-        overall_verdict(one.verdict for one in criteria),
+        combine_verdicts(one.verdict for one in criteria),
         (*first, *facts),
         tuple(tables),
         blocks=blocks,
@@ -260,7 +260,7 @@ def _section(
 def _failed_checks(test: IsoTest) -> Iterator[Check]:
     if test.verdict == "fail":
         for cycle in test.failed_cycles:
-            yield Check(cycle.name, "fail", failed_words(cycle), kind="failed-cycle")
+            yield Check(cycle.name, "fail", format_failed_cycle(cycle), kind="failed-cycle")
 
 
 def _checks(test: IsoTest, criteria: Iterable[Criterion]) -> Iterator[Check]:

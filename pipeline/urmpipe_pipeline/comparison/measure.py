@@ -29,7 +29,7 @@ from urmpipe_pipeline.comparison.deviation import (
 )
 from urmpipe_pipeline.comparison.path_distance import distance_from_path
 from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, allowed_for
-from urmpipe_pipeline.iso9283.criteria import overall_verdict
+from urmpipe_pipeline.iso9283.criteria import combine_verdicts
 from urmpipe_pipeline.joint_log import has_gap_after, ns_to_seconds
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.run import Run
@@ -285,7 +285,7 @@ def describe(
 
 def overall(statistics: Iterable[Statistics | Share]) -> Verdict | None:
     """Return fail if any quantity fails; None if none has a tolerance."""
-    return overall_verdict(one.verdict for one in statistics)
+    return combine_verdicts(one.verdict for one in statistics)
 
 
 def correlation(first: FloatArray, second: FloatArray) -> float | None:

@@ -474,8 +474,8 @@ def _corner_view(one: CornerPath, left: float, top: float) -> Iterator[str]:
         else:
             bottom = f'x="{view.left + 6:.1f}" y="{view.top + view.size - 8:.1f}"'
             yield f'<text {bottom} fill="#5b6770">CO: {amount(away, "m")} from the corner</text>'
-    for name, points in lengths.items():
-        yield from _length(name, view.placed((np.array(points) - one.point) @ axes))
+    for name, both in lengths.items():
+        yield from _length(name, view.placed((np.array(both) - one.point) @ axes))
 
 
 def _inside(points: FloatArray, near: float) -> FloatArray:

@@ -1,26 +1,43 @@
-"""The poses of a command, and where each cycle attained them."""
+"""The poses of a test after ISO 9283: where the command rests, where cycles attain it, and their criteria.
+
+1. `command_poses`: the rests of the command, and stops of a moment that are known.
+2. `find_attained_poses`: the rest of a cycle in each of them.
+3. `settling_and_overshoot`: PSt and OV of one approach.
+4. `pose_values`, over n cycles: AP, RP and their angles as in `criteria`; AD = |mean distance of two poses -
+   commanded distance|, RD = 3 S of the distance; vAP, the largest distance of the barycentres of a pose that
+   is attained from directions at least 30 deg apart; dAP and dRP, the changes of AP and RP from the first
+   tenth of the cycles to the last.
+
+Source: after ISO 9283; AP and RP as public evaluations have them, the others from common knowledge.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import rotation_angle
-from urmpipe_pipeline.iso9283.command_path import CORNER, Stop
-from urmpipe_pipeline.iso9283.criteria import ANGLES, accuracy, angles, repeatability, threefold, turned
-from urmpipe_pipeline.iso9283.motion import Motion, Rest, in_order
+from urmpipe_pipeline.iso9283.command_path import CORNER_ANGLE, Stop
+from urmpipe_pipeline.iso9283.criteria import (
+    Value,
+    accuracy,
+    angle_values,
+    euler_angles,
+    repeatability,
+    three_sigma,
+    values_at,
+)
+from urmpipe_pipeline.iso9283.motion import Motion, Rest, assign_in_order
 
-SAME = (1e-4, 1e-3)
-"""Poses that are no further apart than this in [m] and [rad] are one pose."""
-
-SLOW = 0.1
-"""Where a command stops for a moment only, a cycle is there where it is slowest: slower than this share of
-its largest speed."""
+POSE_TOLERANCE = (1e-4, 1e-3)  # [m] and [rad] between poses that are the same
+SLOW = 0.1  # of the largest speed: a cycle is slower at a pose in which the command stops for a moment
+APPROACH = 50.0  # bands: an approach begins where the cycle comes so near to the pose for the last time
+DRIFT_PARTS = 10  # of the cycles: drift is from the first part to the last
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,8 +47,8 @@ class Poses:
     Attributes:
         position: In [m], shape (k, 3).
         quat_xyzw: Orientations [-], shape (k, 4); None without them.
-        moving: Whether the command stops there for a moment only, one each.
-        closed: Whether a cycle begins in the last one: where it starts it attains nothing.
+        moving: Whether the command stops there for a moment only, one per pose.
+        closed: Whether a cycle begins in the last one, which it attains at its end only.
     """
 
     position: FloatArray
@@ -42,77 +59,69 @@ class Poses:
     def __len__(self) -> int:
         return len(self.position)
 
-    def alike(self, first: int, second: int) -> bool:
-        """Tell whether two of them are one pose."""
-        near = float(np.linalg.norm(self.position[first] - self.position[second])) <= SAME[0]
+    def is_same(self, first: int, second: int) -> bool:
+        """Return whether two of them are the same pose."""
+        near = float(np.linalg.norm(self.position[first] - self.position[second])) <= POSE_TOLERANCE[0]
         if self.quat_xyzw is None or not near:
             return near
-        turned = rotation_angle(self.quat_xyzw[[first]], self.quat_xyzw[[second]])
-        return float(turned[0]) <= SAME[1]
-
-    @property
-    def visited_again(self) -> tuple[tuple[int, ...], ...]:
-        """The numbers of those that are one pose, from 0, for each pose that is attained more than once."""
-        groups: list[list[int]] = []
-        for k in range(len(self)):
-            own = next((one for one in groups if self.alike(one[0], k)), None)
-            if own is None:
-                groups.append([k])
-            else:
-                own.append(k)
-        return tuple(tuple(one) for one in groups if len(one) > 1)
+        angle = rotation_angle(self.quat_xyzw[[first]], self.quat_xyzw[[second]])
+        return float(angle[0]) <= POSE_TOLERANCE[1]
 
 
-def poses_of(command: Motion, stops: Sequence[Stop] = ()) -> Poses:
-    """Return the poses of a command: where it rests; of still poses every row.
+class _Approach(NamedTuple):
+    """A pose of a command: its rows, its position in [m], and whether the command stops for a moment only."""
 
-    A rest that it begins with is left out if it ends in the same pose: every cycle attains that at its end.
+    rest: Rest
+    position: FloatArray
+    is_moment: bool
+
+
+def command_poses(command: Motion, stops: Sequence[Stop] = ()) -> Poses:
+    """Return the poses of a command: where it rests; of static poses each row.
+
+    The rest in which it begins is left out if it ends in the same pose: each cycle attains that at its end.
 
     Args:
-        command: The motion that was asked for.
-        stops: Where it is known to stop, if for a moment only.
+        command: The commanded motion.
+        stops: Where it is known to stop, even if only for a moment.
     """
     if not command.timed:
         return Poses(command.position, command.quat_xyzw, (False,) * len(command))
-    known = [(one, command.pose(one)[0], False) for one in command.rests]
-    moments = [(_row_at(command, one.t), np.array(one.place), True) for one in stops]
-    known += [one for one in moments if not any(_touch(one[0], rest) for rest in command.rests)]
-    known.sort(key=lambda one: one[0].first)
-    found = _gathered(command, known)
-    if len(found) > 1 and _starts(command, known[0][0]) and found.alike(0, len(found) - 1):
-        return replace(_gathered(command, known[1:]), closed=True)
-    return found
+    approaches = [_Approach(rest, command.pose(rest)[0], is_moment=False) for rest in command.rests]
+    for stop in stops:
+        row = int(np.argmin(np.abs(command.t - stop.t)))
+        if not any(rest.first - 1 <= row <= rest.last + 1 for rest in command.rests):
+            approaches.append(_Approach(Rest(row, row), np.array(stop.position), is_moment=True))
+    approaches.sort(key=lambda approach: approach.rest.first)
+    poses = _collect(command, approaches)
+    if len(poses) > 1 and _begins_in(command, approaches[0].rest) and poses.is_same(0, len(poses) - 1):
+        return replace(_collect(command, approaches[1:]), closed=True)
+    return poses
 
 
-def _row_at(command: Motion, t: float) -> Rest:
-    """Return the row of a command that is nearest to a time in [s]."""
-    row = int(np.argmin(np.abs(command.t - t)))
-    return Rest(row, row)
+def _collect(command: Motion, approaches: Sequence[_Approach]) -> Poses:
+    position = np.array([approach.position for approach in approaches]).reshape(-1, 3)
+    quats = [quat for approach in approaches if (quat := command.pose(approach.rest)[1]) is not None]
+    moving = tuple(approach.is_moment for approach in approaches)
+    return Poses(position, np.array(quats) if quats else None, moving)
 
 
-def _touch(one: Rest, other: Rest) -> bool:
-    """Tell whether two stretches of rows overlap, or stand beside each other."""
-    return one.first <= other.last + 1 and other.first <= one.last + 1
+def _begins_in(cycle: Motion, rest: Rest) -> bool:
+    """Return whether a cycle begins in a rest, without a motion before it."""
+    offset = cycle.position[: rest.first + 1] - cycle.pose(rest)[0]
+    return bool(np.linalg.norm(offset, axis=1).max() <= POSE_TOLERANCE[0] + 10.0 * cycle.noise)
 
 
-def _gathered(command: Motion, known: Sequence[tuple[Rest, FloatArray, bool]]) -> Poses:
-    """Return the poses in which a command rests: the rows, the place, and whether it is a moment of each."""
-    position = np.array([place for _, place, _ in known]).reshape(-1, 3)
-    quats = [turned for one, _, _ in known if (turned := command.pose(one)[1]) is not None]
-    return Poses(position, np.array(quats) if quats else None, tuple(moment for _, _, moment in known))
+def find_attained_poses(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | int:
+    """Return the rest of a cycle in each pose, or the number of the first pose, from 0, that it misses.
 
-
-def attained(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | int:
-    """Return where a cycle rests in each pose, or the number of the first, from 0, that it does not attain.
-
-    Of its rests those are taken that follow each other in the order of the poses and are nearest to them in
-    all; where a command stops for a moment only, moments at which the cycle is slowest count, too. Of still
-    poses each row is one.
+    The rests in the order of the poses that are nearest to them in total. Where the command stops for a
+    moment only, moments at which the cycle is slowest count, too. Of static poses each row is one.
 
     Args:
         cycle: The cycle.
         poses: The commanded poses.
-        reach: How far a rest may be from its pose in [m].
+        reach: Largest distance of a rest from its pose in [m].
     """
     if not cycle.timed:
         if len(cycle) != len(poses):
@@ -123,59 +132,48 @@ def attained(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | in
         return tuple(Rest(row, row) for row in range(len(cycle)))
     rests = list(cycle.rests)
     if any(poses.moving):
-        rests = sorted([*rests, *_moments(cycle, reach / 4.0)], key=lambda one: one.first)
-    if poses.closed and rests and _starts(cycle, rests[0]):
+        rests = sorted([*rests, *_slowest_moments(cycle, reach / 4.0)], key=lambda rest: rest.first)
+    if poses.closed and rests and _begins_in(cycle, rests[0]):
         rests = rests[1:]
-    places = np.array([cycle.pose(one)[0] for one in rests]).reshape(-1, 3)
+    positions = np.array([cycle.pose(rest)[0] for rest in rests]).reshape(-1, 3)
     order = np.arange(len(rests), dtype=np.float64)
-    far = [np.linalg.norm(places - wanted, axis=1) for wanted in poses.position]
-    stages = [(order[one <= reach], one[one <= reach]) for one in far]
-    chosen = in_order(stages)
+    distances = [np.linalg.norm(positions - position, axis=1) for position in poses.position]
+    stages = [(order[distance <= reach], distance[distance <= reach]) for distance in distances]
+    chosen = assign_in_order(stages)
     if isinstance(chosen, int):
         return chosen
     return tuple(rests[int(stage[0][k])] for stage, k in zip(stages, chosen, strict=True))
 
 
-def _moments(cycle: Motion, near: float) -> list[Rest]:
-    """Return the rows, one each, at which a cycle is slowest, its ends among them: none about a rest.
+def _slowest_moments(cycle: Motion, near: float) -> list[Rest]:
+    """Return the rows at which the speed of a cycle is least, and its ends, except around a rest.
 
     Args:
         cycle: The cycle.
-        near: What is no further in [m] from the next rest, or from that before, belongs to it: a cycle that
-            overshoots is slow where it turns back.
+        near: Distance in [m] from the rest before or after within which a row belongs to that rest: a cycle
+            that overshoots is slow where it turns back.
     """
     speed = cycle.speed
     at_row = np.minimum(np.append(speed[0], speed), np.append(speed, speed[-1]))
-    lower = np.append(True, at_row[1:] <= at_row[:-1]) & np.append(at_row[:-1] < at_row[1:], True)
-    lower &= at_row <= SLOW * speed.max()
-    lower[[0, -1]] = True
-    rows = np.flatnonzero(lower)
-    begins = np.array([one.first for one in cycle.rests])
-    places = np.array([cycle.pose(one)[0] for one in cycle.rests])
-    for step in (-1, 0) if len(begins) else ():
-        rest = np.clip(np.searchsorted(begins, rows, side="right") + step, 0, len(begins) - 1)
-        rows = rows[np.linalg.norm(cycle.position[rows] - places[rest], axis=1) > near]
+    is_least = np.append(True, at_row[1:] <= at_row[:-1]) & np.append(at_row[:-1] < at_row[1:], True)
+    is_least &= at_row <= SLOW * speed.max()
+    is_least[[0, -1]] = True
+    rows = np.flatnonzero(is_least)
+    first_rows = np.array([rest.first for rest in cycle.rests])
+    positions = np.array([cycle.pose(rest)[0] for rest in cycle.rests])
+    for step in (-1, 0) if len(first_rows) else ():
+        rest = np.clip(np.searchsorted(first_rows, rows, side="right") + step, 0, len(first_rows) - 1)
+        rows = rows[np.linalg.norm(cycle.position[rows] - positions[rest], axis=1) > near]
     return [Rest(int(row), int(row)) for row in rows]
 
 
-def _starts(cycle: Motion, rest: Rest) -> bool:
-    """Tell whether a cycle begins in a rest: nothing leads to it."""
-    way = cycle.position[: rest.first + 1] - cycle.pose(rest)[0]
-    return bool(np.linalg.norm(way, axis=1).max() <= SAME[0] + 10.0 * cycle.noise)
+def settling_and_overshoot(cycle: Motion, since: int, rest: Rest, band: float) -> tuple[float, float] | None:
+    """Return the stabilisation time PSt in [s] and the overshoot OV in [m] of a cycle in a pose.
 
-
-NEAR = 50.0
-"""An approach begins where the cycle comes within so many bands of the pose for the last time."""
-
-
-def settling(cycle: Motion, since: int, rest: Rest, band: float) -> tuple[float, float] | None:
-    """Return the stabilisation time in [s] and the overshoot in [m] with which a cycle attains a pose.
-
-    The final pose is where it stands in the second half of its rest. Stabilisation time: from the first
-    entry into the ball of radius `band` round it to the last one, on straight lines between the rows.
-    Overshoot: max((p - p_final) . u, 0) over the rows from the first entry on, with the unit vector u along
-    the approach, from where the cycle comes within 50 bands to the final pose. None where it does not come
-    from outside the band.
+    The final position p_f is the mean over the second half of the rest. PSt: from the first entry into the
+    ball of radius `band` around it to the last entry, on straight lines between the rows. OV:
+    max((p - p_f) . u, 0) over the rows from the first entry on, with the unit vector u of the approach, from
+    where the cycle comes within 50 bands to p_f. None if it does not come from outside the band.
 
     Args:
         cycle: The cycle.
@@ -187,53 +185,47 @@ def settling(cycle: Motion, since: int, rest: Rest, band: float) -> tuple[float,
     """
     final, _ = cycle.pose(rest)
     rows = slice(since, rest.last + 1)
-    place, t = cycle.position[rows] - final, cycle.t[rows]
-    away = np.linalg.norm(place, axis=1)
-    start = _entry(place, away, NEAR * band, first=False)
-    begin = 0 if start is None else start[0]
-    inside = _entry(place[begin:], away[begin:], band, first=True)
-    settled = _entry(place[begin:], away[begin:], band, first=False)
-    if inside is None or settled is None:
+    offset, t = cycle.position[rows] - final, cycle.t[rows]
+    distance = np.linalg.norm(offset, axis=1)
+    approach = _entry(offset, distance, APPROACH * band, first=False)
+    begin = 0 if approach is None else approach[0]
+    entry = _entry(offset[begin:], distance[begin:], band, first=True)
+    settled = _entry(offset[begin:], distance[begin:], band, first=False)
+    if entry is None or settled is None:
         return None
-    times = [_between(t[begin:], *one) for one in (inside, settled)]
-    came = place[0] if start is None else _between(place, *start)
-    along = -came / np.linalg.norm(came)
-    beyond = place[begin + inside[0] + 1 :] @ along
-    return float(times[1] - times[0]), float(max(beyond.max(initial=0.0), 0.0))
+    times = [_interpolate(t[begin:], *crossing) for crossing in (entry, settled)]
+    start = offset[0] if approach is None else _interpolate(offset, *approach)
+    direction = -start / np.linalg.norm(start)
+    overshoot = offset[begin + entry[0] + 1 :] @ direction
+    return float(times[1] - times[0]), float(max(overshoot.max(initial=0.0), 0.0))
 
 
-def _entry(place: FloatArray, away: FloatArray, radius: float, *, first: bool) -> tuple[int, float] | None:
-    """Return the row before a cycle enters a ball round the origin, first or last, and the share.
+def _entry(
+    offset: FloatArray, distance: FloatArray, radius: float, *, first: bool
+) -> tuple[int, float] | None:
+    """Return the row before a cycle first, or last, enters a ball around the origin, and its share.
 
     Args:
-        place: In [m] from its centre, shape (n, 3).
-        away: The distances from it in [m], shape (n,).
+        offset: Positions from the centre in [m], shape (n, 3).
+        distance: Their distances from it in [m], shape (n,).
         radius: Of the ball in [m].
-        first: Whether the first entry is wanted, else the last one.
+        first: Whether to return the first entry, else the last one.
     """
-    rows = np.flatnonzero((away[:-1] > radius) & (away[1:] <= radius))
+    rows = np.flatnonzero((distance[:-1] > radius) & (distance[1:] <= radius))
     if not len(rows):
         return None
     row = int(rows[0 if first else -1])
-    step = place[row + 1] - place[row]
-    a, b, c = step @ step, place[row] @ step, away[row] ** 2 - radius**2  # |p + x step| = radius
+    step = offset[row + 1] - offset[row]
+    a, b, c = step @ step, offset[row] @ step, distance[row] ** 2 - radius**2  # |p + x step| = radius
     return row, float(c / (-b + np.sqrt(max(b * b - a * c, 0.0))))
 
 
-def _between(values: FloatArray, row: int, share: float) -> FloatArray:
-    """Return what lies between a row and the next."""
+def _interpolate(values: FloatArray, row: int, share: float) -> FloatArray:
     return np.asarray(values[row] + share * (values[row + 1] - values[row]))
 
 
-Found: TypeAlias = tuple[str, str, float | None]
-"""A criterion, where it is, and its value."""
-
-TENTH = 10
-"""Drift is told between the first and the last of so many parts of the cycles."""
-
-
-def pose_criteria(attained: FloatArray, quats: FloatArray | None, poses: Poses) -> Iterator[Found]:
-    """Yield what the attained points of several cycles tell of each pose.
+def pose_values(attained: FloatArray, quats: FloatArray | None, poses: Poses) -> Iterator[Value]:
+    """Yield AP, RP, their angles, AD, RD, vAP, dAP and dRP of each pose or pair.
 
     Args:
         attained: In [m], shape (n, k, 3): cycles, poses, coordinates.
@@ -242,83 +234,56 @@ def pose_criteria(attained: FloatArray, quats: FloatArray | None, poses: Poses) 
 
     Source: after ISO 9283: AP and RP as public evaluations have them, the others from common knowledge.
     """
-    at = [f"pose {k + 1}" for k in range(len(poses))]
-    yield from _each("AP", at, accuracy(attained, poses.position))
-    yield from _each("RP", at, repeatability(attained))
+    names = [f"pose {k + 1}" for k in range(len(poses))]
+    yield from values_at("AP", names, accuracy(attained, poses.position))
+    yield from values_at("RP", names, repeatability(attained))
     if quats is not None and poses.quat_xyzw is not None:
-        flat = angles(quats.reshape(-1, 4)).reshape(*quats.shape[:2], 3)
-        off = turned(flat, angles(poses.quat_xyzw))
-        yield from angle_criteria("P", at, off)
-    yield from _distances(attained, poses)
-    yield from _directions(attained, poses)
-    yield from _drift(attained, poses, at)
+        angles = euler_angles(quats.reshape(-1, 4)).reshape(*quats.shape[:2], 3)
+        yield from angle_values("P", names, angles, euler_angles(poses.quat_xyzw))
+    yield from _distance_values(attained, poses)
+    yield from _direction_values(attained, poses)
+    yield from _drift_values(attained, poses, names)
 
 
-def angle_criteria(kind: str, at: Sequence[str], off: FloatArray) -> Iterator[Found]:
-    """Yield accuracy and repeatability of the angles rz, ry and rx.
-
-    A = |mean angle - commanded angle|, R = 3 S of the angle over the cycles.
-
-    Args:
-        kind: P of poses, T of paths.
-        at: What the places are called.
-        off: Attained - commanded angles in [rad], shape (n, k, 3).
-
-    Source: after ISO 9283, from common knowledge.
-    """
-    spread = threefold(off)
-    for axis, angle in enumerate(ANGLES):
-        yield from _each(f"A{kind}_{angle}", at, np.abs(off[:, :, axis].mean(axis=0)))
-        yield from _each(f"R{kind}_{angle}", at, None if spread is None else spread[:, axis])
-
-
-def _each(name: str, at: Sequence[str], values: FloatArray | None) -> Iterator[Found]:
-    """Yield a criterion at some places; its values are of shape (k,), or none are known."""
-    for k, where in enumerate(at):
-        yield name, where, None if values is None else float(values[k])
-
-
-def _distances(attained: FloatArray, poses: Poses) -> Iterator[Found]:
-    """Yield of each two poses AD = |mean distance - commanded distance| and RD = 3 S of the distance."""
-    pairs = [pair for pair in combinations(range(len(poses)), 2) if not poses.alike(*pair)]
+def _distance_values(attained: FloatArray, poses: Poses) -> Iterator[Value]:
+    pairs = [pair for pair in combinations(range(len(poses)), 2) if not poses.is_same(*pair)]
     if not pairs:
         return
     first, second = np.array(pairs).T
     distance = np.linalg.norm(attained[:, first] - attained[:, second], axis=2)
-    wanted = np.linalg.norm(poses.position[first] - poses.position[second], axis=1)
-    at = [f"poses {a + 1}-{b + 1}" for a, b in pairs]
-    yield from _each("AD", at, np.abs(distance.mean(axis=0) - wanted))
-    yield from _each("RD", at, threefold(distance))
+    commanded = np.linalg.norm(poses.position[first] - poses.position[second], axis=1)
+    names = [f"poses {a + 1}-{b + 1}" for a, b in pairs]
+    yield from values_at("AD", names, np.abs(distance.mean(axis=0) - commanded))
+    yield from values_at("RD", names, three_sigma(distance))
 
 
-def _directions(attained: FloatArray, poses: Poses) -> Iterator[Found]:
-    """Yield vAP: of a pose that is attained from different directions, how far its barycentres are apart.
-
-    The direction is that from the pose before, of which the command tells; directions that differ by less
-    than 30 deg are one.
-    """
+def _direction_values(attained: FloatArray, poses: Poses) -> Iterator[Value]:
+    """Yield vAP of each pose that is attained more than once; the direction is from the pose before."""
     centre = attained.mean(axis=0)
-    for group in poses.visited_again:
-        own = [k for k in group if k > 0]
-        ways = [poses.position[k] - poses.position[k - 1] for k in own]
-        pairs = [(own[i], own[j]) for i, j in combinations(range(len(own)), 2) if _differ(ways[i], ways[j])]
+    groups: list[list[int]] = []
+    for k in range(len(poses)):
+        group = next((group for group in groups if poses.is_same(group[0], k)), None)
+        if group is None:
+            groups.append([k])
+        else:
+            group.append(k)
+    for group in groups:
+        steps = {k: poses.position[k] - poses.position[k - 1] for k in group if k > 0}
+        pairs = [(a, b) for a, b in combinations(steps, 2) if _is_other_direction(steps[a], steps[b])]
         if pairs:
-            apart = max(float(np.linalg.norm(centre[a] - centre[b])) for a, b in pairs)
-            yield "vAP", f"poses {', '.join(str(k + 1) for k in group)}", apart
+            largest = max(float(np.linalg.norm(centre[a] - centre[b])) for a, b in pairs)
+            yield "vAP", f"poses {', '.join(str(k + 1) for k in group)}", largest
 
 
-def _differ(first: FloatArray, second: FloatArray) -> bool:
-    """Tell whether two directions, shape (3,) each, are at least 30 deg apart."""
+def _is_other_direction(first: FloatArray, second: FloatArray) -> bool:
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
-    return size > 0.0 and float(first @ second) <= size * np.cos(CORNER)
+    return size > 0.0 and float(first @ second) <= size * np.cos(CORNER_ANGLE)
 
 
-def _drift(attained: FloatArray, poses: Poses, at: Sequence[str]) -> Iterator[Found]:
-    """Yield dAP and dRP: how much AP and RP change from the first tenth of the cycles to the last."""
-    count = -(-len(attained) // TENTH)
+def _drift_values(attained: FloatArray, poses: Poses, names: Sequence[str]) -> Iterator[Value]:
+    count = -(-len(attained) // DRIFT_PARTS)
     parts = attained[:count], attained[-count:]
-    several = len(attained) > 1
-    accuracies = [accuracy(one, poses.position) for one in parts]
-    yield from _each("dAP", at, np.abs(accuracies[1] - accuracies[0]) if several else None)
-    first, last = (repeatability(one) for one in parts)
-    yield from _each("dRP", at, None if first is None or last is None else np.abs(last - first))
+    first, last = (accuracy(part, poses.position) for part in parts)
+    yield from values_at("dAP", names, np.abs(last - first) if len(attained) > 1 else None)
+    before, after = (repeatability(part) for part in parts)
+    yield from values_at("dRP", names, None if before is None or after is None else np.abs(after - before))

@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding
-from urmpipe_pipeline.iso9283.criteria import ANGLES, MEANING, UNITS, Criterion, fewest_cycles
+from urmpipe_pipeline.iso9283.criteria import ANGLES, MEANING, UNITS, Criterion, min_cycles
 from urmpipe_pipeline.iso9283.result import CutPath, Cycle, FailedCycle, IsoTest
 from urmpipe_pipeline.presentation.digits import allowed_words, held, written
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, rows_table, spot_at
@@ -184,7 +184,7 @@ def value_of(one: Criterion | None) -> Value | None:
     if one is None:
         return None
     return Value(
-        one.value, shown_unit(one.unit), one.tolerance, one.verdict, one.used, signed=one.name == "AV"
+        one.value, shown_unit(one.unit), one.tolerance, one.verdict, one.utilisation, signed=one.name == "AV"
     )
 
 
@@ -195,7 +195,9 @@ def tolerance_of(one: Criterion) -> Value:
 
 def worst_first(criteria: Iterable[Criterion]) -> list[Criterion]:
     """Return criteria by the share of their tolerance that they use up; those without one stand behind."""
-    return sorted(criteria, key=lambda one: -1.0 if one.used is None else one.used, reverse=True)
+    return sorted(
+        criteria, key=lambda one: -1.0 if one.utilisation is None else one.utilisation, reverse=True
+    )
 
 
 def decisive(test: IsoTest, part: str = "") -> Criterion | None:
@@ -236,7 +238,7 @@ def tolerance_words(tolerance: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {allowed_words(value)}" for name, value in allowed)
 
 
-def failed_words(cycle: FailedCycle) -> str:
+def format_failed_cycle(cycle: FailedCycle) -> str:
     """Return which rows a failed cycle has, how far from the command it is, and why it failed."""
     return f"{_rows_and_distance(cycle)}: {cycle.reason}"
 
@@ -258,7 +260,7 @@ def not_judged_findings(test: IsoTest) -> list[Finding]:
         Finding(
             parameter="tolerance",
             found=f"{one.name} of {test.cycle_count}: not judged",
-            allowed=f"{one.name} of {fewest_cycles(one.name)} cycles or more",
+            allowed=f"{one.name} of {min_cycles(one.name)} cycles or more",
         )
         for one in test.not_judged
     ]

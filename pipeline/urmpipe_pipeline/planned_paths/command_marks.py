@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_pipeline.iso9283.command_path import CORNER, Bend, Stop
+from urmpipe_pipeline.iso9283.command_path import CORNER_ANGLE, RoundedCorner, Stop
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 
-def bends_of(plan: PlannedPath) -> tuple[Bend, ...]:
+def bends_of(plan: PlannedPath) -> tuple[RoundedCorner, ...]:
     """Return the corners that arcs of a plan round by 30 deg or more, each with its times."""
     arcs = [k for k, kind in enumerate(plan.path.kinds) if kind == "arc"]
     times, angle = plan.segment_times.tolist(), plan.path.length / np.maximum(plan.path.radius, 1e-12)
     return tuple(
-        Bend(times[k], times[k + 1], (float(x), float(y), float(z)))
+        RoundedCorner(times[k], times[k + 1], (float(x), float(y), float(z)))
         for k, (x, y, z) in zip(arcs, plan.corners, strict=True)
-        if CORNER - 1e-9 <= angle[k] < np.pi and np.isfinite(x)
+        if CORNER_ANGLE - 1e-9 <= angle[k] < np.pi and np.isfinite(x)
     )
 
 

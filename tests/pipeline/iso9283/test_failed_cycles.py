@@ -20,7 +20,7 @@ from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.iso import IsoOptions
+from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.results import present, read_recording
 
 TICK = 0.02  # s

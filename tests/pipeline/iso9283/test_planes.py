@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -199,6 +200,21 @@ def test_a_stop_is_no_corner(tmp_path: Path) -> None:
     path = path_of(told(reference, logs(tmp_path, [values] * 2), planes=6))
     assert not path.corners
     np.testing.assert_allclose(path.s, (np.arange(6) + 0.5) * 0.1, atol=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("corners", "count", "s"),  # of even planes one is at a corner with a rest, at 0.5 m and 0.2 m
+    [(ZONED, 3, (0.1, 0.3, 0.4)), (((0, 0, 0), (0.2, 0, 0), (0, 0, 0)), 1, (0.1,))],
+)
+def test_a_plane_at_a_stop_where_the_path_turns_off_moves_back(
+    corners: Sequence[Sequence[float]], count: int, s: tuple[float, ...], tmp_path: Path
+) -> None:
+    values = along(corners, 0.1, rest=0.2, rests=range(1, len(corners) - 1))
+    reference = written(tmp_path / "command.csv", values)
+    cycles = [values + offset * np.array([1.0, 1.0, 0.0]) for offset in (-1e-3, 1e-3)]
+    test = told(reference, logs(tmp_path, cycles), planes=count)
+    assert not test.failed_cycles
+    np.testing.assert_allclose(path_of(test).s, s, atol=EXACT)
 
 
 def test_a_cycle_that_turns_back_before_a_plane_is_left_out(tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.exports import exports
-from urmpipe_pipeline.comparison.iso import IsoOptions
-from urmpipe_pipeline.iso9283.criteria import UNITS, judged
+from urmpipe_pipeline.iso9283.criteria import UNITS, judge_criterion
+from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.iso9283.tables import meaning, tolerance_words, value_of, worst_first
 from urmpipe_pipeline.outputs import safe_output
@@ -127,7 +127,7 @@ def test_the_criteria_stand_worst_first_and_others_behind(shown: Presentation, i
         ]
         assert found["cycles"] == [4] * len(found["name"])
     judged_ones = cells(first)
-    used = [there(by_name[name].used) for name in judged_ones["name"]]
+    used = [there(by_name[name].utilisation) for name in judged_ones["name"]]
     assert set(judged_ones["name"]) == set(ALLOWED) and used == sorted(used, reverse=True)
     assert judged_ones["tolerance"] == [ALLOWED[name] for name in judged_ones["name"]]
     assert judged_ones["verdict"] == [Judged(by_name[name].verdict) for name in judged_ones["name"]]
@@ -184,12 +184,12 @@ def test_rows_and_exports_are_the_criteria(result: Comparison, iso: IsoTest, sho
 
 
 def test_a_share_is_shown_in_percent_and_a_speed_in_m_per_s() -> None:
-    away, fast = judged("AV", None, -0.05, 3, {"AV": 0.1}), judged("FV", None, 0.002, 3, {})
+    away, fast = judge_criterion("AV", None, -0.05, 3, {"AV": 0.1}), judge_criterion("FV", None, 0.002, 3, {})
     assert (there(value_of(away)).unit, there(value_of(fast)).unit) == ("%", "m/s")
     assert (
         tolerance_words({"AP": 4e-4, "AV": 0.05, "AP_rz": math.pi / 180}) == "AP 0.4 mm, AV 5 %, AP_rz 1 deg"
     )
-    near = judged("AP", None, 1e-6, 3, {"AP": 1.1e-6})
+    near = judge_criterion("AP", None, 1e-6, 3, {"AP": 1.1e-6})
     assert worst_first([away, fast, near]) == [near, away, fast]
 
 

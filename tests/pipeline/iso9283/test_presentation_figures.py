@@ -19,7 +19,7 @@ from repeated import along
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.iso import IsoOptions
+from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.iso9283.figures import (
     AROUND,
     FACTORS,
