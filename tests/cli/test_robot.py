@@ -96,7 +96,7 @@ def test_show_tells_masses_gravity_efforts_and_drives(urmpipe: Any, tmp_path: Pa
     (tmp_path / "arm.toml").write_text(HEAVY, encoding="utf-8")
     ran = urmpipe("robot", "show", "arm.toml")
     assert (ran.code, ran.err) == (
-        0, "warning: the mass of finger is left out: this link moves by a joint of its own\n",
+        0, "warning: the mass of finger is left out: this link moves by a joint outside the chain\n",
     )  # fmt: skip
     lines = [" ".join(line.split()) for line in ran.out.splitlines()]
     assert "Gravity: 0, 9.81, 0 m/s²" in lines

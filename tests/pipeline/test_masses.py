@@ -12,12 +12,14 @@ def test_links_whose_masses_are_left_out_are_named() -> None:
     joints = (Joint("j"),)
     assert mass_warnings(Chain("arm", joints)) == []
     assert mass_warnings(Chain("arm", joints, left_out=("finger",))) == [
-        LogWarning("mass-left-out", "the mass of finger is left out: this link moves by a joint of its own")
+        LogWarning(
+            "mass-left-out", "the mass of finger is left out: this link moves by a joint outside the chain"
+        )
     ]
     assert mass_warnings(Chain("arm", joints, left_out=("left", "right"))) == [
         LogWarning(
             "mass-left-out",
-            "the masses of left, right are left out: these links move by joints of their own",
+            "the masses of left, right are left out: these links move by joints outside the chain",
         )
     ]
 

@@ -1,129 +1,120 @@
-"""The uniform time grid of a run: the log's own samples where they are regular, else a resampling.
+"""The uniform time grid of a run: the rows of the log where they are regular, else a resampling.
 
-Times are integer nanoseconds from the log's first row. Nothing is upsampled in silence, and nothing is
-interpolated across a gap, or across a step of a joint that no motion explains.
+- `row_clock`: the clock of the rows; a regular one also where the timestamps are quantised.
+- `make_grid`: the grid, with warnings about every change.
+- `Grid.resample`, `Grid.resample_joints`: linear interpolation; missing values inside gaps, and across a step
+  of a joint that no motion explains.
+
+Times are integer nanoseconds from the first row of the log.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, is_inside_gap
 from urmpipe_pipeline.sources.clocks.quantised import Regular, behind_rounded
 
-REGULAR = 0.01
-"""A log is regular if no sample is further from its place on the grid than this share of the period."""
-
-ROUNDING_NS = 1000
-"""Clocks are printed to the microsecond or finer: so much beyond the last known time is still at it."""
-
-RESAMPLED = "resampled"
-"""The kind of the warning that every run has whose grid is not the rows of its log."""
-
-MOST_BYTES = 256 << 20
-"""Bytes of a run on a grid, where the rows of its log do not hold as many: more come of a broken clock or a
-mistyped period."""
-
-FINER = 8
-"""A grid may have so many samples for each row of its log, however many these are."""
-
-_ALWAYS = 31
-"""Numbers of a sample beside three a joint: its time, the tool centre point with its rates."""
+REGULAR = 0.01  # share of the period: no sample of a regular log is further from its place on the grid
+ROUNDING_NS = 1000  # clocks are printed to the microsecond or finer: a time this far outside is at the end
+RESAMPLED = "resampled"  # kind of the warning of every run whose grid is not the rows of its log
+MAX_BYTES = 256 << 20  # of a run on a grid; more come from a broken clock or a mistyped period
+MAX_SAMPLES_PER_ROW = 8  # samples of a grid for each row of its log, also above MAX_BYTES
+_VALUES_PER_SAMPLE = 31  # the time and the tool centre point with its rates; each joint has three more
 
 
 class RowClock(NamedTuple):
-    """The clock behind the rows of a log.
+    """The clock of the rows of a log.
 
     Attributes:
-        t_ns: Its times of the rows in integer [ns], strictly increasing, shape (n,): their own, or those of
-            the regular clock behind rounded ones.
-        period: Of a regular clock its mean, else the median, in [ns]; 0 of a single row.
-        regular: Whether it is regular.
-        rounded: What is seen behind rounded times; None where they stand as they are.
+        t_ns: Times of the rows in integer [ns], strictly increasing, shape (n,); of quantised timestamps the
+            regular times.
+        period: The mean period of a regular clock, else the median, in [ns]; 0 for a single row.
+        regular: Whether the clock is regular.
+        quantised: The regular clock that explains quantised timestamps; None if they are used as they are.
     """
 
     t_ns: IntArray
     period: float
     regular: bool
-    rounded: Regular | None = None
+    quantised: Regular | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Grid:
-    """Where a run is sampled.
+class Grid(NamedTuple):
+    """The samples of a run.
 
     Attributes:
-        t_ns: Times from the log's first row in integer [ns], shape (g,).
+        t_ns: Times from the first row of the log in integer [ns], shape (g,).
         tsp: Sampling period in [s]; 0 for a single sample.
-        own: True if each sample is a row of the log, at its own time or that of the clock rounded to it.
-        source_ns: Times of the rows in integer [ns], of rounded ones those of the clock behind, shape (n,).
+        is_rows: Whether each sample is a row of the log.
+        source_ns: Times of the rows by `RowClock` in integer [ns], shape (n,).
         warnings: What was changed.
     """
 
     t_ns: IntArray
     tsp: float
-    own: bool
+    is_rows: bool
     source_ns: IntArray
     warnings: tuple[LogWarning, ...]
 
     def resample(self, values: FloatArray) -> FloatArray:
         """Return values in any unit, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps."""
-        if self.own:
-            return values
-        return interpolate(self.t_ns, self.source_ns, values)
+        return values if self.is_rows else interpolate(self.t_ns, self.source_ns, values)
 
     def resample_joints(
         self, values: FloatArray, unresolved: IntArray
     ) -> tuple[FloatArray, tuple[LogWarning, ...]]:
-        """Return joint values on the grid; NaN inside gaps and between the rows of an unresolved step.
+        """Return joint values on the grid, NaN inside gaps and unresolved steps, and a warning.
 
-        Values, repolarized, are in [rad] or [m], shape (n, joints), on the grid (g, joints). Steps that no
-        motion explains are row before, row after and joint index, shape (u, 3): a warning counts what was
-        left open.
+        Args:
+            values: Repolarized joint values in [rad] or [m], shape (n, joints); on the grid (g, joints).
+            unresolved: Row before, row after and joint index of steps that no motion explains, shape (u, 3).
         """
         result = self.resample(values)
-        if self.own or not len(unresolved):
+        if self.is_rows or not len(unresolved):
             return result, ()
-        inside = inside_spans(*self._between(unresolved), unresolved[:, 2], result.shape)
-        left = int(np.count_nonzero((inside & ~np.isnan(result)).any(axis=1)))
+        inside = mark_spans(*self._between(unresolved), unresolved[:, 2], result.shape)
+        count = int(np.count_nonzero((inside & ~np.isnan(result)).any(axis=1)))
         result[inside] = np.nan
-        said = f"{left} grid samples lie inside steps of a joint that no motion explains and have no value"
-        return result, (LogWarning("step-left-open", said),) if left else ()
+        message = f"{count} grid samples lie inside steps of a joint that no motion explains"
+        return result, (LogWarning("step-left-open", f"{message} and have no value"),) if count else ()
 
-    def steps(self, rows: IntArray) -> IntArray:
-        """Return the steps of the grid that steps between rows reach into: the first and the last one.
+    def find_steps(self, row_steps: IntArray) -> IntArray:
+        """Return the first and last step of the grid within each step between rows, shape (m, 3).
 
-        Rows are row before, row after and joint index, shape (b, 3). Grid steps are told by the sample before
-        them, and joint index, shape (m, 3).
+        Args:
+            row_steps: Row before, row after and joint index, shape (b, 3).
+
+        Returns:
+            Sample before the first grid step, sample before the last one, and joint index.
         """
-        if self.own:
-            return np.column_stack((rows[:, 0], rows[:, 1] - 1, rows[:, 2]))
-        first, end = self._between(rows)
+        before, after, joints = row_steps.T
+        if self.is_rows:
+            return np.column_stack((before, after - 1, joints))
+        first, end = self._between(row_steps)
         last = np.minimum(end - 1, len(self.t_ns) - 2)
-        return np.column_stack((first - 1, last, rows[:, 2]))[first - 1 <= last]
+        return np.column_stack((first - 1, last, joints))[first - 1 <= last]
 
-    def _between(self, rows: IntArray) -> tuple[IntArray, IntArray]:
+    def _between(self, row_steps: IntArray) -> tuple[IntArray, IntArray]:
         """Return the first grid sample after each row before, and the first at or after the row after."""
-        first = np.searchsorted(self.t_ns, self.source_ns[rows[:, 0]], side="right")
-        return first, np.searchsorted(self.t_ns, self.source_ns[rows[:, 1]], side="left")
+        first = np.searchsorted(self.t_ns, self.source_ns[row_steps[:, 0]], side="right")
+        return first, np.searchsorted(self.t_ns, self.source_ns[row_steps[:, 1]], side="left")
 
 
 def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> FloatArray:
-    """Return values at given times: linear between the known ones, NaN outside them and inside gaps.
+    """Interpolate linearly; NaN outside the known times and inside their gaps.
 
     Args:
-        at_ns: Times wanted in integer [ns], shape (m,).
-        known_ns: Times known in integer [ns], strictly increasing, shape (n,).
+        at_ns: Times to interpolate at in integer [ns], shape (m,).
+        known_ns: Known times in integer [ns], strictly increasing, shape (n,).
         values: Values at the known times, in any unit, shape (n, k).
 
     Returns:
-        Values at the times wanted, in the same unit, shape (m, k).
+        Values in the same unit, shape (m, k).
     """
     x, known = at_ns.astype(np.float64), known_ns.astype(np.float64)
     within = np.clip(x, known[0], known[-1])
@@ -135,10 +126,8 @@ def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> Floa
     return result
 
 
-def inside_spans(
-    first: IntArray, end: IntArray, columns: IntArray, shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    """Return a mask of rows and columns of some shape that is true in some spans of rows.
+def mark_spans(first: IntArray, end: IntArray, columns: IntArray, shape: tuple[int, ...]) -> BoolArray:
+    """Return a mask of the given shape (rows, columns) that is true within spans of rows.
 
     Each span has its first row, the row after its last one and its column, all of shape (m,).
     """
@@ -156,8 +145,8 @@ def row_clock(t_ns: IntArray) -> RowClock:
     ideal = t_ns[0] + np.arange(len(t_ns)) * mean
     if np.max(np.abs(t_ns - ideal)) <= REGULAR * mean:
         return RowClock(t_ns, mean, True)
-    if rounded := behind_rounded(t_ns):
-        return RowClock(rounded.t_ns - rounded.t_ns[0] + t_ns[0], rounded.period, True, rounded)
+    if quantised := behind_rounded(t_ns):
+        return RowClock(quantised.t_ns - quantised.t_ns[0] + t_ns[0], quantised.period, True, quantised)
     return RowClock(t_ns, float(np.median(np.diff(t_ns))), False)
 
 
@@ -166,57 +155,53 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
 
     Args:
         log: The log, its times strictly increasing.
-        tsp: The period wanted in [s]; None for the log's own, which is its rows where they are
-            regular (as far as the resolution of their clock tells) and else its median period.
+        tsp: Period in [s]; None for that of the log: its rows where they are regular within the resolution of
+            their clock, else its median period.
 
     Raises:
-        LogError: If it would have more samples than fit in memory.
+        LogError: If the grid would have more samples than fit in memory.
     """
-    clock = row_clock(log.t_ns)
-    own, period = clock.t_ns, clock.period
-    if len(own) < 2:
-        return Grid(own, tsp or 0.0, True, own, ())
-    wanted = period if tsp is None else tsp * 1e9
-    told = () if clock.rounded is None else (_rounded(clock.rounded),)
-    if clock.regular and abs(wanted - period) <= REGULAR * period / len(own):
-        return Grid(own, period / 1e9, True, own, told)
-    count = int((own[-1] - own[0]) / wanted + 1e-6) + 1
-    _refuse_endless(log, wanted, count)
-    grid = np.rint(np.arange(count) * wanted).astype(np.int64) + own[0]
-    in_gap = is_inside_gap(grid, own)
-    return Grid(grid, wanted / 1e9, False, own, (*told, *_changes(log, wanted, count, in_gap)))
+    t_ns, own_period, is_regular, quantised = row_clock(log.t_ns)
+    if len(t_ns) < 2:
+        return Grid(t_ns, tsp or 0.0, True, t_ns, ())
+    period = own_period if tsp is None else tsp * 1e9
+    warnings = []
+    if quantised:
+        message = f"the times are those of a regular clock of {quantised.period / 1e6:.6g} ms"
+        message += f" in steps of {quantised.resolution / 1e6:.6g} ms: the rows are taken as regular"
+        warnings.append(LogWarning("clock-rounded", message))
+    if is_regular and abs(period - own_period) <= REGULAR * own_period / len(t_ns):
+        return Grid(t_ns, own_period / 1e9, True, t_ns, tuple(warnings))
+    count = int((t_ns[-1] - t_ns[0]) / period + 1e-6) + 1
+    _check_size(log, period, count)
+    grid_ns = np.rint(np.arange(count) * period).astype(np.int64) + t_ns[0]
+    missing = int(is_inside_gap(grid_ns, t_ns).sum())
+    warnings += _resampling_warnings(log, period, count, missing)
+    return Grid(grid_ns, period / 1e9, False, t_ns, tuple(warnings))
 
 
-def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
-    """Raise a `LogError` if a grid has more samples than its log or the memory accounts for."""
-    most = max(MOST_BYTES // (8 * (_ALWAYS + 3 * len(log.joints))), FINER * log.rows)
-    if count <= most:
+def _check_size(log: JointLog, period: float, count: int) -> None:
+    bytes_per_sample = 8 * (_VALUES_PER_SAMPLE + 3 * len(log.joints))
+    allowed = max(MAX_BYTES // bytes_per_sample, MAX_SAMPLES_PER_ROW * log.rows)
+    if count <= allowed:
         return
     steps = np.diff(log.t_ns)
     row = int(np.argmax(steps)) + 2
-    found = f"found {count} samples every {wanted / 1e6:.6g} ms for {log.rows} rows"
-    gap = f"{float(steps.max()) / 1e9:.6g} s pass before row {row}"
-    message = f"{found}, {gap}, allowed: {most} samples; a clock without such a gap"
+    message = f"found {count} samples every {period / 1e6:.6g} ms for {log.rows} rows"
+    message += f", {float(steps.max()) / 1e9:.6g} s pass before row {row}"
+    message += f", allowed: {allowed} samples; a clock without such a gap"
     hints = (Hint("tsp", None, "sets a longer period"),)
     raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row, hints=hints))
 
 
-def _rounded(clock: Regular) -> LogWarning:
-    """Say that a regular clock is seen behind rounded times."""
-    said = f"the times are those of a regular clock of {clock.period / 1e6:.6g} ms"
-    steps = f"in steps of {clock.resolution / 1e6:.6g} ms: the rows are taken as regular"
-    return LogWarning("clock-rounded", f"{said} {steps}")
-
-
-def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]) -> list[LogWarning]:
-    """Say what the resampling did."""
+def _resampling_warnings(log: JointLog, period: float, count: int, missing: int) -> list[LogWarning]:
     median = float(np.median(np.diff(log.t_ns)))
-    said = f"{log.rows} rows with a median period of {median / 1e6:.6g} ms became {count} samples"
-    left = int(in_gap.sum())
-    inside = f"; {left} of them lie inside gaps and have no value" if left else ""
-    warnings = [LogWarning(RESAMPLED, f"{said} every {wanted / 1e6:.6g} ms (linear){inside}")]
-    if wanted < (1.0 - REGULAR) * median:
-        said = f"the grid of {wanted / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms"
-        why = "the samples between its rows are interpolated, not measured"
-        warnings.append(LogWarning("upsampled", f"{said}: {why}"))
+    message = f"{log.rows} rows with a median period of {median / 1e6:.6g} ms became {count} samples"
+    message += f" every {period / 1e6:.6g} ms (linear)"
+    message += f"; {missing} of them lie inside gaps and have no value" if missing else ""
+    warnings = [LogWarning(RESAMPLED, message)]
+    if period < (1.0 - REGULAR) * median:
+        message = f"the grid of {period / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms"
+        message += ": the samples between its rows are interpolated, not measured"
+        warnings.append(LogWarning("upsampled", message))
     return warnings

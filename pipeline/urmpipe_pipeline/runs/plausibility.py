@@ -6,43 +6,51 @@
 - `limit_warnings`, `speed_warning`: joints that leave their limits or move faster than they can.
 
 The values stay as they are: each check returns warnings. A check is silent where noise, the number format of
-the file or an uneven clock explains what it sees.
+the file or an uneven clock explains the values.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import FloatArray, IntArray, row_blocks
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_blocks
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.repolarization.interval import fold_rows
 from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
 
-COARSEST = 0.02
-"""No number format is taken to be coarser than this in [rad] or [m]: whole degrees are finer."""
+JOINT_LIMIT = "joint-limit"
+SPEED_LIMIT = "speed-limit"
+
+MAX_RESOLUTION = 0.02  # rad or m, of a number format: whole degrees are finer
+OUTLIER_RATIO = 5.0  # step to an outlier / largest step between the other rows
+MIN_OUTLIER_STEP = 0.01  # rad or m, in addition to the resolution of the number format
+MAX_DECELERATION = 100.0  # rad/s2 or m/s2; no joint of an arm reaches it, a smaller one may be a hard start
+MIN_ROWS = 10  # of a log in which a row can be an outlier
+MIN_RUNS = 10  # runs of repeated rows that make a pattern
+MIN_EVEN_SHARE = 0.95  # share of the runs of about equal length if the controller is slow
+MAX_RUN_RATIO = 3  # length of a run / usual length; longer runs are an arm at rest
+OVERSHOOT = 1.1  # speed / limit; a controller may pass a nominal limit by a tenth
+NOISE_RATIO = 5.0  # noise step / median second difference; one in a million is larger (Gaussian: 5.8 sigma)
+LIMIT_SLACK = 0.005  # rad or m, since robot files round limits: 6.28 is 0.0032 below a turn
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointMotion:
-    """What the checks look at.
+class JointMotion(NamedTuple):
+    """The motion of a log that the checks use.
 
     Attributes:
-        names: The joints.
-        units: rad or m for each.
-        q: Joint values, repolarized, in [rad] or [m], shape (n, joints), n > 1; NaN where one is missing.
-        t_ns: Times in [ns], shape (n,), strictly increasing.
+        names: Names of the joints.
+        units: rad or m of each joint.
+        q: Repolarized joint values in [rad] or [m], shape (n, joints), n > 1; NaN where one is missing.
+        t_ns: Times in integer [ns], strictly increasing, shape (n,).
         period: Median time between rows in [s].
-        inner: Largest step of each joint between rows other than the first and the last, in [rad] or [m],
-            shape (joints,); NaN where a value is missing.
-        fineness: How far apart the file's number format lets two values of each joint be, in [rad] or [m],
-            shape (joints,).
+        inner_max_step: Largest step of each joint between rows other than the first and the last, in [rad] or
+            [m], shape (joints,); NaN if a value is missing.
+        resolution: Resolution of the number format of each joint in [rad] or [m], shape (joints,).
     """
 
     names: tuple[str, ...]
@@ -50,22 +58,25 @@ class JointMotion:
     q: FloatArray
     t_ns: IntArray
     period: float
-    inner: FloatArray
-    fineness: FloatArray
+    inner_max_step: FloatArray
+    resolution: FloatArray
 
     @classmethod
-    def of(cls, log: JointLog, q: FloatArray, turning: NDArray[np.bool_]) -> JointMotion:
+    def of(cls, log: JointLog, q: FloatArray, revolute: BoolArray) -> JointMotion:
         """Return the motion of a log.
 
-        Its joints, repolarized, are in [rad] or [m], shape (n, joints); which turn, shape (joints,).
+        Args:
+            log: The log.
+            q: Its repolarized joint values in [rad] or [m], shape (n, joints).
+            revolute: Which joints are revolute, shape (joints,).
         """
         inner = largest_steps(q[1:-1]) if len(q) > 3 else np.zeros(q.shape[1])
-        units = tuple("rad" if turns else "m" for turns in turning)
-        return cls(log.joints, units, q, log.t_ns, log.period, inner, format_steps(log))
+        units = tuple("rad" if turns else "m" for turns in revolute)
+        return cls(log.joints, units, q, log.t_ns, log.period, inner, format_resolution(log))
 
     @property
     def ends(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """The first and the last row, each with the row beside it."""
+        """The first and the last row, each with its neighbour."""
         last = len(self.q) - 1
         return (0, 1), (last, last - 1)
 
@@ -80,179 +91,149 @@ def largest_steps(q: FloatArray) -> FloatArray:
     return np.asarray(np.max(steps, axis=0))
 
 
-def format_steps(log: JointLog) -> FloatArray:
-    """Return how far apart the file's number format lets two values of a joint be, in SI, shape (joints,).
+def format_resolution(log: JointLog) -> FloatArray:
+    """Return the resolution of the number format of each joint in [rad] or [m], shape (joints,).
 
-    Seen in samples of the values: the decimals that they all get by with, or the significant digits where
-    the file was seen to be quantised; 0 for a format that is finer than matters.
+    It is inferred from samples of the values: from the decimals that are enough for all of them, or from the
+    significant digits of a quantised file; 0 for a format with more than four decimals.
     """
     columns = {column.name: column for column in log.columns if column.role == "joint"}
     rows = np.linspace(0, len(log.q) - 1, 256).astype(np.int64)
-    steps = np.zeros(len(log.joints))
+    resolution = np.zeros(len(log.joints))
     for j, name in enumerate(log.joints):
         if name in columns:
             factor, offset = columns[name].factor, columns[name].offset
-            written = log.q[rows, j] / factor - offset  # but for the sign
-            steps[j] = min(_format_step(written[~np.isnan(written)], log.digits) * factor, COARSEST)
-    return steps
+            numbers = log.q[rows, j] / factor - offset  # the sign does not matter
+            in_file = _number_resolution(numbers[~np.isnan(numbers)], log.digits)
+            resolution[j] = min(in_file * factor, MAX_RESOLUTION)
+    return resolution
 
 
-def _format_step(written: FloatArray, digits: int | None) -> float:
-    """Return the step of the format of some values in the file's own unit."""
+def _number_resolution(numbers: FloatArray, digits: int | None) -> float:
     if digits is not None:
-        largest = np.abs(written).max(initial=0.0)
+        largest = np.abs(numbers).max(initial=0.0)
         return float(10.0 ** (np.floor(np.log10(largest)) + 1 - digits)) if largest > 0.0 else 0.0
     for decimals in range(5):
-        scaled = written * 10.0**decimals
+        scaled = numbers * 10.0**decimals
         if np.allclose(scaled, np.rint(scaled), rtol=0.0, atol=1e-6):
             return float(10.0**-decimals)
     return 0.0
-
-
-JOINT_LIMIT = "joint-limit"
-SPEED_LIMIT = "speed-limit"
-
-FAR = 5.0
-"""An outlying end is further off than so many times the largest step between the other rows."""
-
-LEAST_STEP = 0.01
-"""A step below this in [rad] or [m], beside that of the number format, makes no outlier."""
-
-MAX_DECELERATION = 100.0
-"""Acceleration in [rad/s2] or [m/s2] that no joint of an arm reaches: a smaller one may be a hard start."""
-
-LEAST_ROWS = 10
-"""A log of fewer rows tells too little of the motion to call one of them an outlier."""
-
-LEAST_RUNS = 10
-"""So many runs of repeated rows make a pattern."""
-
-EVEN_SHARE = 0.95
-"""Share of the runs of repeated rows that are about equally long where a controller is slow."""
-
-REST = 3
-"""A run of repeated rows so many times longer than the usual one is an arm that stands still."""
-
-OVERSHOOT = 1.1
-"""A controller may pass a nominal limit of speed by a tenth."""
-
-NOISE = 5.0
-"""Times the median second difference: no noise step in a million is larger (Gaussian noise: 5.8 sigma)."""
-
-ROUNDED_LIMIT = 0.005
-"""Robot files round their limits, in [rad] or [m]: 6.28 is 0.0032 short of a turn."""
 
 
 def plausibility_warnings(
     log: JointLog,
     q: FloatArray,
     robot: Chain | None,
-    turning: NDArray[np.bool_],
-    told: NDArray[np.int64],
+    revolute: BoolArray,
+    reported: IntArray,
     *,
     timed: bool,
     tsp: float = 0.0,
 ) -> list[LogWarning]:
-    """Return what an arm would hardly have done.
+    """Return warnings about implausible motion: outliers, repeated samples, limits, speeds.
 
     Args:
         log: The log.
-        q: Its joint values, repolarized, in [rad] or [m], shape (n, joints).
-        robot: The arm, with its limits; None if it is not known.
-        turning: Which joints turn (the others slide), shape (joints,).
-        told: Row and joint index of steps that a warning speaks of already, shape (u, 2).
-        timed: Whether the times are those of the motion; else nothing is said of speeds.
-        tsp: Period of the grid in [s]: one as long as values stay takes each of them once.
+        q: Its repolarized joint values in [rad] or [m], shape (n, joints).
+        robot: The arm, with its limits; None if it is unknown.
+        revolute: Which joints are revolute (the others are prismatic), shape (joints,).
+        reported: Row and joint index of steps that other warnings report, shape (u, 2).
+        timed: Whether the times are those of the motion; else speeds are not checked.
+        tsp: Period of the grid in [s]: if values stay the same no longer than that, it takes each of them
+            once.
     """
     if len(q) < 2 or not q.shape[1]:
         return []
-    motion = JointMotion.of(log, q, turning)
+    motion = JointMotion.of(log, q, revolute)
     outliers = find_end_outliers(motion)
-    held = mean_repeats(motion)
-    warnings = [*outlier_warnings(motion, outliers), *repeated_sample_warnings(motion, held, tsp)]
+    repeats = mean_repeats(motion)
+    warnings = [*outlier_warnings(motion, outliers), *repeated_sample_warnings(motion, repeats, tsp)]
     if robot is not None:
-        warnings += _beyond_limits(motion, robot)
+        warnings += _limit_warnings(motion, robot)
     if timed:
-        steps = np.maximum(outliers, (1, 0))  # a step belongs to the row that it ends in
-        limits = speed_limits(robot, turning)
-        warnings += speed_warning(motion, limits, np.vstack((told, steps)), held * motion.period)
+        outlier_steps = np.maximum(outliers, (1, 0))  # a step has the index of the row that it ends in
+        limits = speed_limits(robot, revolute)
+        reported = np.vstack((reported, outlier_steps))
+        warnings += speed_warning(motion, limits, reported, repeats * motion.period)
     return warnings
 
 
-def find_end_outliers(motion: JointMotion) -> NDArray[np.int64]:
+def find_end_outliers(motion: JointMotion) -> IntArray:
     """Return row and joint index, shape (k, 2), where the first or last row is off the motion of the others.
 
-    It is if the joint steps there by more than `FAR` times what it does anywhere else, and starts or stops
-    harder than an arm can.
+    The step there is larger than `OUTLIER_RATIO` times any other step of the joint, and takes a larger
+    acceleration than an arm has.
     """
     q, t_ns = motion.q, motion.t_ns
-    found = [np.empty((0, 2), dtype=np.int64)]
-    for row, beside in motion.ends if len(q) >= LEAST_ROWS else ():
-        dt = max(abs(int(t_ns[row]) - int(t_ns[beside])) / 1e9, motion.period)
-        least = np.maximum(
-            LEAST_STEP + motion.fineness, np.maximum(FAR * motion.inner, MAX_DECELERATION * dt**2)
-        )
-        joints = np.flatnonzero(np.abs(q[row] - q[beside]) > least)  # never where values are missing: NaN
-        found.append(np.column_stack((np.full(len(joints), row), joints)))
-    return np.concatenate(found)
+    outliers = [np.empty((0, 2), dtype=np.int64)]
+    for row, neighbour in motion.ends if len(q) >= MIN_ROWS else ():
+        dt = max(abs(int(t_ns[row]) - int(t_ns[neighbour])) / 1e9, motion.period)
+        threshold = np.maximum(OUTLIER_RATIO * motion.inner_max_step, MAX_DECELERATION * dt**2)
+        threshold = np.maximum(MIN_OUTLIER_STEP + motion.resolution, threshold)
+        joints = np.flatnonzero(np.abs(q[row] - q[neighbour]) > threshold)  # never if values are missing: NaN
+        outliers.append(np.column_stack((np.full(len(joints), row), joints)))
+    return np.concatenate(outliers)
 
 
-def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[LogWarning]:
-    """Return a warning for each end that is an outlier: which joints are off, and by how much.
+def outlier_warnings(motion: JointMotion, outliers: IntArray) -> list[LogWarning]:
+    """Return a warning for each end with outliers: which joints, and their steps.
 
-    Outliers are row and joint index, shape (k, 2), as `find_end_outliers` returns them.
+    Outliers are row and joint index, shape (k, 2), as from `find_end_outliers`.
     """
     q, warnings = motion.q, []
-    for row, beside in motion.ends:
+    for row, neighbour in motion.ends:
         joints = outliers[outliers[:, 0] == row, 1].tolist()
         if joints:
             steps = ", ".join(
-                f"{motion.names[j]} by {abs(q[row, j] - q[beside, j]):.4g} {motion.units[j]}"
-                f" (other steps: at most {motion.inner[j]:.4g})"
+                f"{motion.names[j]} by {abs(q[row, j] - q[neighbour, j]):.4g} {motion.units[j]}"
+                f" (other steps: at most {motion.inner_max_step[j]:.4g})"
                 for j in joints
             )
-            said = f"an outlier, off the motion of the other rows: {steps}"
-            said = f"{said}; it is kept; remove it from the file if the arm was not there"
-            warnings.append(LogWarning("outlier-last" if row else "outlier-first", said, row + 1))
+            message = f"an outlier, off the motion of the other rows: {steps}"
+            message += "; it is kept; remove it from the file if the arm was not there"
+            warnings.append(LogWarning("outlier-last" if row else "outlier-first", message, row + 1))
     return warnings
 
 
 def mean_repeats(motion: JointMotion) -> float:
-    """Return how many rows a moving arm's values stay bit for bit the same, on average; 1 where they do not.
+    """Return the mean number of rows for which the values of a moving arm stay equal; 1 without a pattern.
 
-    More than 1 is a slow controller polled fast: its differences are stairs. An arm at rest makes few runs
-    of repeated rows, all long; where the numbers are coarse for a slow motion, they change by a digit, one
-    joint here, one there.
+    More than 1 is a slow controller that is polled fast: its differences are stairs. An arm at rest makes few
+    runs of repeated rows, all long. Coarse numbers of a slow motion change by one digit, in one joint at a
+    time.
     """
-    changes = np.flatnonzero(~_repeats(motion.q))
+    changes = np.flatnonzero(~_is_repeated(motion.q))
     runs = np.diff(changes)
-    usual = float(np.median(runs)) if len(runs) >= LEAST_RUNS else 1.0
+    usual = float(np.median(runs)) if len(runs) >= MIN_RUNS else 1.0
     if usual < 2.0:
         return 1.0
-    moving = runs <= REST * usual
+    moving = runs <= MAX_RUN_RATIO * usual
     even = (runs >= 2) & (np.abs(runs - usual) <= max(1.0, usual / 4))
-    if moving.sum() < LEAST_RUNS or even[moving].mean() < EVEN_SHARE or not _in_one_go(motion.q, changes):
+    if moving.sum() < MIN_RUNS or even[moving].mean() < MIN_EVEN_SHARE:
         return 1.0
-    return float(runs[moving].mean())
+    steps = np.abs(motion.q[changes + 1] - motion.q[changes])
+    together = ((steps > 0.0).sum(axis=1) > 1).mean() >= MIN_EVEN_SHARE
+    small, large = np.quantile(np.fmax.reduce(steps, axis=1), (0.1, 0.9))
+    return float(runs[moving].mean()) if together or large > 1.5 * small else 1.0
 
 
-def repeated_sample_warnings(motion: JointMotion, rows: float, tsp: float) -> list[LogWarning]:
-    """Return a warning if values stay for several rows, as `mean_repeats` returns, longer than tsp in [s]."""
-    time = rows * motion.period
-    once = float(f"{time:.4g}")
-    if rows == 1.0 or tsp >= once:
+def repeated_sample_warnings(motion: JointMotion, repeats: float, tsp: float) -> list[LogWarning]:
+    """Return a warning if values stay equal for several rows (`mean_repeats`) and longer than tsp in [s]."""
+    time = repeats * motion.period
+    period = float(f"{time:.4g}")
+    if repeats == 1.0 or tsp >= period:
         return []
-    repeats = _repeats(motion.q)
-    said = f"the joint values change only every {rows:.3g} rows ({time * 1e3:.4g} ms)"
-    count = f"{int(repeats.sum())} of {len(motion.q)} rows repeat the row before"
-    said = f"{said}, {count}: a slow controller polled fast?"
-    hints = (Hint("tsp", once, "takes each value once"),)
-    return [LogWarning("repeated-samples", said, int(np.argmax(repeats)) + 2, hints=hints)]
+    repeated = _is_repeated(motion.q)
+    message = f"the joint values change only every {repeats:.3g} rows ({time * 1e3:.4g} ms)"
+    message += f", {int(repeated.sum())} of {len(motion.q)} rows repeat the row before"
+    message += ": a slow controller polled fast?"
+    hints = (Hint("tsp", period, "takes each value once"),)
+    return [LogWarning("repeated-samples", message, int(np.argmax(repeated)) + 2, hints=hints)]
 
 
-def _repeats(q: FloatArray) -> NDArray[np.bool_]:
-    """Tell which rows, from the second on, are the row before in every joint."""
-    same: NDArray[np.bool_] = q[1:, 0] == q[:-1, 0]
+def _is_repeated(q: FloatArray) -> BoolArray:
+    """Return which rows, from the second on, equal the row before in every joint."""
+    same: BoolArray = q[1:, 0] == q[:-1, 0]
     for j in range(1, q.shape[1]):
         if not same.any():
             break
@@ -260,103 +241,100 @@ def _repeats(q: FloatArray) -> NDArray[np.bool_]:
     return same
 
 
-def _in_one_go(q: FloatArray, changes: NDArray[np.int64]) -> bool:
-    """Tell whether the joints change together, or by steps of several sizes, and not digit by digit."""
-    steps = np.abs(q[changes + 1] - q[changes])
-    together = ((steps > 0.0).sum(axis=1) > 1).mean() >= EVEN_SHARE
-    small, large = np.quantile(np.fmax.reduce(steps, axis=1), (0.1, 0.9))
-    return bool(together or large > 1.5 * small)
-
-
 def limit_warnings(log: JointLog, q: FloatArray, robot: Chain) -> list[LogWarning]:
-    """Return a warning for each joint of a log that leaves the limits of an arm.
+    """Return one warning about the joints of a log that leave the limits of an arm, or none.
 
-    Its joint values are in [rad] or [m], shape (n, joints).
+    Joint values are in [rad] or [m], shape (n, joints).
     """
-    turning = np.array([joint.kind == "revolute" for joint in robot.moving])
-    return _beyond_limits(JointMotion.of(log, q, turning), robot)
+    revolute = np.array([joint.kind == "revolute" for joint in robot.moving])
+    return _limit_warnings(JointMotion.of(log, q, revolute), robot)
 
 
-def _beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
-    """Return a warning if joints leave their limits: which, how often, where first, where worst."""
-    q, slack = motion.q, ROUNDED_LIMIT + motion.fineness
+def _limit_warnings(motion: JointMotion, robot: Chain) -> list[LogWarning]:
+    q, slack = motion.q, LIMIT_SLACK + motion.resolution
     lower, upper = np.array([(joint.lower, joint.upper) for joint in robot.moving]).T
     if not np.isfinite((lower, upper)).any():
         return []
-    kept = (fold_rows(np.minimum, q) >= lower - slack) & (fold_rows(np.maximum, q) <= upper + slack)
-    found = []
-    for j in np.flatnonzero(~kept).tolist():  # also the columns where values are missing: NaN
+    is_within = (fold_rows(np.minimum, q) >= lower - slack) & (fold_rows(np.maximum, q) <= upper + slack)
+    excesses = []
+    for j in np.flatnonzero(~is_within).tolist():  # also the columns with missing values: NaN
         beyond = np.maximum(lower[j] - q[:, j], q[:, j] - upper[j])
         rows = np.flatnonzero(beyond > slack[j])
         if len(rows):
             worst = int(rows[np.argmax(beyond[rows])])
             limits = f"its limits of {lower[j]:.6g} to {upper[j]:.6g} {motion.units[j]}"
-            where = f"in {len(rows)} of {len(q)} rows, at worst {q[worst, j]:.6g} in row {worst + 1}"
-            said = f"{motion.names[j]} is beyond {limits} {where}"
-            found.append(_OfJoint(motion.names[j], rows, float(beyond[worst]), said))
-    check = "check robot, unit, sign and zero"
-    return [LogWarning(JOINT_LIMIT, *_in_one(found, "row", check))] if found else []
+            message = f"{motion.names[j]} is beyond {limits} in {len(rows)} of {len(q)} rows"
+            message += f", at worst {q[worst, j]:.6g} in row {worst + 1}"
+            excesses.append(_Excess(motion.names[j], rows, float(beyond[worst]), message))
+    return _join_excesses(JOINT_LIMIT, excesses, "row", "check robot, unit, sign and zero")
 
 
-def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
-    """Return the largest speed of each joint in [rad/s] or [m/s], shape (joints,).
+def speed_limits(robot: Chain | None, revolute: BoolArray) -> FloatArray:
+    """Return the speed limit of each joint in [rad/s] or [m/s], shape (joints,).
 
-    It is the robot's, else `FASTEST` for one that turns, shape (joints,), else inf.
+    It is that of the robot, else `FASTEST` for revolute joints, shape (joints,), else inf.
     """
-    fallback = np.where(turning, FASTEST, np.inf)
+    fallback = np.where(revolute, FASTEST, np.inf)
     if robot is None:
         return fallback
-    own = np.array([joint.velocity for joint in robot.moving])
-    return np.where(np.isfinite(own), own, fallback)
+    limits = np.array([joint.velocity for joint in robot.moving])
+    return np.where(np.isfinite(limits), limits, fallback)
 
 
 def speed_warning(
-    motion: JointMotion, limits: FloatArray, told: NDArray[np.int64], period: float
+    motion: JointMotion, limits: FloatArray, reported: IntArray, period: float
 ) -> list[LogWarning]:
-    """Return a warning if joints step faster than they can: which, how often, where first, where worst.
+    """Return one warning about the joints that move faster than their limits, or none.
 
-    Rows closer in time than the usual period in [s] are taken to be that far apart: it is their clock that
-    hurries. Limits are in [rad/s] or [m/s], shape (joints,); steps that a warning speaks of already are row
-    and joint index, shape (u, 2).
+    Args:
+        motion: The motion.
+        limits: Speed limits in [rad/s] or [m/s], shape (joints,).
+        reported: Row and joint index of steps that other warnings report, shape (u, 2).
+        period: Usual period in [s], used for rows closer in time: their clock is assumed to be uneven.
     """
     q = motion.q
-    largest = np.max([motion.inner, *(np.abs(q[row] - q[beside]) for row, beside in motion.ends)], axis=0)
-    suspects = np.flatnonzero(~(largest <= OVERSHOOT * limits * period + motion.fineness)).tolist()
+    end_steps = (np.abs(q[row] - q[neighbour]) for row, neighbour in motion.ends)
+    largest = np.max([motion.inner_max_step, *end_steps], axis=0)
+    is_slow = largest <= OVERSHOOT * limits * period + motion.resolution
+    suspects = np.flatnonzero(~is_slow).tolist()  # also the columns with missing values: NaN
     dt = np.maximum(np.diff(motion.t_ns) / 1e9, period) if suspects else np.empty(0)
-    found = []
+    excesses = []
     for j in suspects:
-        steps = np.abs(np.diff(q[:, j]))
-        fast = steps > OVERSHOOT * limits[j] * dt + motion.fineness[j] + _noise(q[:, j])
-        fast[told[told[:, 1] == j, 0] - 1] = False
+        steps, second = np.abs(np.diff(q[:, j])), np.abs(np.diff(q[:, j], 2))
+        second = second[~np.isnan(second)]
+        noise = NOISE_RATIO * float(np.median(second)) if len(second) else 0.0
+        fast = steps > OVERSHOOT * limits[j] * dt + motion.resolution[j] + noise
+        fast[reported[reported[:, 1] == j, 0] - 1] = False
         rows = np.flatnonzero(fast)
         if len(rows):
             speeds = steps[rows] / dt[rows]
-            worst = f"at worst at {speeds.max():.4g} {motion.units[j]}/s to row {rows[np.argmax(speeds)] + 2}"
-            said = f"{motion.names[j]} moves faster than {limits[j]:.4g} {motion.units[j]}/s"
-            said = f"{said} in {len(rows)} of {len(steps)} steps, {worst}"
-            found.append(_OfJoint(motion.names[j], rows + 1, float(speeds.max() / limits[j]), said))
-    return [LogWarning(SPEED_LIMIT, *_in_one(found, "step", "check robot, unit and clock"))] if found else []
+            unit = f"{motion.units[j]}/s"
+            message = f"{motion.names[j]} moves faster than {limits[j]:.4g} {unit}"
+            message += f" in {len(rows)} of {len(steps)} steps"
+            message += f", at worst at {speeds.max():.4g} {unit} to row {rows[np.argmax(speeds)] + 2}"
+            excesses.append(_Excess(motion.names[j], rows + 1, float(speeds.max() / limits[j]), message))
+    return _join_excesses(SPEED_LIMIT, excesses, "step", "check robot, unit and clock")
 
 
-class _OfJoint(NamedTuple):
-    """What is odd of a joint: in which rows, how odd at worst, and said in words."""
+class _Excess(NamedTuple):
+    """Rows, from 0, in which a joint exceeds a limit, the largest excess, and its description."""
 
     name: str
-    rows: NDArray[np.int64]
-    worst: float
-    said: str
+    rows: IntArray
+    largest: float
+    message: str
 
 
-def _in_one(found: list[_OfJoint], place: str, check: str) -> tuple[str, int]:
-    """Return what is odd of some joints in one sentence, the worst in words, and the first row from 1."""
-    worst = max(found, key=lambda one: one.worst)
-    others = [f"{one.name} ({text.counted(len(one.rows), place)})" for one in found if one is not worst]
-    said = f"{worst.said}; also {text.enumerated(others)}" if others else worst.said
-    return f"{said}: {check}", min(int(one.rows[0]) for one in found) + 1
-
-
-def _noise(column: FloatArray) -> float:
-    """Return how large a step is that noise alone may make, from what is not smooth in a column."""
-    second = np.abs(np.diff(column, 2))
-    second = second[~np.isnan(second)]
-    return NOISE * float(np.median(second)) if len(second) else 0.0
+def _join_excesses(kind: str, excesses: list[_Excess], noun: str, advice: str) -> list[LogWarning]:
+    """Return one warning at the first row, with the description of the worst joint."""
+    if not excesses:
+        return []
+    worst = max(excesses, key=lambda excess: excess.largest)
+    joints = [
+        f"{excess.name} ({text.counted(len(excess.rows), noun)})"
+        for excess in excesses
+        if excess is not worst
+    ]
+    message = f"{worst.message}; also {text.enumerated(joints)}" if joints else worst.message
+    row = min(int(excess.rows[0]) for excess in excesses) + 1
+    return [LogWarning(kind, f"{message}: {advice}", row)]

@@ -1,4 +1,9 @@
-"""A run: an ingested log as plain arrays, a table (`to_frame`) and JSON (`to_dict`); and a slice of it."""
+"""A run: an ingested log as plain arrays.
+
+- `Run`: the arrays, as a table (`to_frame`) and as JSON (`to_dict`).
+- `TorqueSummary`, `summarise_torques`: the largest and the rms torque of each joint, and its effort limit.
+- `slice_run`: some rows of a run.
+"""
 
 from __future__ import annotations
 
@@ -30,18 +35,18 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class TorqueSummary:
-    """The torque of a joint over a motion, in [N.m], or the force in [N] of one that slides.
+    """The torque of a revolute joint in [N.m], or the force of a prismatic joint in [N], over a motion.
 
     Attributes:
-        joint: Its name.
+        joint: Name of the joint.
         unit: N.m or N.
-        max: Largest absolute value; NaN where no sample has one.
-        t_max: When, in [s]; NaN likewise.
-        sample_max: In which sample, from 0.
-        rms: Root of its mean square.
-        effort: Its limit either way; None without one, and where the period of the rows is assumed.
-        beyond: Row numbers of the samples beyond the limit, from 0, shape (k,).
-        samples: How many samples have a value.
+        max: Largest absolute value; NaN if no sample has a value.
+        t_max: Time of the largest value in [s]; NaN likewise.
+        sample_max: Sample of the largest value, from 0.
+        rms: Root mean square.
+        effort: Limit in both directions; None without one, and where the period of the rows is assumed.
+        beyond: Samples beyond the limit, from 0, shape (k,).
+        samples: Number of samples with a value.
     """
 
     joint: str
@@ -56,7 +61,7 @@ class TorqueSummary:
 
     @property
     def effort_share(self) -> float | None:
-        """The largest share of its limit that it takes, above 1 beyond it; None without limit or samples."""
+        """The largest value divided by the limit; None without limit or samples."""
         return None if self.effort is None or not self.samples else self.max / self.effort
 
     @property
@@ -65,7 +70,7 @@ class TorqueSummary:
         return None if self.effort is None or not self.samples else len(self.beyond) / self.samples
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as `urmpipe ingest --json` prints it."""
+        """Return the object that `urmpipe ingest --json` prints."""
         keys = ("joint", "unit", "max", "t_max", "rms", "effort", "effort_share", "share_out")
         return {key: getattr(self, key) for key in keys}
 
@@ -78,45 +83,44 @@ def summarise_torques(
     *,
     limited: bool = True,
 ) -> list[TorqueSummary]:
-    """Return the torque of each joint in short; none where torques are not known.
+    """Return the torque of each joint over a motion; none if torques are unknown.
 
     Args:
-        names: Of the joints.
-        robot: The arm, with its limits.
+        names: Names of the joints.
+        robot: The arm, with its effort limits.
         t_ns: Times in integer [ns], shape (n,).
-        tau: Torques in [N.m] or [N], shape (n, joints); None where they are not known.
-        limited: Whether they are held against the efforts of the joints.
+        tau: Torques in [N.m] or [N], shape (n, joints); None if they are unknown.
+        limited: Whether they are compared with the effort limits.
     """
     if robot is None or tau is None or not len(tau):
         return []
-    found = []
+    summaries = []
     for name, joint, column in zip(names, robot.moving, np.asarray(tau).T, strict=True):
         size = np.abs(column)
-        known = size[np.isfinite(size)]
-        at = int(np.nanargmax(size)) if len(known) else 0
+        finite = size[np.isfinite(size)]
+        largest = int(np.nanargmax(size)) if len(finite) else 0
         effort = joint.effort if limited else math.inf
-        found.append(
-            TorqueSummary(
-                joint=name,
-                unit="N.m" if joint.kind == "revolute" else "N",
-                max=float(size[at]) if len(known) else math.nan,
-                t_max=float(t_ns[at]) / 1e9 if len(known) else math.nan,
-                sample_max=at,
-                rms=float(np.sqrt(np.mean(known**2))) if len(known) else math.nan,
-                effort=effort if math.isfinite(effort) else None,
-                beyond=np.flatnonzero(size > effort),
-                samples=len(known),
-            )
+        summary = TorqueSummary(
+            joint=name,
+            unit="N.m" if joint.kind == "revolute" else "N",
+            max=float(size[largest]) if len(finite) else math.nan,
+            t_max=float(t_ns[largest]) / 1e9 if len(finite) else math.nan,
+            sample_max=largest,
+            rms=float(np.sqrt(np.mean(finite**2))) if len(finite) else math.nan,
+            effort=effort if math.isfinite(effort) else None,
+            beyond=np.flatnonzero(size > effort),
+            samples=len(finite),
         )
-    return found
+        summaries.append(summary)
+    return summaries
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowJoints:
-    """The joints on the file's own rows: where a log is judged.
+    """The joints on the rows of the file, where deviations are measured.
 
     Attributes:
-        t_ns: Times of the rows in integer [ns], those of the regular clock behind rounded ones, shape (n,).
+        t_ns: Times of the rows in integer [ns], shape (n,); of quantised timestamps the regular times.
         q: Repolarized joint values in [rad] or [m], shape (n, joints).
     """
 
@@ -129,25 +133,25 @@ class Run(Result):
     """One ingested log: repolarized, on a uniform grid, with the arm's kinematics.
 
     Attributes:
-        name: The log's name.
-        log: The file's own rows.
-        robot: The arm, or None for a log without kinematics.
+        name: Name of the log.
+        log: The rows of the file.
+        robot: The arm; None for a log without kinematics.
         tsp: Sampling period of the grid in [s]; 0 without times.
         t_ns: Grid times in integer [ns], shape (g,).
         q: Repolarized joint values in [rad] or [m], shape (g, joints).
-        qd: Rates in [rad/s] or [m/s], shape (g, joints).
-        qdd: Second derivatives in [rad/s2] or [m/s2], shape (g, joints).
-        tcp: Motion of the tool centre point, or None without a robot.
-        tcp_recorded: The position that the log itself recorded, on the grid, in [m], shape (g, 3).
-        audit: What the repolarizer did and what it could not decide, by row.
-        warnings: What a person should know.
+        qd: Joint velocities in [rad/s] or [m/s], shape (g, joints).
+        qdd: Joint accelerations in [rad/s2] or [m/s2], shape (g, joints).
+        tcp: Motion of the tool centre point; None without a robot.
+        tcp_recorded: The recorded position of the tool centre point on the grid in [m], shape (g, 3).
+        audit: What the repolarizer changed and what is ambiguous, by row.
+        warnings: Warnings about the log, the robot and the motion.
         provenance: How to repeat it.
-        recording: Where it was written.
-        rows: The joints on the file's rows where the grid has other samples; else None.
-        tau: Torques of the joints in [N.m] or [N], shape (g, joints), NaN where a rate is; None of a robot
-            without masses, of still poses, and where no sample has one.
-        derivative: What made the accelerations: central, savgol, recorded or planned; empty without any, and
-            in recordings that do not tell.
+        recording: Path of its recording.
+        rows: The joints on the rows of the file if the grid has other samples; else None.
+        tau: Torques of the joints in [N.m] or [N], shape (g, joints), NaN where a derivative is; None for a
+            robot without masses, for static poses, and if no sample has a torque.
+        derivative: Source of the accelerations: central, savgol, recorded or planned; empty without any, and
+            in recordings that do not contain it.
     """
 
     name: str
@@ -171,25 +175,24 @@ class Run(Result):
     @property
     def resampled(self) -> bool:
         """Whether its grid has other samples than the rows of the log."""
-        return any(one.kind == RESAMPLED for one in self.warnings)
+        return any(warning.kind == RESAMPLED for warning in self.warnings)
 
     @property
     def on_rows(self) -> RowJoints:
-        """The joints on the file's own rows.
+        """The joints on the rows of the file.
 
         Raises:
-            LogError: If the run was recorded when they were not kept.
+            LogError: If the recording of the run has only the grid.
         """
         if self.rows is None and self.resampled:
-            said = (
-                "found a recording of the grid alone, allowed: one with the log's rows; ingest the log again"
-            )
-            raise LogError(Finding(said, self.log.files[0].name if self.log.files else self.name))
+            message = "found a recording of the grid alone, allowed: one with the log's rows"
+            file = self.log.files[0].name if self.log.files else self.name
+            raise LogError(Finding(f"{message}; ingest the log again", file))
         return self.rows or RowJoints(self.t_ns, self.q)
 
     @property
     def rows_ns(self) -> IntArray:
-        """Times of the file's rows in integer [ns], of rounded ones those of the clock behind, shape (n,)."""
+        """Times of the rows as in `RowJoints`, in integer [ns], shape (n,)."""
         if self.rows is not None:
             return self.rows.t_ns
         return self.log.t_ns if self.resampled else self.t_ns
@@ -201,7 +204,7 @@ class Run(Result):
 
     @property
     def repolarizations(self) -> tuple[AuditEntry, ...]:
-        """Every wrap that was undone."""
+        """The wraps that were undone."""
         return tuple(entry for entry in self.audit if entry.kind == "wrap")
 
     @property
@@ -211,19 +214,19 @@ class Run(Result):
 
     @property
     def timed(self) -> bool:
-        """Whether its rows have times; else they are poses that no motion joins, and it has no rates."""
+        """Whether its rows have times; else they are static poses without velocities."""
         return self.log.timed
 
     @property
     def rotation_recorded(self) -> FloatArray | None:
-        """The orientation that the log itself recorded, on the grid, shape (g, k); None without one.
+        """The recorded orientation on the grid, shape (g, k); None without one.
 
-        In its own form (of a matrix as a quaternion x, y, z, w) in [rad] or [-], without jumps between the
-        names of one rotation, and so linear between the rows; of still poses as the log has it.
+        In the form of the log (a matrix as a quaternion x, y, z, w) in [rad] or [-], continuous, so that it
+        can be interpolated; of static poses as in the log.
         """
         form = self.log.rotation_form
-        follows = self.log.tcp_rotation_continuous if self.timed else self.log.tcp_rotation
-        values = self.log.tcp_quat_xyzw if form == "matrix" else follows
+        rotation = self.log.tcp_rotation_continuous if self.timed else self.log.tcp_rotation
+        values = self.log.tcp_quat_xyzw if form == "matrix" else rotation
         if form is None or values is None:
             return None
         if not np.array_equal(self.t_ns, self.log.t_ns):
@@ -232,7 +235,7 @@ class Run(Result):
 
     @property
     def rotation_names(self) -> tuple[str, ...]:
-        """What the columns of `rotation_recorded` are called; none without one."""
+        """Names of the columns of `rotation_recorded`; none without one."""
         form = self.log.rotation_form
         return () if form is None else COLUMN_NAMES["quat_xyzw" if form == "matrix" else form]
 
@@ -245,20 +248,19 @@ class Run(Result):
 
     @property
     def torque_units(self) -> list[str]:
-        """The SI unit of the torque of each joint, N.m, or N of one that slides."""
+        """The SI unit of the torque of each joint: N.m of a revolute, N of a prismatic joint."""
         return ["N.m" if unit == "rad" else "N" for unit in self.joint_units]
 
     def torque_summaries(self) -> list[TorqueSummary]:
-        """Return the torque of each joint in short; none has a limit where the period is assumed."""
+        """Return the torque of each joint over the run; without limits if the period is assumed."""
         limited = not self.log.period_assumed
         return summarise_torques(self.log.joints, self.robot, self.t_ns, self.tau, limited=limited)
 
     def as_run(self) -> Run:
-        """Return this run: what results that have a run return of it."""
+        """Return this run; results that contain a run return that."""
         return self
 
     def _headline(self) -> str:
-        """Return its name, its arm and how long it is."""
         arm = self.robot.name if self.robot else "no robot"
         rows = format_count(self.log.rows, "row")
         if not self.timed:
@@ -267,9 +269,9 @@ class Run(Result):
         return format_headline(self.name, arm, f"{rows} in {self.duration:g} s", grid)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a grid sample: t [s], the joints, their rates and torques, and the TCP, where known.
+        """Return one row per grid sample: t [s], joints, their derivatives and torques, and the TCP.
 
-        Of still poses the number of the row stands for t, from 1, and there is nothing per second.
+        Static poses have the number of the row, from 1, in place of t, and no derivatives.
         """
         import pandas as pd
 
@@ -286,11 +288,10 @@ class Run(Result):
                 columns |= {f"{name}{axis}": values[:, i] for i, axis in enumerate("xyz")}
             columns |= {name: self.tcp.euler_zyx[:, i] for i, name in enumerate(("rz", "ry", "rx"))}
         frame = pd.DataFrame(columns)
-        frame.attrs[URMPIPE_SOURCE] = {"units": self._units()}
+        frame.attrs[URMPIPE_SOURCE] = {"units": self._column_units()}
         return frame
 
-    def _units(self) -> dict[str, str]:
-        """Return the units by which `ingest` reads its table again."""
+    def _column_units(self) -> dict[str, str]:
         units = {"t": "s"} if self.timed else {}
         for prefix, order in (("", ""), ("d_", "/s"), ("dd_", "/s2")):
             joints = zip(self.log.joints, self.joint_units, strict=True)
@@ -312,58 +313,57 @@ class Run(Result):
             "source": self.log.source,
             "robot": self.robot.name if self.robot else None,
             "units": dict(self.log.units),
-            "inferences": [one.to_dict() for one in self.log.inferences],
+            "inferences": [inference.to_dict() for inference in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
             "derivative": self.derivative or None,
-            "torques": [one.to_dict() for one in self.torque_summaries()],
-            "warnings": [one.to_dict() for one in self.warnings],
+            "torques": [summary.to_dict() for summary in self.torque_summaries()],
+            "warnings": [warning.to_dict() for warning in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
 
 
 def slice_run(run: Run, first: int, last: int, name: str) -> Run:
-    """Return some rows of a run, both ends included, on their own clock, with the joints' turns as they are.
+    """Return some rows of a run, both ends included, with times from its first row.
 
-    The warnings stay with the whole.
+    The turns of the joints stay as they are; warnings are left out.
 
     Args:
         run: The run.
         first: The first row, from 0.
         last: The last row, from 0.
-        name: What the part is called.
+        name: Name of the slice.
     """
     rows = slice(first, last + 1)
-    log, begins = _log(run.log, rows, name), int(run.rows_ns[first])
+    start_ns = int(run.rows_ns[first])
     grid = rows
-    if run.rows is not None:  # the grid has samples of its own
-        ends = int(run.rows_ns[last])
-        grid = slice(*np.searchsorted(run.t_ns, [begins, ends + 1]).tolist())
+    if run.rows is not None:  # the grid has other samples than the rows
+        end_ns = int(run.rows_ns[last])
+        grid = slice(*np.searchsorted(run.t_ns, [start_ns, end_ns + 1]).tolist())
     tcp = run.tcp
     if tcp is not None:
-        tcp = PointLog(**{one.name: getattr(tcp, one.name)[grid] for one in fields(tcp)})
+        tcp = PointLog(**{part.name: getattr(tcp, part.name)[grid] for part in fields(tcp)})
     audit = (
-        replace(one, row=one.row - first, t=one.t - begins / 1e9)
-        for one in run.audit
-        if first < one.sample <= last
+        replace(entry, row=entry.row - first, t=entry.t - start_ns / 1e9)
+        for entry in run.audit
+        if first < entry.sample <= last
     )
     return replace(
-        run, name=name, log=log, t_ns=run.t_ns[grid] - begins, q=run.q[grid], qd=run.qd[grid],
-        qdd=run.qdd[grid], tcp=tcp,
+        run, name=name, log=_slice_log(run.log, rows, name), t_ns=run.t_ns[grid] - start_ns, q=run.q[grid],
+        qd=run.qd[grid], qdd=run.qdd[grid], tcp=tcp,
         tcp_recorded=None if run.tcp_recorded is None else run.tcp_recorded[grid],
         tau=None if run.tau is None else run.tau[grid], audit=tuple(audit), warnings=(), recording=None,
-        rows=None if run.rows is None else RowJoints(run.rows.t_ns[rows] - begins, run.rows.q[rows]),
+        rows=None if run.rows is None else RowJoints(run.rows.t_ns[rows] - start_ns, run.rows.q[rows]),
     )  # fmt: skip
 
 
-def _log(log: JointLog, rows: slice, name: str) -> JointLog:
-    """Return some rows of a log, on their own clock."""
-    begins = int(log.t_ns[rows.start])
+def _slice_log(log: JointLog, rows: slice, name: str) -> JointLog:
+    start_ns = int(log.t_ns[rows.start])
     arrays: dict[str, Any] = {
-        one: None if (values := getattr(log, one)) is None else values[rows]
-        for one in ("q", "qd", "qdd", "tcp_position", "tcp_rotation")
+        key: None if (values := getattr(log, key)) is None else values[rows]
+        for key in ("q", "qd", "qdd", "tcp_position", "tcp_rotation")
     }
     return replace(
-        log, name=name, t_ns=log.t_ns[rows] - begins, clock_start_ns=log.clock_start_ns + begins,
+        log, name=name, t_ns=log.t_ns[rows] - start_ns, clock_start_ns=log.clock_start_ns + start_ns,
         first_line=log.first_line + rows.start, **arrays,
     )  # fmt: skip

@@ -1,14 +1,14 @@
-"""Torques of a run: the masses that they rest on, the inverse dynamics, and warnings about both.
+"""Torques of a run: the masses that they depend on, the inverse dynamics, and warnings about both.
 
 - `mass_warnings`, `urdf_mass_warning`: masses that are not used, and those lost in a URDF.
 - `compute_torques`: tau(q, q', q'') on the grid.
-- `torque_warnings`: joints that need more than their effort, and torques that are noise of the log.
+- `torque_warnings`: torques that are noise of the log (`noise_warnings`), and joints that need more than
+  their effort (`effort_warning`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,25 +24,42 @@ from urmpipe_pipeline.runs.run import Run, TorqueSummary
 MASS_LEFT_OUT = "mass-left-out"
 MASS_FAULT = "mass-fault"
 NOT_IN_URDF = "not-in-urdf"
+EFFORT_LIMIT = "effort-limit"
+TORQUE_NOISE = "torque-noise"
+
+CHECK_LOG = "check masses, clock and noise of the log"  # advice for a recorded motion beyond an effort
+MOVE_SLOWER = "move slower, or check the masses"  # advice for a planned or solved one
+SMOOTHED = Hint("derivative", "savgol", "smooths the accelerations")
+PERIOD_ASSUMED = "The period of the rows is assumed. Torques depend on it, so no limit is applied."
+
+# A joint has noise if smoothing changes its torque by more than these, and the change alternates.
+NOISE_SHARE = 0.2  # of the rms of its smoothed torque
+MIN_SHARE = (
+    0.01  # of the largest such rms of the joints with the same unit: a wrist may have almost no torque
+)
+MIN_TORQUE = 0.1  # N.m or N: an arm may rest where no joint has a load
+MAX_CORRELATION = (
+    -0.4
+)  # of the change with itself one sample on: noise and rounding -0.5 to -0.7, values that
+# change every other row -1; a motion too sharp for the smoothing, even a step of its speed, -0.1 to 1
 
 
 def mass_warnings(robot: Chain) -> list[LogWarning]:
-    """Return a warning of the masses that the arm carries and that are not among its `inertials`."""
+    """Return a warning about the masses of an arm that are not among its `inertials`."""
     if robot.mass_faults:
-        return [
-            LogWarning(MASS_FAULT, f"the masses of the robot are not used: {'; '.join(robot.mass_faults)}")
-        ]
+        message = f"the masses of the robot are not used: {'; '.join(robot.mass_faults)}"
+        return [LogWarning(MASS_FAULT, message)]
     if not robot.left_out:
         return []
     names = ", ".join(robot.left_out)
-    words = f"the masses of {names} are left out: these links move by joints of their own"
+    message = f"the masses of {names} are left out: these links move by joints outside the chain"
     if len(robot.left_out) == 1:
-        words = f"the mass of {names} is left out: this link moves by a joint of its own"
-    return [LogWarning(MASS_LEFT_OUT, words)]
+        message = f"the mass of {names} is left out: this link moves by a joint outside the chain"
+    return [LogWarning(MASS_LEFT_OUT, message)]
 
 
 def urdf_mass_warning(robot: Chain) -> list[LogWarning]:
-    """Return a warning of what a URDF of the arm does not hold."""
+    """Return a warning about properties of the arm that a URDF cannot contain."""
     lost = []
     if tuple(robot.gravity) != GRAVITY:
         lost.append(f"gravity {[*map(float, robot.gravity)]} m/s2")
@@ -50,35 +67,34 @@ def urdf_mass_warning(robot: Chain) -> list[LogWarning]:
         lost.append("the drives")
     if robot.left_out:
         lost.append("which masses are left out")
-    words = f"a URDF does not hold {' and '.join(lost)}: a TOML robot file does"
-    return [LogWarning(NOT_IN_URDF, words)] if lost else []
-
-
-EFFORT_LIMIT = "effort-limit"
-
-CHECK_LOG = "check masses, clock and noise of the log"
-"""What to do where the motion of a log that was recorded takes more than a joint can give."""
-
-MOVE_SLOWER = "move slower, or check the masses"
-"""What to do where a motion that was planned or solved does."""
-
-PERIOD_ASSUMED = "The period of the rows is assumed. Torques depend on it, so no limit is applied."
-"""What stands with torques whose rates rest on an assumption."""
+    message = f"a URDF does not hold {' and '.join(lost)}: a TOML robot file does"
+    return [LogWarning(NOT_IN_URDF, message)] if lost else []
 
 
 def compute_torques(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray | None:
-    """Return the torques of the joints in [N.m] or [N], (n, joints), NaN where a rate is; None if all are.
+    """Return the torques of the joints in [N.m] or [N], shape (n, joints), NaN where a derivative is.
+
+    None if all are NaN, without a robot, and for one without masses.
 
     Args:
-        robot: The arm; None, and one without masses, has none.
+        robot: The arm.
         q: Joint values in [rad] or [m], shape (n, joints).
-        qd: Their rates in [rad/s] or [m/s], shape (n, joints).
-        qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
+        qd: Joint velocities in [rad/s] or [m/s], shape (n, joints).
+        qdd: Joint accelerations in [rad/s2] or [m/s2], shape (n, joints).
     """
     if robot is None or not robot.inertials or q.shape[1] == 0:
         return None
     tau = torques_over_log(robot, q, qd, qdd)
     return tau if np.isfinite(tau).any() else None
+
+
+def torque_warnings(run: Run) -> list[LogWarning]:
+    """Return warnings about torques that are noise, and joints that need more than their effort."""
+    advice, hints = CHECK_LOG, (SMOOTHED,) if run.derivative == "central" else ()
+    if run.log.source == SOLVED:
+        advice, hints = MOVE_SLOWER, ()
+    summaries = run.torque_summaries()
+    return [*noise_warnings(run), *effort_warning(summaries, run.t_ns, advice, run.rows_ns, hints)]
 
 
 def effort_warning(
@@ -88,121 +104,77 @@ def effort_warning(
     rows_ns: IntArray | None = None,
     hints: tuple[Hint, ...] = (),
 ) -> list[LogWarning]:
-    """Return a warning if joints need more than their effort: which, how often, where worst, first row.
+    """Return one warning about the joints that need more than their effort, or none.
 
     Args:
-        summaries: The torque of each joint.
+        summaries: Torque of each joint.
         t_ns: Times of the samples in integer [ns], shape (n,).
         advice: What to do about it.
-        rows_ns: Times of the file's rows in integer [ns], shape (m,): the row nearest to a sample is named;
-            None where the samples are no rows of a file: their times are named.
-        hints: What to give to do so.
+        rows_ns: Times of the rows of the file in integer [ns], shape (m,): the row nearest to a sample is
+            named; None if the samples are not rows of a file: their times are named.
+        hints: Options that help.
     """
-    found = [one for one in summaries if len(one.beyond)]
-    if not found:
+    exceeding = [summary for summary in summaries if len(summary.beyond)]
+    if not exceeding:
         return []
-    worst = max(found, key=lambda one: one.effort_share or 0.0)
-    first, place = None, f"at t = {text.seconds(worst.t_max)} s"
+    worst = max(exceeding, key=lambda summary: summary.effort_share or 0.0)
+    row, place = None, f"at t = {text.seconds(worst.t_max)} s"
     if rows_ns is not None:
-        first, row = _rows_at(rows_ns, t_ns[[min(int(one.beyond[0]) for one in found), worst.sample_max]])
-        place = f"in row {row}"
-    words = f"{worst.joint} needs more than its effort of {worst.effort:.6g} {worst.unit} in"
-    words += f" {len(worst.beyond)} of {worst.samples} samples ({text.percent(worst.share_out or 0.0)}),"
-    words += f" at worst {worst.max:.4g} {worst.unit} {place}"
-    others = [f"{one.joint} ({text.counted(len(one.beyond), 'sample')})" for one in found if one is not worst]
-    words += f"; also {text.enumerated(others)}" if others else ""
-    return [LogWarning(EFFORT_LIMIT, f"{words}: {advice}", first, hints=hints)]
-
-
-def _rows_at(rows_ns: IntArray, t_ns: IntArray) -> list[int]:
-    """Return the rows nearest to some times in [ns], shape (k,), from 1."""
-    return [round(row) + 1 for row in np.interp(t_ns, rows_ns, np.arange(len(rows_ns))).tolist()]
-
-
-TORQUE_NOISE = "torque-noise"
-
-SMOOTHED = Hint("derivative", "savgol", "smooths the accelerations")
-
-SHARE = 0.2
-"""A joint is named if smoothing changes its torque by more than this share of the smoothed one's rms ..."""
-
-LEAST = 0.01
-"""... by more than this share of the largest such rms of the joints of its unit: a wrist may have none ..."""
-
-FELT = 0.1
-"""... by more than this, in [N.m] or [N]: an arm may rest where nothing pulls at it ..."""
-
-ALTERNATING = -0.4
-"""... and if the change correlates so with itself one sample on. White noise and rounding have -0.5 to -0.7,
-values that change every other row -1; a motion too sharp for the smoothing, even a step of its speed, -0.1
-to 1."""
-
-
-class _Change(NamedTuple):
-    """What smoothing does to the torques, an entry a joint, in [N.m] or [N].
-
-    Attributes:
-        before: Their rms without it.
-        after: Their rms with it.
-        change: Rms of the difference.
-        correlation: Of the difference with itself one sample on, -1 to 1 [-]; NaN where it is always 0.
-    """
-
-    before: FloatArray
-    after: FloatArray
-    change: FloatArray
-    correlation: FloatArray
+        first = min(int(summary.beyond[0]) for summary in exceeding)
+        at_ns = t_ns[[first, worst.sample_max]]
+        nearest = np.interp(at_ns, rows_ns, np.arange(len(rows_ns))).tolist()
+        row, worst_row = (round(index) + 1 for index in nearest)
+        place = f"in row {worst_row}"
+    message = f"{worst.joint} needs more than its effort of {worst.effort:.6g} {worst.unit} in"
+    message += f" {len(worst.beyond)} of {worst.samples} samples ({text.percent(worst.share_out or 0.0)}),"
+    message += f" at worst {worst.max:.4g} {worst.unit} {place}"
+    joints = [
+        f"{summary.joint} ({text.counted(len(summary.beyond), 'sample')})"
+        for summary in exceeding
+        if summary is not worst
+    ]
+    message += f"; also {text.enumerated(joints)}" if joints else ""
+    return [LogWarning(EFFORT_LIMIT, f"{message}: {advice}", row, hints=hints)]
 
 
 def noise_warnings(run: Run) -> list[LogWarning]:
-    """Return a warning if torques by central differences are noise that smoothing takes away."""
-    known = run.derivative == "central" and run.log.source != SOLVED and not run.log.period_assumed
-    if run.tau is None or not known or len(run.t_ns) <= WINDOW or not _alternates(run.qdd):
+    """Return a warning if torques by central differences are noise that smoothing removes."""
+    is_recorded = run.derivative == "central" and run.log.source != SOLVED and not run.log.period_assumed
+    if run.tau is None or not is_recorded or len(run.t_ns) <= WINDOW:
         return []
-    found = _smoothing(run, run.tau)
-    units = np.array(run.torque_units)
-    scale = np.array([np.nan_to_num(found.after[units == unit]).max() for unit in units])
-    least = np.maximum(np.maximum(SHARE * found.after, LEAST * scale), FELT)
-    noisy = (found.change > least) & (found.correlation < ALTERNATING)
-    if not noisy.any():
+    steps = np.diff(run.qdd, axis=0)
+    if not (np.nansum(steps[1:] * steps[:-1], axis=0) < 0.0).any():  # cheap: no acceleration alternates
         return []
-    relative = found.change / (scale + found.change)
-    worst, *others = sorted(np.flatnonzero(noisy).tolist(), key=lambda j: -relative[j])
-    names, unit = run.log.joints, units[worst]
-    words = "joint values are noisy or coarse for torques: accelerations by differences give"
-    words += f" {names[worst]} {found.before[worst]:.4g} {unit} rms, smoothed over {WINDOW} samples"
-    words += f" {found.after[worst]:.4g} {unit}"
-    words += f"; also {text.enumerated([names[j] for j in sorted(others)])}" if others else ""
-    return [LogWarning(TORQUE_NOISE, words, hints=(SMOOTHED,))]
-
-
-def _alternates(qdd: FloatArray) -> bool:
-    """Tell cheaply whether accelerations in [rad/s2] or [m/s2], shape (n, joints), go to and fro at all."""
-    steps = np.diff(qdd, axis=0)
-    return bool((np.nansum(steps[1:] * steps[:-1], axis=0) < 0.0).any())
-
-
-def _smoothing(run: Run, tau: FloatArray) -> _Change:
-    """Return what smoothing does to the torques in [N.m] or [N], shape (n, joints)."""
     q = np.where(np.isfinite(run.qdd), run.q, np.nan)  # no window reaches across a step that is no motion
     smooth = compute_torques(run.robot, q, *derivatives(q, run.tsp, "savgol"))
     if smooth is None:
-        none = np.full(tau.shape[1], np.nan)
-        return _Change(none, none, none, none)
-    change = tau - smooth
+        return []
+    change = run.tau - smooth
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = _mean(change[1:] * change[:-1]) / _mean(change**2)
-    known = np.where(np.isfinite(smooth), tau, np.nan)
-    return _Change(_rms(known), _rms(smooth), _rms(change), correlation)
+    before, after = _rms(np.where(np.isfinite(smooth), run.tau, np.nan)), _rms(smooth)
+    units = np.array(run.torque_units)
+    scale = np.array([np.nan_to_num(after[units == unit]).max() for unit in units])
+    threshold = np.maximum(np.maximum(NOISE_SHARE * after, MIN_SHARE * scale), MIN_TORQUE)
+    is_noisy = (_rms(change) > threshold) & (correlation < MAX_CORRELATION)
+    if not is_noisy.any():
+        return []
+    relative = _rms(change) / (scale + _rms(change))
+    worst, *further = sorted(np.flatnonzero(is_noisy).tolist(), key=lambda j: -relative[j])
+    names, unit = run.log.joints, units[worst]
+    message = "joint values are noisy or coarse for torques: accelerations by differences give"
+    message += f" {names[worst]} {before[worst]:.4g} {unit} rms, smoothed over {WINDOW} samples"
+    message += f" {after[worst]:.4g} {unit}"
+    message += f"; also {text.enumerated([names[j] for j in sorted(further)])}" if further else ""
+    return [LogWarning(TORQUE_NOISE, message, hints=(SMOOTHED,))]
 
 
 def _rms(values: FloatArray) -> FloatArray:
-    """Return the root of the mean square of each column."""
     return np.sqrt(_mean(values**2))
 
 
 def _mean(values: FloatArray) -> FloatArray:
-    """Return the mean of what each column has; NaN where it has nothing."""
+    """Return the mean of the finite values of each column; NaN where there are none."""
     count = np.count_nonzero(np.isfinite(values), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.nansum(values, axis=0) / count)

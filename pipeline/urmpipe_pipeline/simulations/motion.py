@@ -69,7 +69,7 @@ def run_of_block(simulation: Simulation, block: str | None = None, robot: Chain 
     only = Inference("block", chosen, "it alone has a motion", hints=(Hint("block"),))
     told = (*(() if block else (only,)), *((because,) if because else ()))
     log = _log(simulation, chosen, arm, told)
-    return log_to_run(log, arm, ReadOptions(), made=simulation.provenance)
+    return log_to_run(log, arm, ReadOptions(), provenance=simulation.provenance)
 
 
 def _chosen(simulation: Simulation, block: str | None) -> str:

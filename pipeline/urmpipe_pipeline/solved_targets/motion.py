@@ -50,7 +50,7 @@ def run_of_solutions(
         clock_start_ns=clock_start_ns, columns=tuple(_columns(chain, timed=timed)), warnings=warnings,
         timed=timed,
     )  # fmt: skip
-    return log_to_run(log, chain, ReadOptions(), made=made)
+    return log_to_run(log, chain, ReadOptions(), provenance=made)
 
 
 def _columns(chain: Chain, *, timed: bool) -> Iterator[LogColumn]:

@@ -39,7 +39,7 @@ def path_at(t: FloatArray, position: FloatArray) -> Run:
     """The run of a path, as `ingest` makes it."""
     t_ns = np.rint(t * 1e9).astype(np.int64)
     log = JointLog("path", "path", (), t_ns, (), np.empty((len(t), 0)), tcp_position=position)
-    return log_to_run(log, None, ReadOptions(), made=build_provenance("ingest", {}, ()))
+    return log_to_run(log, None, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
 
 
 def table(t: FloatArray, position: FloatArray) -> pd.DataFrame:

@@ -110,7 +110,7 @@ def path_at(t: FloatArray, rng: np.random.Generator, name: str) -> Run:
         name, "path", (), t_ns, (), np.empty((len(t), 0)),
         tcp_position=rng.uniform(-1, 1, (len(t), 3)), tcp_rotation=quat.as_quat(), rotation_form="quat_xyzw",
     )  # fmt: skip
-    return log_to_run(log, None, ReadOptions(), made=build_provenance("ingest", {}, ()))
+    return log_to_run(log, None, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
 
 
 @pytest.mark.slow

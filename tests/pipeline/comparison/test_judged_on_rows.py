@@ -40,14 +40,14 @@ def joint_log(t: FloatArray, q: FloatArray, name: str = "log", position: FloatAr
     """Return the run of a log at these times."""
     t_ns = np.rint(t * 1e9).astype(np.int64)
     log = JointLog(name, "table", (), t_ns, tuple(f"q{k + 1}" for k in range(6)), q, tcp_position=position)
-    return log_to_run(log, UR5E, ReadOptions(), made=build_provenance("ingest", {}, ()))
+    return log_to_run(log, UR5E, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
 
 
 def path(t: FloatArray, position: FloatArray) -> Run:
     """Return the run of a path."""
     t_ns = np.rint(t * 1e9).astype(np.int64)
     log = JointLog("path", "path", (), t_ns, (), np.empty((len(t), 0)), tcp_position=position)
-    return log_to_run(log, None, ReadOptions(), made=build_provenance("ingest", {}, ()))
+    return log_to_run(log, None, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_a_spike_of_one_row_keeps_its_height_to_the_bit(
     wanted = positions_over_log(UR5E, q)
     wanted[row, 2] += height  # the reference has the spike at a row of the log: nothing is interpolated
     log = JointLog("log", "table", (), np.rint(t * 1e9).astype(np.int64), tuple("abcdef"), q)
-    run = log_to_run(log, UR5E, ReadOptions(), made=build_provenance("ingest", {}, ()), tsp=tsp)
+    run = log_to_run(log, UR5E, ReadOptions(), provenance=build_provenance("ingest", {}, ()), tsp=tsp)
     assert run.resampled
     one = compare_runs(path(t, wanted), [run]).runs[0]
     exact = np.abs(wanted - trajectory(run).position)

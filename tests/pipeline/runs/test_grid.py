@@ -23,16 +23,16 @@ def log_at(t_ns: ArrayLike, q: ArrayLike | None = None) -> JointLog:
 def test_a_regular_log_keeps_its_own_rows() -> None:
     log = log_at(np.arange(100) * 5 * MS)
     grid = make_grid(log)
-    assert grid.own
+    assert grid.is_rows
     assert grid.t_ns is log.t_ns
     assert grid.tsp == 0.005
     assert grid.warnings == ()
-    assert make_grid(log, 0.005).own
+    assert make_grid(log, 0.005).is_rows
 
 
 def test_rounded_clocks_are_regular() -> None:
     """A period of 1/240 s printed to the microsecond."""
-    assert make_grid(log_at(np.rint(np.arange(1000) / 240 * 1e6).astype(np.int64) * 1000)).own
+    assert make_grid(log_at(np.rint(np.arange(1000) / 240 * 1e6).astype(np.int64) * 1000)).is_rows
 
 
 def test_an_irregular_log_is_resampled_to_its_median_period_and_says_so() -> None:
@@ -40,7 +40,7 @@ def test_an_irregular_log_is_resampled_to_its_median_period_and_says_so() -> Non
     t = np.sort(np.arange(200) * 10 * MS + rng.integers(-2 * MS, 2 * MS, 200))
     t -= t[0]
     grid = make_grid(log_at(t, 2.0 * t))
-    assert not grid.own
+    assert not grid.is_rows
     assert grid.tsp == pytest.approx(np.median(np.diff(t)) / 1e9)
     # a straight line stays itself; values to 4e9, doubles round at 1e-6 of them
     np.testing.assert_allclose(grid.resample(2.0 * t[:, None])[:, 0], 2.0 * grid.t_ns, rtol=1e-12, atol=1e-5)
@@ -96,7 +96,7 @@ def test_interpolation_gives_known_values_exactly_and_nothing_outside() -> None:
 def test_logs_of_no_and_one_row_have_a_grid(count: int) -> None:
     grid = make_grid(log_at(np.arange(count)))
     assert len(grid.t_ns) == count
-    assert grid.own
+    assert grid.is_rows
     assert not is_inside_gap(np.arange(3), np.arange(count)).any()
 
 
@@ -104,7 +104,7 @@ def test_a_clock_rounded_to_milliseconds_is_regular_and_that_is_said() -> None:
     """300 Hz in whole milliseconds: steps of 3, 3, 4 ms."""
     t = np.floor(np.arange(300) / 0.3).astype(np.int64) * MS
     grid = make_grid(log_at(t))
-    assert grid.own
+    assert grid.is_rows
     assert grid.tsp == pytest.approx(1 / 300, rel=1e-5)  # a millisecond in a second, over 300 rows
     assert np.abs(grid.t_ns - t).max() <= MS
     np.testing.assert_array_equal(grid.source_ns, grid.t_ns)
@@ -116,7 +116,7 @@ def test_a_clock_rounded_to_milliseconds_is_regular_and_that_is_said() -> None:
         )
     ]
     wider = make_grid(log_at(t), 0.01)
-    assert not wider.own
+    assert not wider.is_rows
     np.testing.assert_array_equal(wider.source_ns, grid.t_ns)  # another grid changes no time of a row
 
 

@@ -15,7 +15,7 @@ from urmpipe_models.errors import Hint
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.plausibility import format_steps, largest_steps
+from urmpipe_pipeline.runs.plausibility import format_resolution, largest_steps
 from urmpipe_pipeline.sources import ReadOptions
 
 SHARED = Path(__file__).parents[4] / "shared" / "logs"
@@ -298,8 +298,8 @@ def test_the_largest_step_is_that_of_numpy() -> None:
 
 def test_the_step_of_the_format_is_seen() -> None:
     q, t = swing()
-    assert format_steps(log_of(np.round(q, 3), t)).tolist() == [0.001, 0.001, 0.001]
-    assert format_steps(log_of(q, t)).tolist() == [0.0, 0.0, 0.0]
+    assert format_resolution(log_of(np.round(q, 3), t)).tolist() == [0.001, 0.001, 0.001]
+    assert format_resolution(log_of(q, t)).tolist() == [0.0, 0.0, 0.0]
     degrees = np.radians(np.round(np.degrees(q), 1))
-    np.testing.assert_allclose(format_steps(log_of(degrees, t, "deg")), np.radians(0.1))
-    assert format_steps(log_of(10.0 * q, t, digits=4)).tolist() == [0.001, 0.001, 0.001]
+    np.testing.assert_allclose(format_resolution(log_of(degrees, t, "deg")), np.radians(0.1))
+    assert format_resolution(log_of(10.0 * q, t, digits=4)).tolist() == [0.001, 0.001, 0.001]
