@@ -35,6 +35,7 @@ OutputKind = Literal[
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")  # header of an audit
 MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --log-map THIS"  # first line of a map
 STATISTICS_HEADER = "run,sync_offset,quantity,kind,unit,max,"  # a later version may have more columns
+CRITERIA_HEADER = "name,at,value,unit,cycles,tolerance,verdict"  # of a test after ISO 9283, likewise
 JUNIT_HEADER = '<?xml version="1.0" encoding="UTF-8"?><!-- urmpipe: verdict of a comparison -->'  # first line
 DRAWING_HEADER = "<!-- Generator: urmpipe "  # start of a drawing (SVG)
 EXPORT_HEADER = "urmpipe export"  # at the start of an export; in the metadata of Parquet
@@ -52,8 +53,8 @@ HEAD = 4096  # bytes at the start of a file with its mark
 _TAIL = 65536  # bytes at the end of a PDF with its mark
 
 
-def _first_line(text: str) -> re.Pattern[bytes]:
-    return re.compile(rb"\A" + re.escape(text.encode()))
+def _first_line(*starts: str) -> re.Pattern[bytes]:
+    return re.compile(rb"\A(?:" + b"|".join(re.escape(start.encode()) for start in starts) + rb")")
 
 
 def _last_column(name: str) -> re.Pattern[bytes]:
@@ -81,7 +82,9 @@ OUTPUT_RULES: dict[OutputKind, OutputRule] = {
     "export": OutputRule("export"),
     "audit": OutputRule("audit", (".csv",), _first_line(",".join(AUDIT_COLUMNS))),
     "junit": OutputRule("JUnit file", (".xml",), _first_line(JUNIT_HEADER)),
-    "statistics": OutputRule("table of statistics", (".csv",), _first_line(STATISTICS_HEADER)),
+    "statistics": OutputRule(
+        "table of statistics", (".csv",), _first_line(STATISTICS_HEADER, CRITERIA_HEADER)
+    ),
     "figure": OutputRule("figure"),
     "drawing": OutputRule("drawing", (".svg",), _first_line(DRAWING_HEADER)),
     "fmu": OutputRule("FMU", (".fmu",)),

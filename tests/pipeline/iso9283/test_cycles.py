@@ -204,6 +204,13 @@ def test_rows_of_several_logs_are_refused(square: Path, thrice: Path) -> None:
     assert "cycles" in said and "one log" in said
 
 
+def test_a_table_of_criteria_replaces_an_earlier_one(square: Path, thrice: Path, tmp_path: Path) -> None:
+    for planes in (1, 2):
+        criteria = told(square, thrice, csv=tmp_path / "criteria.csv", planes=planes).criteria
+        lines = (tmp_path / "criteria.csv").read_text(encoding="utf-8").splitlines()
+        assert [line.split(",")[0] for line in lines[1:]] == [criterion.name for criterion in criteria]
+
+
 def test_a_log_of_another_motion_is_a_failed_cycle(tmp_path: Path, square: Path) -> None:
     done = logs(tmp_path, [resting(one) for one in (SQUARE_PATH, OTHER, SQUARE_PATH, SQUARE_PATH[:320])])
     result = run(square, done)
