@@ -355,13 +355,14 @@ def has_gap_after(t_ns: IntArray) -> BoolArray:
     return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
 
 
-def is_inside_gap(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
+def is_inside_gap(at_ns: IntArray, known_ns: IntArray, gaps: BoolArray | None = None) -> BoolArray:
     """Return which times lie strictly inside a gap between two known ones, shape (n,).
 
-    Both are integer times in [ns], of shape (n,) and, rising, (k,).
+    Both are integer times in [ns], of shape (n,) and, rising, (k,). `gaps` are those of `has_gap_after`, of
+    shape (k - 1,); None: computed.
     """
     if len(known_ns) < 2:
         return np.zeros(len(at_ns), dtype=np.bool_)
     after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
-    wide = has_gap_after(known_ns)[after - 1]
+    wide = (has_gap_after(known_ns) if gaps is None else gaps)[after - 1]
     return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))

@@ -9,24 +9,26 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_blocks
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.hand_eye import UnobservableDirection
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.math3d import rotation_angle, slerp, to_quaternions
 from urmpipe_models.wraps import unwrap_quaternions
-from urmpipe_pipeline.joint_log import NETWORK, SourceFile, ns_to_seconds
+from urmpipe_pipeline.joint_log import NETWORK, SourceFile, has_gap_after, ns_to_seconds
 from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
 from urmpipe_pipeline.runs.run import Run
 
 SyncMode = Literal["start", "stamps", "given", "auto"]
 AlignMode = Literal["none", "start", "rigid", "tool", "base+tool"]
 
+BLOCK_ROWS = 1 << 16  # rows that are matched and measured at once: temporary arrays of some MB
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 ORIENTED = "joints with a robot, or a recorded orientation"  # what gives a side an orientation
@@ -296,40 +298,56 @@ def reference_rows(reference: Side, log: Side) -> Trajectory:
     return trajectory.rows_with_value() if joined else trajectory
 
 
-def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
+def match(reference: Trajectory, log: Trajectory, sync: Sync, *, block_rows: int = BLOCK_ROWS) -> Matched:
     """Return both sides at the log's own rows; the reference is interpolated there.
 
     Positions and joints are interpolated linearly, orientations on the great arc. Samples outside the time of
     the reference, inside a gap or a broken step of it, or without a position in the log are left out and
     counted.
+
+    Args:
+        reference: The reference.
+        log: The log, at least one row.
+        sync: The offset of the clocks.
+        block_rows: Rows of the log that are matched at once; no result depends on it.
     """
-    shift = round(sync.offset * 1e9)
-    at_ns = log.t_ns + shift
-    reference_position = interpolate(at_ns, reference.t_ns, reference.position)
-    sides = reference_position, log.position
-    if not np.isfinite(reference.position).any() and reference.q is not None and log.q is not None:
-        sides = interpolate(at_ns, reference.t_ns, reference.q), log.q  # compared by their joints alone
-    known = np.all([np.isfinite(side).all(axis=1) for side in sides], axis=0)
-    sample = np.flatnonzero(known & ~_inside_broken(at_ns, reference))
-    at_ns = at_ns[sample]
-    reference_q = actual_q = None
-    if reference.q is not None and log.q is not None:
+    at_ns = log.t_ns + round(sync.offset * 1e9)
+    q, log_q = reference.q, log.q
+    by_joints = q is not None and log_q is not None and not np.isfinite(reference.position).any()
+    order = None
+    if q is not None and log_q is not None and not joint_mismatch(reference, log.joints, log.joint_units):
         order = joint_order(reference.joints, log.joints)
-        if order is not None and not joint_mismatch(reference, log.joints, log.joint_units):
-            reference_q = interpolate(at_ns, reference.t_ns, reference.q[:, order])
-            actual_q = log.q[sample]
-    first, last = log.t_ns[[0, -1]] + shift
-    outside = (reference.t_ns < first - ROUNDING_NS) | (reference.t_ns > last + ROUNDING_NS)
+    gaps = has_gap_after(reference.t_ns)
+    samples, positions, quats, joints = [], [], [], []
+    for rows in row_blocks(len(at_ns), block_rows):
+        first = max(int(np.searchsorted(reference.t_ns, at_ns[rows.start], side="right")) - 1, 0)
+        near = slice(first, int(np.searchsorted(reference.t_ns, at_ns[rows.stop - 1])) + 1)
+        known_ns = reference.t_ns[near]
+        lines = partial(interpolate, known_ns=known_ns, gaps=gaps[near][: len(known_ns) - 1])
+        position = lines(at_ns[rows], values=reference.position[near])
+        sides = [position, log.position[rows]]
+        if by_joints and q is not None and log_q is not None:
+            sides = [lines(at_ns[rows], values=q[near]), log_q[rows]]
+        known = np.all([np.isfinite(side).all(axis=1) for side in sides], axis=0)
+        kept = np.flatnonzero(known & ~_inside_broken(at_ns[rows], reference))
+        samples.append(rows.start + kept)
+        positions.append(position[kept])
+        if reference.quat_xyzw is not None:
+            quats.append(_interpolate_orientations(at_ns[rows][kept], reference.t_ns, reference.quat_xyzw))
+        if q is not None and order is not None:
+            joints.append(lines(at_ns[rows][kept], values=q[near][:, order]))
+    sample = np.concatenate(samples)
+    outside = (reference.t_ns < at_ns[0] - ROUNDING_NS) | (reference.t_ns > at_ns[-1] + ROUNDING_NS)
     return Matched(
         sample=sample,
         t_ns=log.t_ns[sample],
-        reference=reference_position[sample],
+        reference=np.concatenate(positions),
         actual=log.position[sample],
-        reference_quat=_interpolate_orientations(at_ns, reference),
+        reference_quat=np.concatenate(quats) if quats else None,
         actual_quat=None if log.quat_xyzw is None else log.quat_xyzw[sample],
-        reference_q=reference_q,
-        actual_q=actual_q,
-        left_out=len(log.t_ns) - len(sample),
+        reference_q=np.concatenate(joints) if joints else None,
+        actual_q=log_q[sample] if joints and log_q is not None else None,
+        left_out=len(at_ns) - len(sample),
         reference_left_out=int(np.count_nonzero(outside)),
         sync=sync,
         alignment=Alignment(),
@@ -345,11 +363,8 @@ def _inside_broken(at_ns: IntArray, reference: Trajectory) -> BoolArray:
     return np.asarray(np.isin(after - 1, reference.broken) & ~at_sample)
 
 
-def _interpolate_orientations(at_ns: IntArray, reference: Trajectory) -> FloatArray | None:
-    """Return the reference's orientations at times within its own, on the great arc between two of them."""
-    known_ns, quat = reference.t_ns, reference.quat_xyzw
-    if quat is None:
-        return None
+def _interpolate_orientations(at_ns: IntArray, known_ns: IntArray, quat: FloatArray) -> FloatArray:
+    """Return orientations at times within the known ones, on the great arc between two of them."""
     if len(known_ns) == 1:
         return np.repeat(quat, len(at_ns), axis=0)
     after = np.clip(np.searchsorted(known_ns, at_ns), 1, len(known_ns) - 1)

@@ -13,7 +13,7 @@ from urmpipe_pipeline.comparison.align import align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.iso import evaluate_test
-from urmpipe_pipeline.comparison.measure import measure, unheld
+from urmpipe_pipeline.comparison.measure import joints_not_compared, measure
 from urmpipe_pipeline.comparison.sync import (
     SyncOption,
     check_sync,
@@ -392,7 +392,7 @@ def _comparison(
         warnings += left_out_warnings(one, reference)
         warnings += [*weak_evidence(one), *undetermined_frames(one)]
         if reference.joints and one.run.log.joints and one.joint_delta is None:
-            said = f"no joint is compared: {unheld(reference, one.run)}"
+            said = f"no joint is compared: {joints_not_compared(reference, one.run)}"
             warnings.append(LogWarning("joints-not-compared", said, about=one.name))
     warnings += _shapes_gone([one.run for one in deviations])
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]

@@ -1,18 +1,39 @@
-"""Measure: every deviation of a log from the reference at the same times, with its statistics."""
+"""Measure: every deviation of a log from the reference at the same times, with its statistics and verdict.
+
+1. `measure`: reference - log by x, y, z and norm, distance from the path, angle, joints, and the speed.
+2. `compute_statistics`: max, rms, mean, standard deviation, 95th percentile of a quantity, and its verdict.
+3. `measure_shares`: how much of both motions the verdict is based on, in two shares judged like a deviation.
+
+Rows are measured in blocks, whose size changes no bit of a result: what is summed is summed in parts of a
+fixed size, and the parts exactly.
+
+`coverage` is the share of the reference's samples that the log shows, `judged` the share of the log's
+motion that lies in judged samples. Samples are the rows of a side that have a value; a judged sample is a row
+of the log that was compared, at its time on the reference's clock. A reference sample is shown
+
+- if a judged sample is no further from it than half the reference's period; or
+- if a judged sample is no further than 0.9 of the log's period, and between the judged samples before and
+  after it the reference departs from the straight line between its values at these two by no more than the
+  tolerance (a sparse log of a quick motion shows only its own rows); or
+- if it lies before the first judged sample or after the last, and the reference, which moves elsewhere, rests
+  there: it stays within the tolerance of its value at that judged sample.
+
+Periods are medians of the positive steps. Motion is the length of the log's path (of its joints where these
+alone are compared), counted in steps of at least the tolerance, so that noise at rest does not count. A step
+counts as judged if the row that completes it is. Of a log that rests, samples are counted.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.delta import delta
-from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_blocks, row_norms
 from urmpipe_models.errors import LogError
 from urmpipe_models.math3d import rotation_angle, slerp
 from urmpipe_models.wraps import FULL_TURN
@@ -34,6 +55,7 @@ from urmpipe_pipeline.joint_log import has_gap_after, ns_to_seconds
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import (
+    BLOCK_ROWS,
     ORIENTED,
     Matched,
     Trajectory,
@@ -42,51 +64,107 @@ from urmpipe_pipeline.trajectories import (
     run_finding,
 )
 
-START_SAMPLES = 11
-"""Samples by which the turns of the start are counted: as few as outvote a wild one."""
+START_SAMPLES = 11  # by which the turns of the start are counted: as few as outvote an outlier
+SUMMED_ROWS = 1 << 16  # values that are summed at once: fixed, so that no block size changes a sum
+# In [m] or [m/s]: below, a quantity does not change. Logs print nothing finer than a nanometre, and what
+# rounding leaves (1e-15 m) correlates with anything by chance.
+MIN_STD = 1e-9
+NEAR = 0.9  # of the log's period: rows that each shift by a third of it are up to 1.67 periods apart
+
+
+class Quantity(NamedTuple):
+    """One quantity of a deviation.
+
+    Attributes:
+        name: x, y, z, norm, path, angle, or a joint's name.
+        kind: What it is measured of.
+        unit: m or rad.
+        values: In [m] or [rad], as the unit says, shape (m,); NaN where a side has no value.
+    """
+
+    name: str
+    kind: Kind
+    unit: str
+    values: FloatArray
+
+    def out_of_tolerance(self, tolerance: Mapping[str, float]) -> BoolArray:
+        """Return where it is out of tolerance, shape (m,): nowhere without one.
+
+        A missing value cannot be shown to be within its tolerance: it is out of it.
+        """
+        allowed = allowed_for(self.name, self.kind, tolerance)
+        if allowed is None:
+            return np.zeros(len(self.values), bool)
+        return ~np.asarray(np.abs(self.values) <= allowed)
 
 
 def measure(
-    run: Run, reference: Trajectory, log: Trajectory, matched: Matched, tolerance: Mapping[str, float]
+    run: Run,
+    reference: Trajectory,
+    log: Trajectory,
+    matched: Matched,
+    tolerance: Mapping[str, float],
+    *,
+    block_rows: int = BLOCK_ROWS,
 ) -> Deviation:
     """Return the deviation of a log: delta, distance from the path, angle, joints, shares, and the verdict.
 
     Args:
         run: The log, its name unique in the comparison.
-        reference: What was asked for, its rows that have a value.
-        log: What was done, whole.
+        reference: The reference, its rows that have a value.
+        log: The log, whole.
         matched: Both sides at the same times, the log aligned.
         tolerance: In [m] or [rad], by kind or by coordinate; least shares 0..1.
+        block_rows: Rows that are measured at once; no result depends on it.
 
     Raises:
         LogError: If there is a tolerance for what a side does not have.
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    values = np.column_stack(delta(_columns(matched.reference), _columns(matched.actual)))
-    placed, path, angle = bool(np.isfinite(values).any()), values[:, 3], _angle(matched)
-    if placed:
+    blocks = row_blocks(len(matched.sample), block_rows)
+    values = np.empty((len(matched.sample), 4))
+    for rows in blocks:
+        reference_xyz, log_xyz = (
+            (side[rows, 0], side[rows, 1], side[rows, 2]) for side in (matched.reference, matched.actual)
+        )
+        values[rows] = np.column_stack(delta(reference_xyz, log_xyz))
+    angle, speed = _angle(matched, blocks), _speed(run, matched, blocks)
+    joint_delta, turns = _joint_delta(run, matched)
+    errors = []
+    if "angle" in tolerance and angle is None:
+        errors.append(f"angle: found a side without an orientation, allowed: {ORIENTED}")
+    if "joint" in tolerance and joint_delta is None:
+        reason = joints_not_compared(reference, run)
+        errors.append(f"joint: found that {reason}, allowed: the same joints on both sides")
+    if errors:
+        raise LogError(*(run_finding(run, message, parameter="tolerance") for message in errors))
+    path, in_space = values[:, 3], list[Quantity]()
+    if np.isfinite(values).any():
         joined = ~has_gap_after(reference.t_ns) & run.timed  # nothing joins still poses
         joined[[] if reference.broken is None else reference.broken] = False
         path = distance_from_path(matched.actual, reference.position, joined)
-        path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
-    joint_delta, turns = _joint_delta(run, matched)
-    _refuse_unheld(run, reference, tolerance, angle, joint_delta)
-    in_space, of_joints = _in_space(values, path, angle) if placed else [], _of_joints(run, joint_delta)
-    t, sample = ns_to_seconds(matched.t_ns), matched.sample
-    if not run.timed:
-        t = np.full_like(t, np.nan)
+        path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, within rounding
+        in_space = [Quantity(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
+        in_space.append(Quantity("path", "path", "m", path))
+        in_space += [] if angle is None else [Quantity("angle", "angle", "rad", angle)]
+    joints = list[Quantity]()
+    if joint_delta is not None:
+        columns = zip(run.log.joints, run.joint_units, joint_delta.T, strict=True)
+        joints = [Quantity(name, "joint", unit, column) for name, unit, column in columns]
+    t = ns_to_seconds(matched.t_ns) if run.timed else np.full(len(matched.sample), np.nan)
     statistics, joint_statistics = (
-        {one.quantity: describe(one, t, sample, tolerance) for one in measured}
-        for measured in (in_space, of_joints)
+        {one.name: compute_statistics(one, t, matched.sample, tolerance) for one in quantities}
+        for quantities in (in_space, joints)
     )
     shares = measure_shares(reference, log, matched, tolerance, timed=run.timed)
-    speed = _speed(run, matched)
+    verdicts = [one.verdict for one in (*statistics.values(), *joint_statistics.values())]
+    verdicts += [share.verdict for share in shares.values()]
     x, y, z, norm = (float(value) for value in values[0])
     return Deviation(
         name=run.name,
         run=run,
-        sample=sample,
+        sample=matched.sample,
         t_ns=matched.t_ns,
         reference=matched.reference,
         actual=matched.actual,
@@ -96,7 +174,7 @@ def measure(
         angle=angle,
         joint_delta=joint_delta,
         joint_turns=turns,
-        outside=np.any([one.outside(tolerance) for one in (*in_space, *of_joints)], axis=0),
+        outside=np.any([one.out_of_tolerance(tolerance) for one in (*in_space, *joints)], axis=0),
         sync=matched.sync,
         alignment=matched.alignment,
         left_out=matched.left_out,
@@ -105,23 +183,18 @@ def measure(
         joint_statistics=joint_statistics,
         start=(x, y, z, norm),
         speed_correlation=correlation(values[:, 3], speed),
-        verdict=overall([*statistics.values(), *joint_statistics.values(), *shares.values()]),
+        verdict=combine_verdicts(verdicts),
         shares=shares,
     )
 
 
-def _in_space(values: FloatArray, path: FloatArray, angle: FloatArray | None) -> list[Measured]:
-    """Return what is measured of the pose: x, y, z, norm, path, and the angle where there is one."""
-    found = [Measured(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
-    found.append(Measured("path", "path", "m", path))
-    return found if angle is None else [*found, Measured("angle", "angle", "rad", angle)]
-
-
-def _angle(matched: Matched) -> FloatArray | None:
+def _angle(matched: Matched, blocks: Iterable[slice]) -> FloatArray | None:
     """Return the angle between the orientations in [rad], shape (m,); None if a side has none anywhere."""
     if matched.reference_quat is None or matched.actual_quat is None:
         return None
-    angle = rotation_angle(matched.reference_quat, matched.actual_quat)
+    angle = np.empty(len(matched.sample))
+    for rows in blocks:
+        angle[rows] = rotation_angle(matched.reference_quat[rows], matched.actual_quat[rows])
     return angle if np.isfinite(angle).any() else None
 
 
@@ -129,6 +202,10 @@ def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[i
     """Return reference - log of each joint, and the whole turns that are taken out of a motion's.
 
     None if a joint has no value on a side: it could not be judged.
+
+    Logs of one motion may count other turns for the pose they start in, such as pi and -pi: that is no
+    deviation, a turn more on the way is. The turns are those of the median of the first few samples: an
+    outlier in the first would put all the others a turn out, and a later change stays where it happens.
     """
     if matched.reference_q is None or matched.actual_q is None:
         return None, ()
@@ -136,156 +213,92 @@ def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[i
     if not np.isfinite(difference).any(axis=0).all():
         return None, ()
     turning = np.array(run.joint_units) == "rad"
-    if not run.timed:  # each pose names its turns for itself
-        whole = FULL_TURN * np.rint(difference / FULL_TURN)
-        return difference - np.where(turning, whole, 0.0), (0,) * len(turning)
-    turns = [_turns_at_start(values) if one else 0 for values, one in zip(difference.T, turning, strict=True)]
-    return difference - FULL_TURN * np.array(turns), tuple(turns)
+    if not run.timed:  # each pose counts its turns for itself
+        turns = np.where(turning, FULL_TURN * np.rint(difference / FULL_TURN), 0.0)
+        return difference - turns, (0,) * len(turning)
+    counts = []
+    for column, is_turning in zip(difference.T, turning, strict=True):
+        first = np.sort(column[np.isfinite(column)][:START_SAMPLES])
+        counts.append(int(np.rint(first[(len(first) - 1) // 2] / FULL_TURN)) if is_turning else 0)
+    return difference - FULL_TURN * np.array(counts), tuple(counts)
 
 
-def _turns_at_start(difference: FloatArray) -> int:
-    """Return the whole turns that two joints in [rad] count apart for the pose they start in.
-
-    Logs of one motion may name it by other turns, such as pi and -pi: that is no deviation, a turn more on
-    the way is. The median of the first few samples: a wild first one would put all the others a turn out,
-    and what happens later stands where it happens.
-    """
-    first = difference[np.isfinite(difference)][:START_SAMPLES]
-    return int(np.rint(np.sort(first)[(len(first) - 1) // 2] / FULL_TURN))
-
-
-def _of_joints(run: Run, joint_delta: FloatArray | None) -> list[Measured]:
-    """Return each joint as a quantity."""
-    if joint_delta is None:
-        return []
-    columns = zip(run.log.joints, run.joint_units, joint_delta.T, strict=True)
-    return [Measured(name, "joint", unit, values) for name, unit, values in columns]
-
-
-def unheld(reference: Trajectory, run: Run) -> str:
+def joints_not_compared(reference: Trajectory, run: Run) -> str:
     """Return why no joint of a log is compared."""
-    apart = joint_mismatch(reference, run.log.joints, tuple(run.joint_units))
-    return apart or "a joint has no value at any compared sample"
+    mismatch = joint_mismatch(reference, run.log.joints, tuple(run.joint_units))
+    return mismatch or "a joint has no value at any compared sample"
 
 
-def _refuse_unheld(
-    run: Run,
-    reference: Trajectory,
-    tolerance: Mapping[str, float],
-    angle: FloatArray | None,
-    joint_delta: FloatArray | None,
-) -> None:
-    """Raise a `LogError` if there is a tolerance for what a side does not have: nothing would be judged."""
-    faults = []
-    if "angle" in tolerance and angle is None:
-        faults.append(f"angle: found a side without an orientation, allowed: {ORIENTED}")
-    if "joint" in tolerance and joint_delta is None:
-        faults.append(f"joint: found that {unheld(reference, run)}, allowed: the same joints on both sides")
-    if faults:
-        raise LogError(*(run_finding(run, said, parameter="tolerance") for said in faults))
+def _speed(run: Run, matched: Matched, blocks: Iterable[slice]) -> FloatArray:
+    """Return the speed of the log's tool centre point in [m/s], shape (m,), by kinematics or by positions.
 
-
-def _speed(run: Run, matched: Matched) -> FloatArray:
-    """Return the speed of the log's tool centre point in [m/s]: by kinematics, else by its positions."""
+    By positions it is that of the differences to both neighbours, weighted so that a parabola's is exact: of
+    the one to a single neighbour at a gap or at a sample left out, NaN without any.
+    """
+    speed = np.full(len(matched.sample), np.nan)
     if not run.timed:
-        return np.full(len(matched.sample), np.nan)
+        return speed
     if run.tcp is not None:
-        speed = np.linalg.norm(run.tcp.velocity, axis=1, keepdims=True)
-        return interpolate(matched.t_ns, run.t_ns, speed)[:, 0]
-    return _speed_by_positions(matched)
-
-
-def _speed_by_positions(matched: Matched) -> FloatArray:
-    """Return the speed by the differences to both neighbours: to one beside a gap or a sample left out.
-
-    NaN without a neighbour. Between two the slopes are weighted so that a parabola's is exact.
-    """
-    step = np.diff(ns_to_seconds(matched.t_ns))[:, np.newaxis]
+        velocity = row_norms(run.tcp.velocity)[:, np.newaxis]
+        return interpolate(matched.t_ns, run.t_ns, velocity)[:, 0]
     joined = (np.diff(matched.sample) == 1) & ~has_gap_after(matched.t_ns)
-    slope = np.where(joined[:, np.newaxis], np.diff(matched.actual, axis=0) / step, 0.0)
-    weight = np.where(joined[:, np.newaxis], 1.0 / step, 0.0)  # of the nearer neighbour the more
     none = np.zeros((1, 1))
-    before, after = np.vstack((none, weight)), np.vstack((weight, none))
-    along = before * np.vstack((np.zeros((1, 3)), slope)) + after * np.vstack((slope, np.zeros((1, 3))))
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.linalg.norm(along / (before + after), axis=1))
+    for rows in blocks:
+        first = max(rows.start - 1, 0)  # with a neighbour on each side
+        position = matched.actual[first : rows.stop + 1]
+        step = np.diff(ns_to_seconds(matched.t_ns[first : rows.stop + 1]))[:, np.newaxis]
+        both = joined[first : first + len(step), np.newaxis]
+        slope = np.where(both, np.diff(position, axis=0) / step, 0.0)
+        weight = np.where(both, 1.0 / step, 0.0)  # of the nearer neighbour the more
+        before, after = np.vstack((none, weight)), np.vstack((weight, none))
+        along = before * np.vstack((np.zeros((1, 3)), slope)) + after * np.vstack((slope, np.zeros((1, 3))))
+        with np.errstate(invalid="ignore"):
+            near = np.linalg.norm(along / (before + after), axis=1)
+        speed[rows] = near[rows.start - first :][: rows.stop - rows.start]
+    return speed
 
 
-def _columns(position: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    x, y, z = position.T
-    return x, y, z
-
-
-UNCHANGING = 1e-9
-"""A quantity with a smaller standard deviation, in [m] or [m/s], does not change: logs print nothing finer
-than a nanometre, and what rounding leaves (1e-15 m) correlates with anything by chance."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Measured:
-    """One quantity of a deviation.
-
-    Attributes:
-        quantity: x, y, z, norm, path, angle, or a joint's name.
-        kind: What it is measured of.
-        unit: m or rad.
-        values: In [m] or [rad], as the unit says, shape (m,); NaN where a side has no value.
-    """
-
-    quantity: str
-    kind: Kind
-    unit: str
-    values: FloatArray
-
-    def outside(self, tolerance: Mapping[str, float]) -> NDArray[np.bool_]:
-        """Return where it is out of tolerance, shape (m,): nowhere without one.
-
-        What has no value cannot be shown to be within its tolerance: it is out of it.
-        """
-        allowed = allowed_for(self.quantity, self.kind, tolerance)
-        if allowed is None:
-            return np.zeros(len(self.values), bool)
-        return ~np.asarray(np.abs(self.values) <= allowed)
-
-
-def describe(
-    measured: Measured, t: FloatArray, sample: IntArray, tolerance: Mapping[str, float]
+def compute_statistics(
+    quantity: Quantity, t: FloatArray, sample: IntArray, tolerance: Mapping[str, float]
 ) -> Statistics:
     """Return the statistics of one quantity over the samples that have a value, and the verdict on all.
 
     The quantity has a value at least at one of the log's rows, shape (m,), whose times are in [s], shape
     (m,). The tolerance is in [m] or [rad], by kind or by coordinate.
     """
-    known = np.flatnonzero(np.isfinite(measured.values))
-    values = measured.values[known]
+    known = np.flatnonzero(np.isfinite(quantity.values))
+    values = quantity.values[known]
     size = np.abs(values)
     worst = int(np.argmax(size))
-    largest = float(size[worst])
-    allowed = allowed_for(measured.quantity, measured.kind, tolerance)
-    out = None if allowed is None else int(np.count_nonzero(measured.outside(tolerance)))
+    allowed = allowed_for(quantity.name, quantity.kind, tolerance)
+    out = None if allowed is None else int(np.count_nonzero(quantity.out_of_tolerance(tolerance)))
+    mean = _mean(values)
     return Statistics(
-        quantity=measured.quantity,
-        kind=measured.kind,
-        unit=measured.unit,
-        max=largest,
-        rms=float(np.sqrt(np.mean(values * values))),
-        mean=float(np.mean(values)),
-        std=float(np.std(values)),
+        quantity=quantity.name,
+        kind=quantity.kind,
+        unit=quantity.unit,
+        max=float(size[worst]),
+        rms=math.sqrt(_mean(values, 0.0)),
+        mean=mean,
+        std=math.sqrt(_mean(values, mean)),
         p95=float(np.percentile(size, 95)),
         t_max=float(t[known[worst]]),
         sample_max=int(sample[known[worst]]),
         tolerance=allowed,
         out_of_tolerance=out,
-        share_out=None if out is None else out / len(measured.values),
+        share_out=None if out is None else out / len(quantity.values),
         verdict=None if out is None else "fail" if out else "pass",
         samples=len(known),
-        missing=len(measured.values) - len(known),
+        missing=len(quantity.values) - len(known),
     )
 
 
-def overall(statistics: Iterable[Statistics | Share]) -> Verdict | None:
-    """Return fail if any quantity fails; None if none has a tolerance."""
-    return combine_verdicts(one.verdict for one in statistics)
+def _mean(values: FloatArray, about: float | None = None) -> float:
+    """Return the mean of values, shape (m,), or of their squares about a value."""
+    parts = (values[rows] for rows in row_blocks(len(values), SUMMED_ROWS))
+    if about is not None:
+        parts = ((part - about) ** 2 for part in parts)
+    return float(np.sum([np.sum(part) for part in parts])) / len(values)
 
 
 def correlation(first: FloatArray, second: FloatArray) -> float | None:
@@ -298,16 +311,13 @@ def correlation(first: FloatArray, second: FloatArray) -> float | None:
         return None
     a, b = (values[both] - values[both].mean() for values in (first, second))
     spread = float(np.sqrt(np.mean(a * a))), float(np.sqrt(np.mean(b * b)))
-    if min(spread) < UNCHANGING:
+    if min(spread) < MIN_STD:
         return None
     return float(np.clip(np.mean(a * b) / (spread[0] * spread[1]), -1.0, 1.0))
 
 
-NEAR = 0.9  # of the log's period: rows that each shift by a third of it are up to 1.67 periods apart
-
-
 class _Limits(NamedTuple):
-    """What is allowed: of x, y, z in [m], shape (3,), of their norm in [m], of angles and joints in [rad]."""
+    """Tolerances: of x, y, z in [m], shape (3,), of their norm in [m], of angles and joints in [rad]."""
 
     axes: FloatArray
     norm: float
@@ -333,7 +343,7 @@ def measure_shares(
     """Return `coverage` and `judged` of a compared log, with the verdict on each.
 
     Args:
-        reference: The reference as it was matched; rows of it without a value do not count.
+        reference: The reference as it was matched; its rows without a value do not count.
         log: The log, whole, on its own clock.
         matched: Both sides at the compared samples.
         tolerance: By kind: deviations in [m] and [rad], least shares 0..1.
@@ -377,7 +387,7 @@ def _share(
 
 
 def _limits(tolerance: Mapping[str, float]) -> _Limits:
-    """Return what is allowed of each quantity, inf without a tolerance; the default without any."""
+    """Return the tolerance of each quantity, inf without one; the default tolerance if nothing has one."""
     if not set(tolerance) - set(LEAST_SHARES):
         tolerance = {"axis": DEFAULT_TOLERANCE}
     axes = [allowed_for(axis, "axis", tolerance) for axis in "xyz"]
@@ -439,7 +449,7 @@ def _straight(left: _Values, right: _Values, share: FloatArray) -> _Values:
 
 
 def _departs(first: _Values, second: _Values, limits: _Limits) -> BoolArray:
-    """Return where two sets of values differ by more than what is allowed; a missing value differs."""
+    """Return where two sets of values differ by more than the tolerance; a missing value differs."""
     difference = first.position - second.position
     within = [np.abs(difference[:, k]) <= limit for k, limit in enumerate(limits.axes) if limit < math.inf]
     if limits.norm < math.inf:
@@ -461,11 +471,11 @@ def _judged_motion(log: Trajectory, valued: IntArray, judged: BoolArray, limits:
     elif least == math.inf and log.quat_xyzw is not None:  # |2 q1 - 2 q2| = 4 sin(angle / 4)
         points, least = 2.0 * log.quat_xyzw, limits.angle
     total = counted = 0.0
-    rows = points[valued].tolist()
-    start = rows[0]
-    for row, is_judged in zip(rows, judged.tolist(), strict=True):
-        if (length := math.dist(start, row)) >= least:
-            start = row
-            total += length
-            counted += length * is_judged
+    start = points[valued[0]].tolist()
+    for block in row_blocks(len(valued)):
+        for row, is_judged in zip(points[valued[block]].tolist(), judged[block].tolist(), strict=True):
+            if (length := math.dist(start, row)) >= least:
+                start = row
+                total += length
+                counted += length * is_judged
     return counted / total if total else float(np.mean(judged))

@@ -105,13 +105,16 @@ class Grid(NamedTuple):
         return first, np.searchsorted(self.t_ns, self.source_ns[row_steps[:, 1]], side="left")
 
 
-def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> FloatArray:
+def interpolate(
+    at_ns: IntArray, known_ns: IntArray, values: FloatArray, gaps: BoolArray | None = None
+) -> FloatArray:
     """Interpolate linearly; NaN outside the known times and inside their gaps.
 
     Args:
         at_ns: Times to interpolate at in integer [ns], shape (m,).
         known_ns: Known times in integer [ns], strictly increasing, shape (n,).
         values: Values at the known times, in any unit, shape (n, k).
+        gaps: Which known times have a gap after them, shape (n - 1,); None: as `has_gap_after`.
 
     Returns:
         Values in the same unit, shape (m, k).
@@ -122,7 +125,7 @@ def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> Floa
     result = np.empty((len(x), values.shape[1]))
     for i, column in enumerate(values.T):
         result[:, i] = np.interp(x, known, column, np.nan, np.nan)
-    result[is_inside_gap(at_ns, known_ns)] = np.nan
+    result[is_inside_gap(at_ns, known_ns, gaps)] = np.nan
     return result
 
 

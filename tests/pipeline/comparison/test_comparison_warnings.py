@@ -14,7 +14,7 @@ from asserting import there
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import complete_noise
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.measure import Measured, describe
+from urmpipe_pipeline.comparison.measure import Quantity, compute_statistics
 from urmpipe_pipeline.comparison.warnings import (
     large_noises,
     large_tolerances,
@@ -67,16 +67,18 @@ def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArra
     rows = [row for row in missing if row < len(values)][: len(values) - 1]
     values[rows] = np.nan
     count, t = np.arange(len(values)), np.linspace(0.0, 1.0, len(values))
-    measured = Measured("angle", "angle", "rad", values)
-    one = describe(measured, t, count, {"angle": 1.0})
+    measured = Quantity("angle", "angle", "rad", values)
+    one = compute_statistics(measured, t, count, {"angle": 1.0})
     assert (one.samples, one.missing) == (len(values) - len(rows), len(rows))
     above = int(np.count_nonzero(np.abs(values) > 1.0))
     assert (
-        one.out_of_tolerance == above + len(rows) == int(np.count_nonzero(measured.outside({"angle": 1.0})))
+        one.out_of_tolerance
+        == above + len(rows)
+        == int(np.count_nonzero(measured.out_of_tolerance({"angle": 1.0})))
     )
     assert round(there(one.share_out) * len(values)) == one.out_of_tolerance
     assert one.verdict == ("fail" if above or rows else "pass")
-    free = describe(measured, t, count, {"axis": 1.0})
+    free = compute_statistics(measured, t, count, {"axis": 1.0})
     assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
 
 

@@ -14,9 +14,10 @@ from urmpipe_models.delta import delta as model_delta
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
-from urmpipe_pipeline.comparison.measure import Measured, describe, overall
+from urmpipe_pipeline.comparison.measure import Quantity, compute_statistics
 from urmpipe_pipeline.comparison.verdict import delta_verdict
 from urmpipe_pipeline.comparison.wording import meter_words
+from urmpipe_pipeline.iso9283.criteria import combine_verdicts
 
 T_NS = np.array([0, 5_000_000, 10_000_000])
 DELTA = np.array([[1e-3, 0.0, 0.0], [0.0, -4e-3, 3e-3], [3.5e-3, 0.0, 0.0]])
@@ -133,11 +134,14 @@ def test_it_is_the_verdict_of_compare(delta: FloatArray, which: list[str], row: 
     tolerance = {kind: share * sizes.get(kind, sizes["y"]) for kind in which}
     assume(min(tolerance.values()) > 0.0)  # compare tells no share of nothing
     found = delta_verdict("meter", np.arange(len(delta)), delta, tolerance)
-    measured = [Measured(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
-    every = [describe(one, np.arange(len(delta)) / 1e9, np.arange(len(delta)), tolerance) for one in measured]
+    measured = [Quantity(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
+    every = [
+        compute_statistics(one, np.arange(len(delta)) / 1e9, np.arange(len(delta)), tolerance)
+        for one in measured
+    ]
     assert found is not None
-    assert found.verdict == overall(every)
-    outside = np.any([one.outside(tolerance) for one in measured], axis=0)
+    assert found.verdict == combine_verdicts(one.verdict for one in every)
+    outside = np.any([one.out_of_tolerance(tolerance) for one in measured], axis=0)
     assert found.out_of_tolerance == np.count_nonzero(outside)
     worst = max((one for one in every if one.used is not None), key=lambda one: one.used or 0.0)
     assert found.used == worst.used

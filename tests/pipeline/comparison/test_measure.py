@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,14 +19,15 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.math3d import RotationForm, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, trajectory
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.measure import UNCHANGING, correlation
+from urmpipe_pipeline.comparison.measure import MIN_STD, Quantity, compute_statistics, correlation, measure
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.trajectories import Sync, match
 
 LOGS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
 TURN = 2 * np.pi
@@ -48,6 +50,7 @@ def joints() -> FloatArray:
 
 
 NAMES = ("a", "b", "s")
+TWO = ((0.005, "path"), (0.0047, "log"))
 
 
 def held(reference: Run, log: Run, **tolerance: float) -> Deviation:
@@ -298,10 +301,55 @@ def test_what_does_not_change_correlates_with_nothing() -> None:
     rounding = 0.0025 + 1e-16 * rng.integers(-3, 4, 500).astype(np.float64)
     assert correlation(rounding, speed) is None
     assert correlation(speed, np.full(500, 0.3)) is None
-    assert correlation(0.0025 + UNCHANGING * speed, speed) is None
+    assert correlation(0.0025 + MIN_STD * speed, speed) is None
     assert correlation(0.0025 + 1e-6 * speed, speed) == pytest.approx(1.0, abs=1e-9)  # 1e-16 m of 1e-7 m
     assert correlation(np.full(500, np.nan), speed) is None
     assert correlation(np.array([1.0]), np.array([2.0])) is None
+
+
+# Blocks of rows
+
+
+@pytest.mark.parametrize("block_rows", [1, 7, 100, 299])
+@pytest.mark.parametrize("kind", ["joints", "poses", "path"])
+def test_no_size_of_the_blocks_changes_a_bit(kind: str, block_rows: int) -> None:
+    rng = np.random.default_rng(8)
+    position, rotation = np.cumsum(rng.normal(0, 0.01, (300, 3)), axis=0), Rotation.random(300, rng=rng)
+    quat = np.where(rng.random((300, 1)) < 0.1, np.nan, rotation.as_quat())
+    runs = {
+        "joints": (arm_run(joints() + rng.normal(0, 0.01, (300, 3)), NAMES), arm_run(joints(), NAMES)),
+        "poses": tuple(path_run(position, quat, tsp=tsp, name=name) for tsp, name in TWO),
+        "path": tuple(path_run(position, tsp=tsp, name=name) for tsp, name in TWO),
+    }[kind]
+    reference, log = (replace(trajectory(run), broken=np.array([40, 41])) for run in runs)
+    late = np.where(np.arange(300) < 200, 0, 300_000_000)
+    reference, log = (replace(side, t_ns=side.t_ns + late) for side in (reference, log))
+    missing = log.position.copy()
+    missing[rng.integers(0, 300, 9)] = np.nan
+    log = replace(log, position=missing)
+
+    def measured(**sizes: int) -> Deviation:
+        matched = match(reference, log, Sync("given", 0.0123), **sizes)
+        assert len(matched.sample) > 200
+        return measure(runs[1], reference, log, matched, {"axis": 0.01, "coverage": 0.9}, **sizes)
+
+    at_once, in_blocks = measured(), measured(block_rows=block_rows)
+    for name in ("sample", "t_ns", "reference", "actual", "delta", "path", "speed", "angle", "joint_delta"):
+        first, second = getattr(at_once, name), getattr(in_blocks, name)
+        assert (first is None) == (second is None)
+        assert first is None or first.tobytes() == second.tobytes()
+    assert at_once.to_dict() == in_blocks.to_dict()
+
+
+def test_sums_are_those_of_parts_of_a_fixed_size() -> None:
+    """The mean of 200,000 values, to the last bits; all rows at once would round elsewhere."""
+    values = np.random.default_rng(9).normal(1.0, 1.0, 200_000)
+    rows = np.arange(len(values))
+    found = compute_statistics(Quantity("norm", "norm", "m", values), rows / 1e3, rows, {})
+    assert found.mean == pytest.approx(math.fsum(values) / len(values), rel=1e-15)
+    assert found.rms == pytest.approx(math.sqrt(math.fsum(values**2) / len(values)), rel=1e-15)
+    deviations = (values - found.mean) ** 2
+    assert found.std == pytest.approx(math.sqrt(math.fsum(deviations) / len(values)), rel=1e-15)
 
 
 # The sample logs
