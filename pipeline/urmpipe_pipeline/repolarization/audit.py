@@ -1,7 +1,11 @@
 """The repolarizer over a log, and its audit: what was undone, repaired, left, or is ambiguous.
 
-- `AuditEntry`: one finding.
-- `audit_log`: unwrap the joints that turn, and return the values with entries, warnings and inferences.
+`audit_log` takes these steps:
+
+1. unwrap the revolute joints by their periods P (`interval`); again with 4 pi where a joint steps by 4 pi;
+2. find the samples that a linear resampling left on wraps (in-between), and repair them if requested;
+3. find the gaps in which a joint can have turned by more than P / 2 (ambiguous);
+4. return the values with an `AuditEntry` for each finding, one warning per kind, and the inferred intervals.
 """
 
 from __future__ import annotations
@@ -11,10 +15,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Hint
 from urmpipe_models.wraps import (
     FULL_TURN,
@@ -35,28 +38,33 @@ from urmpipe_pipeline.sources.options import GivenInterval
 
 AuditKind = Literal["wrap", "in-between", "repaired", "unexplained", "ambiguous"]
 
+MAX_ENTRIES = 10_000  # of a kind other than wraps: a log with more is not one of joints; a warning counts all
+DOUBLE_TURN_RATIO = 3.0  # |step - 4 pi| / motion of the joint at its largest speed
+_LIST_ALL = (Hint("audit", None, "lists all", call="ingest"),)
+
 
 @dataclass(frozen=True, slots=True)
 class AuditEntry:
-    """One thing that the repolarizer did to a joint, or could not decide.
+    """A change by the repolarizer, or a step or gap that it could not explain.
 
-    kind says which:
+    The kinds:
         wrap: a jump of a period that was undone.
-        in-between: a sample that a linear resampling left on a wrap; it stands as it is.
-        repaired: such a sample, put on the line through its neighbours.
-        unexplained: a step above a quarter period that is no wrap; it stays.
-        ambiguous: a gap in which the joint can have turned more than half a period; the nearest is taken.
+        in-between: a sample that a linear resampling left on a wrap; it is kept.
+        repaired: such a sample, moved to the line through its neighbours.
+        unexplained: a step above a quarter period that is no wrap; it is kept.
+        ambiguous: a gap in which the joint can have turned by more than half a period; the nearest turn is
+            used.
 
     Attributes:
         joint: Name of the joint.
         row: Data row of the file, from 1: the first row after the step, or the sample itself.
-        t: Instant in [s]: of a step t_r, half way between its two samples; of a sample its time.
+        t: Time in [s]: of a step the middle between its two samples; of a sample its time.
         half_period: t is known to +- this, in [s].
-        step: The step as it stands in the file, in [rad]; of a sample how far it lies from the line
-            through its repolarized neighbours.
+        step: The step as in the file in [rad]; of a sample the distance from the line through its repolarized
+            neighbours.
         before: Turns k added before it.
         after: Turns k added from it on.
-        kind: What it is.
+        kind: The kind.
     """
 
     joint: str
@@ -82,30 +90,19 @@ class AuditEntry:
         }  # fmt: skip
 
 
-ALL = (Hint("audit", None, "lists all", call="ingest"),)
-"""Where those are of which a warning gives the number."""
-
-MOST = 10_000
-"""Entries of a kind that are no wraps: a log with more of them is none of joints; a warning counts all."""
-
-NEAR = 3.0
-"""A step misses 4 pi by no more than this times what the joint moves at its largest speed."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AuditResult:
-    """A log's joints, repolarized, and what there is to say about it.
+class AuditResult(NamedTuple):
+    """The repolarized joints of a log, and their audit.
 
     Attributes:
-        q: Repolarized values in [rad] or [m] on the file's own rows, repaired if that was asked for, shape
-            (n, joints).
+        q: Repolarized values in [rad] or [m] on the rows of the file, repaired if requested, shape (n,
+            joints).
         entries: The audit, by row.
-        warnings: What a person should know.
-        inferences: The intervals that the joints are limited to.
-        unresolved: Row before, row after and joint index of each step that is unexplained or ambiguous,
-            shape (u, 3): nothing is to be interpolated across it.
-        broken: The same of each step that is no motion, shape (b, 3): the unresolved ones, and those to and
-            from an in-between sample.
+        warnings: One warning per kind of entry, and those about intervals.
+        inferences: The intervals to which the joints are limited.
+        unresolved: Row before, row after and joint index of each unexplained or ambiguous step, shape (u, 3);
+            do not interpolate across them.
+        broken: The same of each step that is no motion, shape (b, 3): the unresolved steps, and those to and
+            from in-between samples.
     """
 
     q: FloatArray
@@ -116,23 +113,34 @@ class AuditResult:
     broken: IntArray
 
 
-class _Places(NamedTuple):
-    """Where something is: rows and joints, the rows of the values before, and how large it is."""
+class _Steps(NamedTuple):
+    """Steps to rows of joints, the row of the value before each, and their sizes."""
 
     rows: IntArray
     joints: IntArray
     before: IntArray
-    figures: FloatArray
+    sizes: FloatArray
 
     @property
-    def steps(self) -> IntArray:
+    def table(self) -> IntArray:
         """Row before, row after and joint index, shape (m, 3)."""
         return np.column_stack((self.before, self.rows, self.joints))
 
     @property
-    def worst(self) -> int:
-        """Index of the largest."""
-        return int(np.argmax(np.abs(self.figures)))
+    def largest(self) -> int:
+        """Index of the largest step."""
+        return int(np.argmax(np.abs(self.sizes)))
+
+    def joint_names(self, log: JointLog) -> str:
+        return text.enumerated([log.joints[j] for j in np.unique(self.joints).tolist()])
+
+
+class _Unwrapped(NamedTuple):
+    """The repolarized joints; period P in [rad] and speed limit in [rad/s] of each joint, shape (joints,)."""
+
+    joints: Repolarized
+    periods: FloatArray
+    limits: FloatArray
 
 
 def audit_log(
@@ -142,129 +150,125 @@ def audit_log(
     interval: Mapping[str, GivenInterval] | None = None,
     repaired: bool = False,
 ) -> AuditResult:
-    """Repolarize the joints that turn, on the file's own rows, and tell all about it.
+    """Repolarize the revolute joints of a log on the rows of the file.
 
     Args:
         log: The log, its times strictly increasing.
-        robot: The arm: it tells which joints turn and how fast they can.
-        interval: The interval of a joint by its name, by "" of all that turn, in the file's own unit.
-        repaired: Whether in-between samples are put on the line through their neighbours.
+        robot: The arm, which determines the revolute joints and their speed limits.
+        interval: Interval of a joint by name, of all revolute joints by "", in the unit of the file.
+        repaired: Whether in-between samples are moved to the line through their neighbours.
 
     Raises:
-        OptionError: If an interval makes no sense.
-        LogError: If values lie outside of an interval that was given, or it cannot be told without.
+        OptionError: If an interval is not allowed.
+        LogError: If values are outside of a given interval, or an interval cannot be inferred.
     """
-    given = interval or {}
-    fixed, periods, limits = _repolarized(log, robot, given)
-    inferences, noticed = interval_inferences(log, fixed, periods, given)
-    odd = _steps_to(log, *fixed.unexplained.T)
-    between = _in_between(log, fixed, periods)
-    unsure, speeds = _ambiguous(log, fixed, periods, limits, between)
-    kinds: dict[AuditKind, _Places] = {
-        "wrap": _steps_to(log, fixed.rows, fixed.joints),
-        "repaired" if repaired else "in-between": between,
-        "unexplained": odd,
-        "ambiguous": unsure,
+    intervals = interval or {}
+    unwrapped, periods, limits = _unwrap(log, robot, intervals)
+    inferences, interval_warnings = interval_inferences(log, unwrapped, periods, intervals)
+    unexplained = _steps_to(log, *unwrapped.unexplained.T)
+    in_between = _find_in_between(log, unwrapped, periods)
+    ambiguous, speeds = _find_ambiguous(log, unwrapped, periods, limits, in_between)
+    steps: dict[AuditKind, _Steps] = {
+        "wrap": _steps_to(log, unwrapped.rows, unwrapped.joints),
+        "repaired" if repaired else "in-between": in_between,
+        "unexplained": unexplained,
+        "ambiguous": ambiguous,
     }
     warnings = [
-        *noticed,
-        *_warn_unexplained(log, odd, periods),
-        *_warn_ambiguous(log, unsure, speeds),
-        *([] if repaired else _warn_in_between(log, between)),
+        *interval_warnings,
+        *_unexplained_warning(log, unexplained, periods),
+        *_ambiguous_warning(log, ambiguous, speeds),
+        *([] if repaired else _in_between_warning(log, in_between)),
     ]
-    unresolved = np.concatenate((odd.steps, unsure.steps))
-    mended = np.column_stack((between.rows, between.joints))
-    return AuditResult(
-        q=reinterpolate(fixed.q, log.t, mended) if repaired and len(mended) else fixed.q,
-        entries=tuple(_entries(log, fixed, periods, kinds)),
-        warnings=tuple(warnings),
-        inferences=tuple(inferences),
-        unresolved=unresolved,
-        broken=unresolved if repaired else np.concatenate((unresolved, *_beside(log, between))),
-    )
+    q, unresolved = unwrapped.q, np.concatenate((unexplained.table, ambiguous.table))
+    broken = unresolved
+    if not repaired:
+        broken = np.concatenate((unresolved, in_between.table, _steps_from(log, in_between)))
+    elif len(in_between.rows):
+        q = reinterpolate(q, log.t, np.column_stack((in_between.rows, in_between.joints)))
+    entries = _build_entries(log, unwrapped, periods, steps)
+    return AuditResult(q, tuple(entries), tuple(warnings), tuple(inferences), unresolved, broken)
 
 
-def _repolarized(
-    log: JointLog, robot: Chain | None, given: Mapping[str, GivenInterval]
-) -> tuple[Repolarized, FloatArray, FloatArray]:
-    """Repolarize the joints; return P of each and the largest speed of each too."""
-    turns = is_revolute(log, robot)
-    periods = wrap_periods(log, turns.tolist(), given)
-    limits = np.array([np.inf if robot is None else robot.moving[j].velocity for j in range(len(turns))])
-    dt = ns_to_seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
-    fixed = repolarize(log.q, dt, period=periods, max_speed=limits)
-    asked = [] if "" in given or not len(fixed.unexplained) else _doubled(log, fixed)
-    doubled = [j for j in asked if log.joints[j] not in given]
-    if doubled:
-        periods[doubled] = 2.0 * FULL_TURN
-        fixed = repolarize(log.q, dt, period=periods, max_speed=limits)
-    return fixed, periods, limits
-
-
-def is_revolute(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
-    """Tell which joints turn, by the robot or else the unit of their columns, shape (joints,)."""
+def is_revolute(log: JointLog, robot: Chain | None) -> BoolArray:
+    """Return which joints are revolute, by the robot or else the unit of their columns, shape (joints,)."""
     if robot is not None and log.joints:
         return np.array([joint.kind == "revolute" for joint in robot.moving])
     return np.array([unit == "rad" for unit in log.joint_units], dtype=np.bool_)
 
 
-def _steps_to(log: JointLog, rows: IntArray, joints: IntArray) -> _Places:
-    """Return the steps to some values, with their size as it stands in the file."""
+def _unwrap(log: JointLog, robot: Chain | None, intervals: Mapping[str, GivenInterval]) -> _Unwrapped:
+    revolute = is_revolute(log, robot)
+    periods = wrap_periods(log, revolute.tolist(), intervals)
+    limits = np.array([np.inf if robot is None else robot.moving[j].velocity for j in range(len(revolute))])
+    dt = ns_to_seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
+    unwrapped = repolarize(log.q, dt, period=periods, max_speed=limits)
+    if "" in intervals or not len(unwrapped.unexplained):
+        return _Unwrapped(unwrapped, periods, limits)
+    doubled = [j for j in _find_double_turns(log, unwrapped) if log.joints[j] not in intervals]
+    if doubled:
+        periods[doubled] = 2.0 * FULL_TURN
+        unwrapped = repolarize(log.q, dt, period=periods, max_speed=limits)
+    return _Unwrapped(unwrapped, periods, limits)
+
+
+def _steps_to(log: JointLog, rows: IntArray, joints: IntArray) -> _Steps:
+    """Return the steps to some values, as in the file, from the last value that is not missing."""
     before = rows - 1
     for j in np.unique(joints[np.isnan(log.q[before, joints])]):
-        mine = joints == j
+        of_joint = joints == j
         present = np.flatnonzero(~np.isnan(log.q[:, j]))
-        before[mine] = present[np.searchsorted(present, rows[mine]) - 1]
-    return _Places(rows, joints, before, log.q[rows, joints] - log.q[before, joints])
+        before[of_joint] = present[np.searchsorted(present, rows[of_joint]) - 1]
+    return _Steps(rows, joints, before, log.q[rows, joints] - log.q[before, joints])
 
 
-def _doubled(log: JointLog, fixed: Repolarized) -> list[int]:
-    """Return the joints that are seen to be limited to +-2 pi."""
-    odd = _steps_to(log, *fixed.unexplained.T)
+def _steps_from(log: JointLog, steps: _Steps) -> IntArray:
+    """Return the steps from the rows of other steps to the next value: row before, row after, joint index."""
+    after = steps.rows + 1
+    for k in np.flatnonzero(np.isnan(log.q[after, steps.joints])):
+        rest = log.q[after[k] :, steps.joints[k]]
+        after[k] += int(np.argmax(~np.isnan(rest)))
+    return np.column_stack((steps.rows, after, steps.joints))
+
+
+def _find_double_turns(log: JointLog, unwrapped: Repolarized) -> list[int]:
+    """Return the joints that are limited to +-2 pi, by their unexplained steps."""
+    steps = _steps_to(log, *unwrapped.unexplained.T)
     speeds = np.zeros(len(log.joints))
-    for j in np.unique(odd.joints):
-        speeds[j] = _held_speed(log, fixed.q, int(j), odd.rows[odd.joints == j])
-    elapsed = ns_to_seconds(log.t_ns[odd.rows] - log.t_ns[odd.before])
-    rest = NEAR * speeds[odd.joints] * elapsed + FULL_TURN / 100.0
-    return find_double_turn_joints(log, fixed, odd.joints, odd.figures, np.minimum(rest, FULL_TURN / 2.0))
+    for j in np.unique(steps.joints):
+        speeds[j] = _sustained_speed(log, unwrapped.q, int(j), steps.rows[steps.joints == j])
+    elapsed = ns_to_seconds(log.t_ns[steps.rows] - log.t_ns[steps.before])
+    slack = DOUBLE_TURN_RATIO * speeds[steps.joints] * elapsed + FULL_TURN / 100.0
+    slack = np.minimum(slack, FULL_TURN / 2.0)
+    return find_double_turn_joints(log, unwrapped, steps.joints, steps.sizes, slack)
 
 
-def _in_between(log: JointLog, fixed: Repolarized, periods: FloatArray) -> _Places:
-    """Return the in-between samples, with how far they lie from the line through their neighbours."""
-    found = [np.empty((0, 2), dtype=np.int64)]
-    off = [np.empty(0)]
-    every, times, sparse = np.arange(log.rows), log.t, _sparse(log)
-    for j in np.unique(fixed.joints).tolist():
-        present, q, x, t = every, log.q[:, j], fixed.q[:, j], times
+def _find_in_between(log: JointLog, unwrapped: Repolarized, periods: FloatArray) -> _Steps:
+    """Return the in-between samples, with their distances from the line through their neighbours as sizes."""
+    samples, distances = [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
+    all_rows, times, sparse = np.arange(log.rows), log.t, _has_missing(log)
+    for j in np.unique(unwrapped.joints).tolist():
+        present, q, x, t = all_rows, log.q[:, j], unwrapped.q[:, j], times
         if sparse[j]:
             present = np.flatnonzero(~np.isnan(q))
             q, x, t = q[present], x[present], t[present]
-        wraps = np.searchsorted(present, fixed.rows[fixed.joints == j])
-        hidden = np.searchsorted(present, fixed.in_between[fixed.in_between[:, 1] == j, 0])
+        wraps = np.searchsorted(present, unwrapped.rows[unwrapped.joints == j])
+        hidden = np.searchsorted(present, unwrapped.in_between[unwrapped.in_between[:, 1] == j, 0])
         at = np.union1d(hidden, find_interpolated_samples(q, x, t, wraps, float(periods[j])))
-        found.append(np.column_stack((present[at], np.full(len(at), j))))
-        off.append(line_residuals(x, t, at))
-    rows, joints = np.concatenate(found).T
+        samples.append(np.column_stack((present[at], np.full(len(at), j))))
+        distances.append(line_residuals(x, t, at))
+    rows, joints = np.concatenate(samples).T
     order = np.lexsort((joints, rows))
-    places = _steps_to(log, rows[order], joints[order])
-    return places._replace(figures=np.concatenate(off)[order])
+    steps = _steps_to(log, rows[order], joints[order])
+    return steps._replace(sizes=np.concatenate(distances)[order])
 
 
-def _beside(log: JointLog, between: _Places) -> list[IntArray]:
-    """Return the steps to and from the in-between samples."""
-    following = between.rows + 1
-    for k in np.flatnonzero(np.isnan(log.q[following, between.joints])):
-        rest = log.q[following[k] :, between.joints[k]]
-        following[k] += int(np.argmax(~np.isnan(rest)))
-    return [between.steps, np.column_stack((between.rows, following, between.joints))]
+def _find_ambiguous(
+    log: JointLog, unwrapped: Repolarized, periods: FloatArray, limits: FloatArray, in_between: _Steps
+) -> tuple[_Steps, FloatArray]:
+    """Return the gaps in which a joint can have turned by more than half a period, and its largest speed.
 
-
-def _ambiguous(
-    log: JointLog, fixed: Repolarized, periods: FloatArray, limits: FloatArray, between: _Places
-) -> tuple[_Places, FloatArray]:
-    """Return the gaps in which a joint can have turned more than half a period, and how fast it can be.
-
-    That is the robot's limit; without one the largest speed that was seen.
+    That is the limit of the robot, else the largest sustained speed.
     """
     steps = np.diff(log.t_ns)
     rows, joints = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
@@ -272,40 +276,38 @@ def _ambiguous(
     uneven = len(steps) and steps.max() > MISSED_SAMPLE * steps.min()
     usual = float(np.median(steps)) if uneven else steps.max(initial=0)
     wide = np.flatnonzero(steps > MISSED_SAMPLE * usual)
-    sparse = _sparse(log)
+    sparse = _has_missing(log)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
-        after, before = _wide_steps(log, j, MISSED_SAMPLE * usual) if sparse[j] else (wide + 1, wide)
+        before, after = wide, wide + 1
+        if sparse[j]:
+            present = np.flatnonzero(~np.isnan(log.q[:, j]))
+            at = np.flatnonzero(np.diff(log.t_ns[present]) > MISSED_SAMPLE * usual)
+            before, after = present[at], present[at + 1]
         if not len(after):
             continue
-        odd = fixed.unexplained[fixed.unexplained[:, 1] == j, 0]
-        skipped = np.concatenate((odd, between.rows[between.joints == j], after))
-        speeds[j] = limits[j] if np.isfinite(limits[j]) else _held_speed(log, fixed.q, j, skipped)
-        reached = speeds[j] * ns_to_seconds(log.t_ns[after] - log.t_ns[before])
-        rows.append(after[reached > periods[j] / 2.0])
+        unexplained = unwrapped.unexplained[unwrapped.unexplained[:, 1] == j, 0]
+        skipped = np.concatenate((unexplained, in_between.rows[in_between.joints == j], after))
+        is_limited = np.isfinite(limits[j])
+        speeds[j] = limits[j] if is_limited else _sustained_speed(log, unwrapped.q, j, skipped)
+        reach = speeds[j] * ns_to_seconds(log.t_ns[after] - log.t_ns[before])
+        rows.append(after[reach > periods[j] / 2.0])
         joints.append(np.full(len(rows[-1]), j))
     at, on = np.concatenate(rows), np.concatenate(joints)
     order = np.lexsort((on, at))
     return _steps_to(log, at[order], on[order]), speeds[on[order]]
 
 
-def _sparse(log: JointLog) -> NDArray[np.bool_]:
-    """Tell which joints miss samples; one pass over all says whether to look column by column."""
+def _has_missing(log: JointLog) -> BoolArray:
+    """Return which joints miss samples; one pass over all decides whether to look column by column."""
     if not np.isnan(log.q.sum()):
         return np.zeros(len(log.joints), dtype=np.bool_)
     return np.asarray(np.isnan(log.q.sum(axis=0)))
 
 
-def _wide_steps(log: JointLog, joint: int, longest: float) -> tuple[IntArray, IntArray]:
-    """Return the rows after and before the steps of a joint that take longer than so many [ns]."""
-    present = np.flatnonzero(~np.isnan(log.q[:, joint]))
-    at = np.flatnonzero(np.diff(log.t_ns[present]) > longest)
-    return present[at + 1], present[at]
+def _sustained_speed(log: JointLog, x: FloatArray, joint: int, skipped: IntArray) -> float:
+    """Return the largest speed of a repolarized joint over two successive steps, in [rad/s].
 
-
-def _held_speed(log: JointLog, x: FloatArray, joint: int, skipped: IntArray) -> float:
-    """Return the largest speed of a repolarized joint that was held over two steps in [rad/s].
-
-    Outliers do not count, nor do the steps to and from rows at which it does not move as a joint does.
+    Outliers have no effect, nor have the steps to and from skipped rows.
     """
     present = np.flatnonzero(~np.isnan(x[:, joint]))
     speed = np.abs(np.diff(x[present, joint])) / ns_to_seconds(np.diff(log.t_ns[present]))
@@ -315,84 +317,75 @@ def _held_speed(log: JointLog, x: FloatArray, joint: int, skipped: IntArray) -> 
     return float(np.minimum(speed[1:], speed[:-1]).max(initial=0.0))
 
 
-def _entries(
-    log: JointLog, fixed: Repolarized, periods: FloatArray, kinds: Mapping[AuditKind, _Places]
+def _build_entries(
+    log: JointLog, unwrapped: Repolarized, periods: FloatArray, steps: Mapping[AuditKind, _Steps]
 ) -> list[AuditEntry]:
-    """Return the audit by row: of each kind its entries, of those that are no wraps the first `MOST`."""
+    """Return the audit by row; of each kind other than wraps the first `MAX_ENTRIES`."""
     entries: list[AuditEntry] = []
-    for kind, places in kinds.items():
-        most = None if kind == "wrap" else MOST
-        rows, joints, before = places.rows[:most], places.joints[:most], places.before[:most]
-        begin, end = log.t_ns[rows if kind in ("in-between", "repaired") else before], log.t_ns[rows]
-        turns = (_turns_at(log, fixed, periods, at, joints) for at in (before, rows))
-        times = ((begin + end) / 2e9, (end - begin) / 2e9)
-        columns = (rows, joints, *times, places.figures[:most], *turns)
-        for row, j, t, half, figure, k_before, k_after in zip(*(c.tolist() for c in columns), strict=True):
-            entries.append(AuditEntry(log.joints[j], row + 1, t, half, figure, k_before, k_after, kind))
+    for kind, of_kind in steps.items():
+        count = None if kind == "wrap" else MAX_ENTRIES
+        rows, joints, before = of_kind.rows[:count], of_kind.joints[:count], of_kind.before[:count]
+        start, end = log.t_ns[rows if kind in ("in-between", "repaired") else before], log.t_ns[rows]
+        turns = (
+            np.rint((unwrapped.q[at, joints] - log.q[at, joints]) / periods[joints]).astype(np.int64)
+            for at in (before, rows)
+        )
+        columns = (rows, joints, (start + end) / 2e9, (end - start) / 2e9, of_kind.sizes[:count], *turns)
+        for row, j, t, half, size, k_before, k_after in zip(*(c.tolist() for c in columns), strict=True):
+            entries.append(AuditEntry(log.joints[j], row + 1, t, half, size, k_before, k_after, kind))
     return sorted(entries, key=lambda entry: entry.row)
 
 
-def _turns_at(
-    log: JointLog, fixed: Repolarized, periods: FloatArray, rows: IntArray, joints: IntArray
-) -> IntArray:
-    """Return k at some values."""
-    added = fixed.q[rows, joints] - log.q[rows, joints]
-    return np.rint(added / periods[joints]).astype(np.int64)
-
-
-def _warn_unexplained(log: JointLog, odd: _Places, periods: FloatArray) -> Iterator[LogWarning]:
-    """Warn once of the steps above a quarter period that are no repolarization."""
-    if not len(odd.rows):
+def _unexplained_warning(log: JointLog, steps: _Steps, periods: FloatArray) -> Iterator[LogWarning]:
+    if not len(steps.rows):
         return
-    joints, worst = _joints(log, odd), odd.worst
-    quarter = f"{np.degrees(periods[odd.joints].min() / 4.0):.0f} deg"
-    if len(odd.rows) == 1:
-        to = log.q[odd.rows[0], odd.joints[0]]
-        said = f"{joints} steps by more than {quarter} from the value before, to {to:.6g} rad: not a wrap,"
-        yield LogWarning("large-step", f"{said} the value is kept", int(odd.rows[0]) + 1)
+    names, row = steps.joint_names(log), int(steps.rows[0])
+    quarter = f"{np.degrees(periods[steps.joints].min() / 4.0):.0f} deg"
+    if len(steps.rows) == 1:
+        value = log.q[row, steps.joints[0]]
+        message = (
+            f"{names} steps by more than {quarter} from the value before, to {value:.6g} rad: not a wrap,"
+        )
+        yield LogWarning("large-step", f"{message} the value is kept", row + 1)
         return
-    said = f"{len(odd.rows)} steps of {joints} by more than {quarter} are not wraps and are kept"
-    by = f"of {log.joints[odd.joints[worst]]} by {np.degrees(abs(odd.figures[worst])):.4g} deg"
-    said = f"{said}; the largest, {by}, is to row {odd.rows[worst] + 1}"
-    yield LogWarning("large-step", said, int(odd.rows[0]) + 1, hints=ALL)
+    worst = steps.largest
+    message = f"{len(steps.rows)} steps of {names} by more than {quarter} are not wraps and are kept"
+    message += f"; the largest, of {log.joints[steps.joints[worst]]} by"
+    message += f" {np.degrees(abs(steps.sizes[worst])):.4g} deg, is to row {steps.rows[worst] + 1}"
+    yield LogWarning("large-step", message, row + 1, hints=_LIST_ALL)
 
 
-def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
-    """Warn once of the samples that a linear resampling left on wraps."""
-    if not len(between.rows):
+def _in_between_warning(log: JointLog, steps: _Steps) -> Iterator[LogWarning]:
+    if not len(steps.rows):
         return
-    joints, worst = _joints(log, between), between.worst
-    off, row = f"{abs(between.figures[worst]):.4g} rad", int(between.rows[0]) + 1
-    if len(between.rows) == 1:
-        said = f"{joints} lies between the ends of a wrap, {off} off the line of its neighbours, where a"
+    names, worst, row = steps.joint_names(log), steps.largest, int(steps.rows[0]) + 1
+    distance = f"{abs(steps.sizes[worst]):.4g} rad"
+    if len(steps.rows) == 1:
+        message = (
+            f"{names} lies between the ends of a wrap, {distance} off the line of its neighbours, where a"
+        )
         hints: tuple[Hint, ...] = (Hint("repair", True, "puts it there"),)
-        yield LogWarning("in-between", f"{said} linear resampling left it", row, hints=hints)
+        yield LogWarning("in-between", f"{message} linear resampling left it", row, hints=hints)
         return
-    said = f"{len(between.rows)} samples of {joints} lie between the ends of wraps, where a linear resampling"
-    by = f"of {log.joints[between.joints[worst]]} in row {between.rows[worst] + 1} by {off}"
-    said = f"{said} left them, off the line of their neighbours, at most that {by}"
-    yield LogWarning("in-between", said, row, hints=(Hint("repair", True, "puts them there"), *ALL))
+    message = f"{len(steps.rows)} samples of {names} lie between the ends of wraps, where a linear resampling"
+    message += " left them, off the line of their neighbours, at most that of"
+    message += f" {log.joints[steps.joints[worst]]} in row {steps.rows[worst] + 1} by {distance}"
+    yield LogWarning("in-between", message, row, hints=(Hint("repair", True, "puts them there"), *_LIST_ALL))
 
 
-def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Iterator[LogWarning]:
-    """Warn once of the gaps in which joints can have turned."""
-    if not len(unsure.rows):
+def _ambiguous_warning(log: JointLog, steps: _Steps, speeds: FloatArray) -> Iterator[LogWarning]:
+    if not len(steps.rows):
         return
-    gaps = np.unique(np.column_stack((unsure.rows, unsure.before)), axis=0)
-    passed = ns_to_seconds(log.t_ns[gaps[:, 0]] - log.t_ns[gaps[:, 1]])
-    longest, row = int(np.argmax(passed)), int(gaps[0, 0]) + 1
-    fastest = {log.joints[j]: speeds[unsure.joints == j].max() for j in np.unique(unsure.joints).tolist()}
+    gaps = np.unique(np.column_stack((steps.rows, steps.before)), axis=0)
+    durations = ns_to_seconds(log.t_ns[gaps[:, 0]] - log.t_ns[gaps[:, 1]])
+    longest, row = int(np.argmax(durations)), int(gaps[0, 0]) + 1
+    fastest = {log.joints[j]: speeds[steps.joints == j].max() for j in np.unique(steps.joints).tolist()}
     joints = ", ".join(f"{name} (at {speed:.3g} rad/s)" for name, speed in fastest.items())
     turned = f"{joints} can have turned by more than half a period"
     if len(gaps) == 1:
-        said = f"no value for {passed[0]:.6g} s before this row: {turned}; the nearest turn is taken"
-        yield LogWarning("ambiguous-turn", said, row)
+        message = f"no value for {durations[0]:.6g} s before this row: {turned}; the nearest turn is taken"
+        yield LogWarning("ambiguous-turn", message, row)
         return
-    ends = f"the longest, {passed[longest]:.6g} s, ends at row {gaps[longest, 0] + 1}"
-    said = f"in {len(gaps)} gaps without values {turned}; {ends}; the nearest turns are taken"
-    yield LogWarning("ambiguous-turn", said, row, hints=ALL)
-
-
-def _joints(log: JointLog, places: _Places) -> str:
-    """Return the joints that some places are of, each once."""
-    return text.enumerated([log.joints[j] for j in np.unique(places.joints).tolist()])
+    message = f"in {len(gaps)} gaps without values {turned}; the longest, {durations[longest]:.6g} s,"
+    message += f" ends at row {gaps[longest, 0] + 1}; the nearest turns are taken"
+    yield LogWarning("ambiguous-turn", message, row, hints=_LIST_ALL)
