@@ -27,7 +27,7 @@ from bare_fmu import BareFmu
 from scipy.optimize import Bounds, OptimizeResult, differential_evolution
 
 import urmpipe
-from urmpipe.driven_runs.arm_unit import ArmUnit
+from urmpipe.driven_runs import ArmUnit
 from urmpipe_datasets import ROBOTS
 from urmpipe_fmus.block import Memory, Parameter, State
 from urmpipe_fmus.blocks.driven_arm import driven_arm

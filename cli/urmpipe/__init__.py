@@ -158,7 +158,7 @@ __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604 - the names are those
 
 def _page(result: Any) -> str | None:
     """Return what a notebook shows of a result."""
-    from urmpipe.printing.notebook import notebook_page
+    from urmpipe.printing.results import notebook_page
 
     return notebook_page(result)
 

@@ -105,7 +105,7 @@ def _are_controls(value: Any) -> bool:
 
 
 def _is_table(value: Any) -> bool:
-    from urmpipe.log_table import LogTable
+    from urmpipe.systems.logs import LogTable
 
     return isinstance(value, LogTable) or _is_path(value)
 

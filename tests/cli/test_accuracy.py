@@ -11,7 +11,7 @@ import pytest
 
 import urmpipe
 from flat_arm import ARM, MASSES, drive, lay_flat_arm
-from urmpipe.driven_runs.running_speed import Within, running_speed
+from urmpipe.driven_runs import Within, running_speed
 from urmpipe.main import run
 from urmpipe_models.planning.path import cube_rows
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from urmpipe.options.named import option_value
-from urmpipe.systems.log_tables import read_mapped_table, read_table
+from urmpipe.systems.logs import read_mapped_table, read_table
 from urmpipe.systems.units import unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.blocks import block_names

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe.systems.held_logs import between_samples, on_points
+from urmpipe.systems.logs import held_warning, snap_to_points
 from urmpipe_fmus.block import Table
 from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.runs.grid import row_clock
@@ -22,19 +22,19 @@ def test_each_communication_point_of_a_regular_log_reads_its_own_row(rate: float
     clock = row_clock(stamps(rate, unit_ns))
     step = clock.period / 1e9
     assert step == pytest.approx(1.0 / rate, rel=1e-5)  # by the ends of 2000 rows, to a digit
-    times = on_points(clock.t_ns, step)
+    times = snap_to_points(clock.t_ns, step)
     k = np.arange(len(times))
     read = Table(times, k[:, None].astype(float)).rows_at(k * step)
     np.testing.assert_array_equal(read.before[0], k)
     np.testing.assert_array_equal(read.fraction, 0.0)
-    assert between_samples("log", times, step, len(times) - 1) is None
+    assert held_warning("log", times, step, len(times) - 1) is None
 
 
 def test_samples_off_the_points_stay_where_they_are_and_are_told() -> None:
     times = np.array([0, 5_000_000, 7_500_000, 15_000_010], dtype=np.int64)
-    met = on_points(times, 0.005)
+    met = snap_to_points(times, 0.005)
     assert met.tolist() == [0, 5_000_000, 7_500_000, 15_000_000]
-    said = between_samples("log", met, 0.005, 9)
+    said = held_warning("log", met, 0.005, 9)
     assert said is not None
     assert said.message == (
         "block log: 1 of 4 communication points lie between samples of the log, where the previous"
@@ -45,4 +45,4 @@ def test_samples_off_the_points_stay_where_they_are_and_are_told() -> None:
 def test_the_period_of_an_irregular_log_is_its_median_and_one_row_has_none() -> None:
     assert row_clock(np.array([0, 10, 20, 90, 100], dtype=np.int64) * 1_000_000).period == 10e6
     assert row_clock(np.array([0], dtype=np.int64)).period == 0.0
-    assert on_points(np.array([0], dtype=np.int64), 0.005).tolist() == [0]
+    assert snap_to_points(np.array([0], dtype=np.int64), 0.005).tolist() == [0]

@@ -12,7 +12,7 @@ import pytest
 
 import urmpipe
 from four_logs import Captured, compare, lay_logs, names, read_lines, recorded
-from urmpipe.printing.presentation import print_presentation
+from urmpipe.printing.results import print_presentation
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.results import present
 

@@ -18,7 +18,7 @@ from rerun.chunk import RrdReader
 import urmpipe
 from recorded import columns, views
 from same_results import assert_same
-from urmpipe.printing.presentation import print_presentation
+from urmpipe.printing.results import print_presentation
 from urmpipe.printing.terminal import print_json
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import results

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import urmpipe as package
-from urmpipe.systems.log_tables import read_table
+from urmpipe.systems.logs import read_table
 from urmpipe_models.errors import LogError
 
 RunCommand = Callable[..., object]

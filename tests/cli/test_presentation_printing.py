@@ -8,7 +8,7 @@ import pytest
 from rich.cells import cell_len
 
 from urmpipe.printing import terminal as printing
-from urmpipe.printing.presentation import print_presentation, print_verdict
+from urmpipe.printing.results import print_presentation, print_verdict
 from urmpipe.printing.terminal import LISTED, new_console
 from urmpipe_pipeline.presentation.section import (
     Column,

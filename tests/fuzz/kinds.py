@@ -73,7 +73,7 @@ def robot(path: Path, made: Path, rng: Random) -> None:
     import numpy as np
 
     import urmpipe
-    from urmpipe.printing.robot import chain_at
+    from urmpipe.printing.mechanisms import chain_at
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
     from urmpipe_pipeline.presentation.meshes import missing_visuals
@@ -224,7 +224,7 @@ def behind_name(*mutators: Mutator) -> list[Mutator]:
 
 def fmu(path: Path, made: Path, rng: Random) -> None:
     """Check an FMU, and read what a system reads of it."""
-    from urmpipe.printing.fmu import checked_dict
+    from urmpipe.printing.units import checked_dict
     from urmpipe_fmus.check import check_fmu
     from urmpipe_fmus.cosim.checks import read_interface
 

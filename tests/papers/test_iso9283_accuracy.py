@@ -16,7 +16,7 @@ from assumed_ranges import Place, assumed
 from driven_paths import CONTOUR, PERIOD, along, begun, joints_of, planned, short_path
 from flat_arm import ARM, MASSES, drive, lay_flat_arm
 from urmpipe import accuracy
-from urmpipe.driven_runs.arm_unit import ArmUnit
+from urmpipe.driven_runs import ArmUnit
 from urmpipe.systems.units import Backend
 from urmpipe_datasets import ROBOTS
 from urmpipe_fmus.block import INTERNAL_STEP

@@ -11,7 +11,7 @@ import numpy as np
 
 import urmpipe
 from fmu_run import FmuRun
-from urmpipe.driven_runs.arm_unit import ArmUnit
+from urmpipe.driven_runs import ArmUnit
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray

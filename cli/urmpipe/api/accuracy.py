@@ -12,9 +12,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from urmpipe.arm_placing import Frame, Robot
-from urmpipe.driven_runs.arm_runs import ArmRuns
-from urmpipe.driven_runs.arm_unit import ArmUnit
-from urmpipe.driven_runs.running_speed import running_speed
+from urmpipe.driven_runs import ArmRuns, ArmUnit, running_speed
 from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
 from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import UntimedReading, map_files, options_of, resolved

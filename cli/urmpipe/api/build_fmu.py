@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe.arm_placing import Robot
 from urmpipe.keyword_checks import PathLike, one_or_many, public
-from urmpipe.log_table import LogTable
+from urmpipe.systems.logs import LogTable
 from urmpipe.systems.units import Backend, unit_of
 from urmpipe_fmus.block import BlockModel
 from urmpipe_models.errors import Finding, OutputError

@@ -95,7 +95,7 @@ def accuracy(path: str, output: Path | None, terminal: Terminal, **options: Any)
 
 def _print(result: Accuracy, replaces: bool) -> None:
     """Print what the runs came to, and what was written."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording
     from urmpipe_pipeline.results import present
 

@@ -202,7 +202,7 @@ def compare(
 
 def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
     """Print a comparison, and what was written."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_pipeline.results import present
 

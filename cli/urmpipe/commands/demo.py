@@ -74,7 +74,7 @@ def demo(output: Path, terminal: Terminal) -> int:
 
 def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     """Print the verdicts, and how to go on from there."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_datasets import LOGS
     from urmpipe_pipeline.results import present

@@ -93,7 +93,7 @@ def diagnose(
 
 def _print(result: Diagnosis, replaces: bool) -> None:
     """Print the answer, what it rests on, and what was written."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_pipeline.results import enclosing_result, present
 

@@ -52,7 +52,7 @@ def list_(unit: str | None, terminal: Terminal) -> int:
       urmpipe fmu list dc_drive
       urmpipe fmu list --json
     """
-    from urmpipe.printing.fmu import print_unit, print_units, unit_dict, units_dict
+    from urmpipe.printing.units import print_unit, print_units, unit_dict, units_dict
 
     if unit is None:
         terminal.answer(units_dict, print_units)
@@ -129,19 +129,19 @@ def build(
       urmpipe fmu build my_unit.py
     """
     from urmpipe.arm_placing import place_robot
-    from urmpipe.printing.fmu import print_built
     from urmpipe.printing.terminal import prints_apart
-    from urmpipe.systems.log_tables import read_mapped_table
-    from urmpipe.systems.units import column_names, refuse_operands
+    from urmpipe.printing.units import print_built
+    from urmpipe.systems.logs import read_mapped_table
+    from urmpipe.systems.units import check_robot_and_log, parse_columns
 
     if log_map and not log:
         hint = Hint("log", None, "sets one")
         raise OptionError(Finding("found without a log", parameter="log_map", hints=(hint,)))
     given = {name: option_value(text) for name, text in options.items()}
     if Path(unit).suffix != ".py":
-        refuse_operands(unit, robot, log)
+        check_robot_and_log(unit, robot, log)
     arm = place_robot(robot)
-    columns = column_names(given.pop("columns", None))
+    columns = parse_columns(given.pop("columns", None))
     table = log and read_mapped_table(log, columns, robot=arm, log_map=log_map)
     if table:
         terminal.warn(table.warnings)
@@ -180,7 +180,7 @@ def check(file: Path, timeout: float, terminal: Terminal) -> int:
 
     Exit codes: 0 no problems, 1 problems found, 2 not an FMU.
     """
-    from urmpipe.printing.fmu import checked_dict, print_checked
+    from urmpipe.printing.units import checked_dict, print_checked
     from urmpipe_fmus.check import check_fmu
 
     checked = check_fmu(file, timeout=timeout)

@@ -125,7 +125,7 @@ def ik(
 
 def _print(result: SolvedTargets, robot: str | None, replaces: bool) -> None:
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.results import present

@@ -88,7 +88,7 @@ def ingest(
 
 def _print(run: Run, explain: bool, replaces: bool, options: Mapping[str, Any]) -> None:
     """Print what was found in a log, and what was written."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.results import present

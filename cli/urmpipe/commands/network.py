@@ -40,7 +40,7 @@ def list_(terminal: Terminal) -> int:
       urmpipe network list
       urmpipe network list --json
     """
-    from urmpipe.printing.network import networks_dict, print_networks
+    from urmpipe.printing.mechanisms import networks_dict, print_networks
     from urmpipe_models.networks.file import load_network, network_names
 
     networks = [load_network(name) for name in network_names()]
@@ -272,7 +272,7 @@ def _answered(result: NetworkResult | NetworkMotion, terminal: Terminal, replace
 
 def _print(result: NetworkResult | NetworkMotion, replaces: bool) -> None:
     """Print what was found, and what was written."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.networks.network_motion import NetworkMotion

@@ -73,7 +73,7 @@ def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> 
 
 def _print(result: PlannedPath, options: Mapping[str, Any], replaces: bool) -> None:
     """Print the plan, and what was written."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_pipeline.results import present
 

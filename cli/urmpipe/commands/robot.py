@@ -36,7 +36,7 @@ def list_(terminal: Terminal) -> int:
       urmpipe robot list
       urmpipe robot list --json
     """
-    from urmpipe.printing.robot import print_robots, robots_dict
+    from urmpipe.printing.mechanisms import print_robots, robots_dict
     from urmpipe_models.robots.catalogue import load_robot, robot_names
 
     robots = [load_robot(name) for name in robot_names()]
@@ -72,7 +72,7 @@ def show(
       urmpipe robot show urm6 --q 0,3.14,0,3.14,0,0 --picture urm6.svg
       urmpipe robot show panda.urdf --tip panda_hand_tcp --json
     """
-    from urmpipe.printing.robot import chain_at, print_chain
+    from urmpipe.printing.mechanisms import chain_at, print_chain
     from urmpipe_models.files import EXPORT_MARK, write_export
     from urmpipe_pipeline.presentation.projections import (
         FRONT,

@@ -131,7 +131,7 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
 
 def _print(result: Simulation, replaces: bool, draw: Path | None) -> None:
     """Print what a simulation came to."""
-    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_pipeline.results import present
 
@@ -146,7 +146,7 @@ def _print(result: Simulation, replaces: bool, draw: Path | None) -> None:
 
 def _list(terminal: Terminal) -> int:
     """List the shipped systems."""
-    from urmpipe.printing.systems import print_systems
+    from urmpipe.printing.units import print_systems
     from urmpipe_fmus.cosim import load_system, system_names
 
     systems = [load_system(name, {}) for name in system_names()]

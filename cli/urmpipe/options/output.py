@@ -60,7 +60,7 @@ class Terminal:
     def tell_failure(self, result: Result) -> None:
         """Print the verdict alone on standard error, of a job that fails quietly: it says why."""
         if self.quiet:
-            from urmpipe.printing.presentation import print_verdict
+            from urmpipe.printing.results import print_verdict
             from urmpipe_pipeline.results import present
 
             shown = present(result)

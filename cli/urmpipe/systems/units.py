@@ -1,4 +1,4 @@
-"""Units as they are named: by name, from a file or complete, with robot, log and options."""
+"""Units of systems and FMUs: by name with robot, log and options, or from a file; their examples."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from urmpipe.arm_placing import Robot, place_robot
 from urmpipe.keyword_checks import PathLike
-from urmpipe.log_table import LogTable
-from urmpipe.systems.log_tables import read_mapped_table
+from urmpipe.systems.logs import LogTable, read_mapped_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import block_option_help, make_block, normalise_block_name
@@ -24,20 +23,15 @@ if TYPE_CHECKING:
 
 Backend = Literal["native", "python"]
 
-EXAMPLES: Mapping[str, Mapping[str, Any]] = {
+EXAMPLES: Mapping[str, Mapping[str, Any]] = {  # arguments of a unit whose variables depend on them
     "kinematic_chain": {"robot": "urm6"},
     "chain_dynamics": {"robot": "ur3"},
     "repolarizer": {"options": {"joints": 6}},
     "network_motion": {"options": {"network": "four-bar"}},
     "log_source": {"log": LOGS / "matlab.csv"},
 }
-"""What the units are given, where they need it, to show their variables."""
-
-DRIVEN = "ur3"
-"""The arm of the example of `driven_arm`, which needs drives."""
-
-FROM_LOG = ("table", "columns")
-"""Options of a unit that come from a log."""
+DRIVEN_ROBOT = "ur3"  # of the example of driven_arm, which needs drives
+FROM_LOG = ("table", "columns")  # options of a unit that come from a log
 
 
 def unit_of(
@@ -61,77 +55,82 @@ def unit_of(
     Raises:
         UrmpipeError: With everything that is wrong with the unit or its options.
     """
-    given = dict(options or {})
+    arguments = dict(options or {})
     if isinstance(unit, BlockModel) or Path(unit).suffix == ".py":
-        _refuse_options(unit, {"robot": robot, "log": log, **given})
-        return unit if isinstance(unit, BlockModel) else _from_file(Path(unit))
+        unexpected = [
+            option for option, value in {"robot": robot, "log": log, **arguments}.items() if value is not None
+        ]
+        if unexpected:
+            name = unit.name if isinstance(unit, BlockModel) else unit
+            found = ", ".join(unexpected)
+            raise OptionError(f"unit {name}: found {found}, allowed: no options, it is complete")
+        if isinstance(unit, BlockModel):
+            return unit
+        from urmpipe_fmus.blocks.user import load_block_file
+
+        return load_block_file(Path(unit))
     name = normalise_block_name(str(unit))
-    refuse_operands(name, robot, log)
+    check_robot_and_log(name, robot, log)
     arm = place_robot(robot)
     if log is not None:
-        names = column_names(given.pop("columns", None))
-        found = (
-            log if isinstance(log, LogTable) else read_mapped_table(log, names, robot=arm, log_map=log_map)
-        )
-        given |= {"table": found.table, "columns": found.columns}
+        names = parse_columns(arguments.pop("columns", None))
+        if not isinstance(log, LogTable):
+            log = read_mapped_table(log, names, robot=arm, log_map=log_map)
+        arguments |= {"table": log.table, "columns": log.columns}
     elif arm is not None:
-        given["robot"] = arm
-    return make_block(name, **given)
+        arguments["robot"] = arm
+    return make_block(name, **arguments)
 
 
 def example_of(unit: str) -> BlockModel:
-    """Return a unit with the options of an example, as its variables depend on them; from a file as it is.
+    """Return a unit with the options of its example; from a file without any.
 
     Raises:
         UrmpipeError: If there is no such unit, or with all that is wrong with a file.
     """
     if normalise_block_name(unit) == "driven_arm":
-        return unit_of(unit, robot=_driven(load_robot(DRIVEN)))
+        return unit_of(unit, robot=_driven_robot())
     return unit_of(unit, **EXAMPLES.get(normalise_block_name(unit), {}))
 
 
 def example_subject(unit: str) -> tuple[str, str]:
-    """Return the arm or the network of a unit's example, and which of them it is; empty if it has none."""
+    """Return the robot or network of a unit's example, and "arm" or "network"; empty without one."""
     name = normalise_block_name(unit)
     if name == "network_motion":
         return str(EXAMPLES[name]["options"]["network"]), "network"
-    robot = DRIVEN if name == "driven_arm" else EXAMPLES.get(name, {}).get("robot", "")
+    robot = DRIVEN_ROBOT if name == "driven_arm" else EXAMPLES.get(name, {}).get("robot", "")
     return robot, "arm" if robot else ""
 
 
-def _driven(robot: Chain) -> Chain:
-    """Return an arm with the drive and the controller of their units' start values on each joint."""
+def _driven_robot() -> Chain:
+    """Return a robot with the start values of the drive and controller units on each joint."""
+    robot = load_robot(DRIVEN_ROBOT)
     starts = {
-        one.name: one.starts[0]
+        parameter.name: parameter.starts[0]
         for name in ("dc_drive", "drive_controller")
-        for one in make_block(name).parameters
+        for parameter in make_block(name).parameters
     }
     drive = Drive(*(starts[key] for key in DRIVE_KEYS))
     gains = Gains(*(starts[key] for key in GAIN_KEYS))
-    drives = (DrivenJoint(one, drive, starts["period"], gains, starts["u_max"]) for one in robot.coordinates)
+    drives = (
+        DrivenJoint(name, drive, starts["period"], gains, starts["u_max"]) for name in robot.coordinates
+    )
     return replace(robot, drives=tuple(drives))
 
 
-def _from_file(path: Path) -> BlockModel:
-    """Return the unit of a user's file."""
-    from urmpipe_fmus.blocks.user import load_block_file
-
-    return load_block_file(path)
-
-
-def column_names(columns: Any) -> list[str] | None:
-    """Return names of columns as they stand in an option: one, or a list of them."""
+def parse_columns(columns: Any) -> list[str] | None:
+    """Return the names of columns that an option gives: one, or a list of them."""
     if columns is None:
         return None
-    return [str(one) for one in (columns if isinstance(columns, (list, tuple)) else [columns])]
+    return [str(column) for column in (columns if isinstance(columns, (list, tuple)) else [columns])]
 
 
-def refuse_operands(name: str, robot: Robot | None, log: Any) -> None:
-    """Raise an error if a unit is not there, lacks its robot or its log, or is given what it does not have.
+def check_robot_and_log(name: str, robot: Robot | None, log: Any) -> None:
+    """Raise an error if a unit is unknown, lacks its robot or log, or has none of those given.
 
     Raises:
         UnitError: If there is no such unit.
-        OptionError: With all that it lacks and all that it does not have.
+        OptionError: With all missing and all unexpected ones.
     """
     name = normalise_block_name(name)
     known = block_option_help(name)
@@ -142,22 +141,9 @@ def refuse_operands(name: str, robot: Robot | None, log: Any) -> None:
             hint = Hint(option, None, f"sets one, in a system file {option} = ...")
             faults.append(Finding(f"found no {option}", about=f"unit {name}", hints=(hint,)))
         elif not takes[option] and value is not None and not (option == "robot" and takes["log"]):
-            said = f"found a {option} ({_shown(value)}), allowed: none, the unit has no such option"
-            faults.append(Finding(said, about=f"unit {name}"))
+            label = value.files[0] if isinstance(value, LogTable) else value
+            label = value.name if isinstance(value, Chain) else label
+            message = f"found a {option} ({label}), allowed: none, the unit has no such option"
+            faults.append(Finding(message, about=f"unit {name}"))
     if faults:
         raise OptionError(*faults)
-
-
-def _shown(value: Any) -> Any:
-    """Return what a robot or a log is called."""
-    if isinstance(value, LogTable):
-        return value.files[0]
-    return value.name if isinstance(value, Chain) else value
-
-
-def _refuse_options(unit: BlockModel | PathLike, given: Mapping[str, Any]) -> None:
-    """Raise an `OptionError` if a unit that is complete is given options."""
-    found = [name for name, value in given.items() if value is not None]
-    if found:
-        who = unit.name if isinstance(unit, BlockModel) else unit
-        raise OptionError(f"unit {who}: found {', '.join(found)}, allowed: no options, it is complete")

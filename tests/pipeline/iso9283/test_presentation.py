@@ -16,7 +16,7 @@ from made_runs import path_run
 from presented import cells, every_section, facts, scene_of
 from repeated import along, still
 from urmpipe import compare
-from urmpipe.printing.presentation import print_presentation
+from urmpipe.printing.results import print_presentation
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
