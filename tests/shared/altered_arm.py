@@ -17,10 +17,10 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.wraps import repolarize
-from urmpipe_pipeline.diagnosis.candidates import later_edits
+from urmpipe_pipeline.diagnosis.candidates import iter_onsets
 from urmpipe_pipeline.diagnosis.explanations import Explanation
 from urmpipe_pipeline.diagnosis.explanations import SearchResult as Found
-from urmpipe_pipeline.diagnosis.hypotheses import Group, State, cause_groups, numbered
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, assign_columns, cause_groups
 from urmpipe_pipeline.diagnosis.models import ArmModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.diagnosis.search import Search
@@ -90,7 +90,7 @@ def arm_model(
         rotation: Matrices [-], shape (3, 3, n); None without any.
     """
     names = chain.coordinates
-    groups = numbered(cause_groups(chain, names, turned=rotation is not None, timed=True))
+    groups = assign_columns(cause_groups(chain, names, has_rotation=rotation is not None, timed=True))
     motion = Motion(t, *(moved(t, order).T.copy() for order in range(3)))
     return ArmModel(chain, groups, motion, Clock(t, -1.0, t), np.arange(len(t)), position, rotation)
 
@@ -188,7 +188,7 @@ def all_edits(model: ArmModel) -> tuple[Edits, ...]:
     start = State(np.zeros(sum(len(group.columns) for group in model.groups)))
     return (
         *sign_edits(joints, most=joints), *swap_edits(joints), *_robots(chain), *unit_edits("reference"),
-        *later_edits(model, model.sample, turning, start, both_ways=False),
+        *iter_onsets(model, model.sample, turning, start, both_ways=False),
     )  # fmt: skip
 
 
@@ -241,13 +241,13 @@ def named(search: Search, found: Found) -> Named:
             one.state.edits,
         )
 
-    return Named(of(found.best), tuple(of(one) for one in found.others))
+    return Named(of(found.best), tuple(of(one) for one in found.rivals))
 
 
 def names_of(search: Search, found: Found, numbers: Sequence[str], edits: Edits = ()) -> frozenset[str]:
     """Return the names of causes, of twins the one that stands for all."""
     groups = [called(group) for group in search.model.groups]
-    told = {groups[g]: groups[by] for g, by in found.twins.items()}
+    told = {groups[g]: groups[by] for g, by in found.representatives.items()}
     said = (f"{edit.kind}:{edit.name or sorted(edit.joints)}" for edit in edits)
     return frozenset((*(told.get(name, name) for name in numbers), *said))
 

@@ -18,7 +18,7 @@ from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics
 from urmpipe_pipeline.comparison.warnings import is_stationary
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
 from urmpipe_pipeline.diagnosis.causes import Cause
-from urmpipe_pipeline.diagnosis.diagnose import LEAST_SAMPLES
+from urmpipe_pipeline.diagnosis.diagnose import MIN_SAMPLES
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
@@ -130,7 +130,7 @@ def _undiagnosed(one: Deviation) -> Iterator[Fact]:
 
     Nothing if that is known, with an alignment, or where a diagnosis finds nothing: in one pose, or in few.
     """
-    told = len(one.sample) >= LEAST_SAMPLES and not is_stationary(one)
+    told = len(one.sample) >= MIN_SAMPLES and not is_stationary(one)
     failed = one.furthest.verdict == "fail"
     if failed and one.diagnosis is None and one.alignment.mode == "none" and told:
         yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))

@@ -22,7 +22,7 @@ from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.sync import BY_HAND, BY_MOTION, synchronise
 from urmpipe_pipeline.comparison.verdict import UNITS, allowed_for
 from urmpipe_pipeline.comparison.wording import unseen_words
-from urmpipe_pipeline.diagnosis.sides import AT_REST
+from urmpipe_pipeline.diagnosis.problem import AT_REST
 from urmpipe_pipeline.joint_log import LogWarning, Role
 from urmpipe_pipeline.provenance import list_assumptions
 from urmpipe_pipeline.runs.grid import ROUNDING_NS

@@ -1,1 +1,1 @@
-"""Why two sides deviate: hypotheses of sign, structure, place and time, held against the deviation."""
+"""Causes of a deviation: hypotheses of sign, structure, pose and time, fitted and selected (diagnose.py)."""

@@ -1,7 +1,10 @@
-"""The side that is modelled, at any time: its joints as an explanation has them.
+"""The motion of a side over time, with derivatives, and its joints with the causes of an explanation.
 
-q + offset + scale q + compliance q'' + play / 2 sign(q') + sag times the torque of gravity, q being that of
-the log, changed by `reading_errors`, at its own time: that of its clock and of its joint, behind a servo.
+1. Derivatives of the samples: by five samples, or by as many as keep the noise small (`motion_of`).
+2. Look-up at the times of the compared rows on the side's clock, each joint at its time (`Motion.joints`).
+3. Edits (`runs.reading_errors`), then the parameters of each joint:
+   q + offset + scale q + compliance q'' + play / 2 sign(q') + sag times the torque of gravity.
+4. A servo with time constant T follows T y' + y = x (`first_order_lag`).
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,26 +24,28 @@ from urmpipe_models.kinematics.forward import jacobian
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, has_masses
 from urmpipe_pipeline.runs.reading_errors import Edits
 
-MOVING = 5.0
-"""A joint moves if its rate exceeds its noise this many times: by chance less than once in a million."""
-
+MOVING = 5.0  # joint velocity over its noise; exceeded by chance less than once in a million
 STANDARD_GRAVITY = 9.80665  # [m/s2]
-
 WEIGHTLESS = 1e-9  # [N m] or [N]: rounding of the torque about a vertical axis
-
-STENCIL = 5  # samples of a rate; the rate of three would leave h^2 x''' / 6
 SHIFTING_TIME = ("time_lag", "clock_drift", "joint_lag")
 
+STENCIL = 5  # samples of a rate; the rate of three would leave h^2 x''' / 6
+STENCIL_NOISE = (
+    0.95,
+    1.12,
+)  # of both derivatives by five samples, per noise of a sample and power of the step
+MAX_NOISE = 0.05  # rms of a derivative that the noise of the samples causes, over that of the derivative
+MIN_WINDOWS = 20  # in a log: no derivative uses a larger part of it
 
-@dataclass(frozen=True, eq=False)
-class Clock:
+
+class Clock(NamedTuple):
     """The times of the compared rows on the clock of the modelled side, and how an offset moves them.
 
-    t_reference = t_log + offset + drift t: where the log is modelled, the same time of the reference meets an
+    t_reference = t_log + offset + drift t: if the log is modelled, a time of the reference corresponds to an
     earlier one of the log.
 
     Attributes:
-        t: Times of the rows on the modelled side's clock in [s], shape (n,); of still poses their rows.
+        t: Times of the rows on the modelled side's clock in [s], shape (n,); of static poses their rows.
         direction: -1 if the log is modelled, 1 if the reference is.
         since: Times of the rows from the first sample of the log in [s], shape (n,).
     """
@@ -49,7 +55,7 @@ class Clock:
     since: FloatArray
 
     def at(self, state: State, groups: Sequence[Group], rows: IntArray) -> FloatArray:
-        """Return where rows are looked up, in [s], shape of rows."""
+        """Return the times at which rows are looked up, in [s], shape of rows."""
         lag, drift = (
             sum(float(state.of(g)[0]) for g in groups if g.kind == kind)
             for kind in ("time_lag", "clock_drift")
@@ -57,31 +63,29 @@ class Clock:
         return np.asarray(self.t[rows] + self.direction * (lag + drift * self.since[rows]))
 
     def flow(self, group: Group, rows: IntArray) -> Element:
-        """Return how a lag or a drift moves the times of rows, shape (n,), in [s] per unit of it."""
+        """Return the change of the times of rows, shape (n,), in [s] per unit of a lag or a drift."""
         return self.direction * (1.0 if group.kind == "time_lag" else self.since[rows])
 
 
-@dataclass(frozen=True, eq=False)
-class Joints:
-    """Joints of some rows as an explanation has them.
+class Joints(NamedTuple):
+    """Joints of some rows with the causes of an explanation.
 
     Attributes:
         q: In [rad] or [m], shape (joints, n).
         rate: q' in [rad/s] or [m/s], shape (joints, n).
-        own: q before its numbers are added in [rad] or [m], shape (joints, n).
-        own_rate: q' of that in [rad/s] or [m/s], shape (joints, n).
+        edited: q after the edits alone in [rad] or [m], shape (joints, n).
         second: q'' of that in [rad/s2] or [m/s2], shape (joints, n).
         inside: Which rows lie within the time of their side, shape (n,).
-        servo_rate: q' in [rad/s] or [m/s] that a servo lag moves the joints along, shape (joints, n).
-        direction: Returns which way a joint moves, or moved last, shape (n,): 1 or -1; 0 if it never moves.
+        servo_rate: q' in [rad/s] or [m/s] by which a servo lag moves the joints, shape (joints, n).
+        direction: Returns the direction of a joint's present or last motion, shape (n,): 1 or -1; 0 if it
+            never moves.
         torque: Returns the static torque of gravity on a joint in [N m] or [N], shape (n,); of an arm without
             masses for each [kg] at its tool centre point.
     """
 
     q: FloatArray
     rate: FloatArray
-    own: FloatArray
-    own_rate: FloatArray
+    edited: FloatArray
     second: FloatArray
     inside: BoolArray
     servo_rate: FloatArray
@@ -89,7 +93,7 @@ class Joints:
     torque: Callable[[int], FloatArray]
 
     def factors(self, group: Group, clock: Clock, rows: IntArray) -> Iterator[tuple[int, Element]]:
-        """Yield the joints that a number of a group moves at rows, shape (n,), and by how much per unit."""
+        """Yield the joints that a parameter of a group moves, and dq / dx at rows, shape (n,)."""
         if group.kind == "servo_lag":
             yield from ((j, -clock.direction * rate) for j, rate in enumerate(self.servo_rate))
         elif group.joint is None:
@@ -100,10 +104,10 @@ class Joints:
 
     def _factor(self, kind: str, j: int, clock: Clock) -> Element:
         if kind == "joint_scale":
-            return self.own[j]
+            return self.edited[j]
         if kind == "compliance":
             return self.second[j]
-        if kind == "joint_lag":  # of the modelled joint, whichever side that is
+        if kind == "joint_lag":  # of the modelled joint, on either side
             return -self.rate[j]
         if kind == "backlash":
             return 0.5 * self.direction(j)
@@ -129,20 +133,20 @@ class Motion:
     noise: FloatArray | None = None
     _directions: dict[tuple[Edits, int], FloatArray] = field(default_factory=dict, init=False)
     _torques: dict[Edits, tuple[FloatArray, BoolArray]] = field(default_factory=dict, init=False)
-    _behinds: dict[float, tuple[Motion, Motion, Motion]] = field(default_factory=dict, init=False)
+    _outputs: dict[float, tuple[Motion, Motion, Motion]] = field(default_factory=dict, init=False)
 
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-        """Return value, rate and second derivative at some times, and which lie within its own.
+        """Return value, rate and second derivative at some times, and which lie within the samples' times.
 
-        x(t) = x_i + x'_i dt + x''_i dt^2 / 2 from the nearest sample: what noise a sample has it keeps, which
-        a line between two would halve.
+        x(t) = x_i + x'_i dt + x''_i dt^2 / 2 from the nearest sample keeps the variance of the noise, which a
+        line between two samples would halve.
 
         Args:
             t: Times in [s], shape (n,).
 
         Returns:
             The first three in their units, shape (k, n), and which times lie within and have all values,
-            shape (n,): one that moves nothing at the start may still move what an explanation adds.
+            shape (n,): a column without effect at first may have one in an explanation.
         """
         nearest = self.nearest(t)
         dt = t - self.t[nearest]
@@ -169,57 +173,57 @@ class Motion:
         rows: IntArray,
         chain: Chain | None,
     ) -> Joints:
-        """Return the joints of some rows as an explanation has them.
+        """Return the joints of some rows with the causes of an explanation.
 
         Args:
             state: The explanation.
-            groups: What it has numbers of.
+            groups: The groups of its parameters.
             clock: The times of all rows.
             sample: Rows of the log, shape (n,).
-            rows: Indices of those that are asked for, shape (k,).
-            chain: The arm that gravity pulls at; None if there is no group of sag.
+            rows: Indices of the rows, shape (k,).
+            chain: The arm that sags under gravity; None if there is no group of sag.
         """
         at = clock.at(state, groups, rows)
         edits = tuple(edit for edit in state.edits if edit.joints)
-        taken = [(one, float(state.values[one.columns[0]])) for one in groups if not one.twists]
-        taken = [(group, value) for group, value in taken if value]
-        late = {group.joint: value for group, value in taken if group.kind == "joint_lag"}
-        own, own_rate, second, inside = self._looked_up(edits, at, sample[rows], late)
+        parameters = [(group, float(state.values[group.columns[0]])) for group in groups if not group.twists]
+        parameters = [(group, value) for group, value in parameters if value]
+        lags = {group.joint: value for group, value in parameters if group.kind == "joint_lag"}
+        edited, edited_rate, second, inside = self._look_up(edits, at, sample[rows], lags)
         nearest = cache(partial(self.nearest, at))
-        q, rate = own.copy(), own_rate.copy()
+        q, rate = edited.copy(), edited_rate.copy()
         joints = Joints(
-            q, rate, own, own_rate, second, inside, own_rate.copy(),
+            q, rate, edited, second, inside, edited_rate.copy(),
             partial(self._direction, edits, clock, sample, nearest),
             partial(self._torque, edits, clock, sample, nearest, chain),
         )  # fmt: skip
-        for group, value in taken:
+        for group, value in parameters:
             if group.kind in SHIFTING_TIME:
                 continue
             if group.kind == "servo_lag" and clock.direction * value > 0.0:
-                parts = self._behind(clock.direction * value)
-                (x, slope), (y, speed), (_, further) = (
-                    part._looked_up(edits, at, sample[rows], late)[:2] for part in parts
+                parts = self._filtered(clock.direction * value)
+                (x, x_rate), (y, y_rate), (_, servo_rate) = (
+                    part._look_up(edits, at, sample[rows], lags)[:2] for part in parts
                 )
                 q += y - x
-                rate += speed - slope
-                joints.servo_rate[:] = further
+                rate += y_rate - x_rate
+                joints.servo_rate[:] = servo_rate
                 continue
             for j, factor in joints.factors(group, clock, rows):
                 q[j] += value * factor
             if group.kind == "joint_scale":
-                rate[group.joint] += value * own_rate[group.joint]
+                rate[group.joint] += value * edited_rate[group.joint]
             elif group.kind == "servo_lag":
                 ahead = -clock.direction * value
                 rate += ahead * second
         return joints
 
-    def _behind(self, constant: float) -> tuple[Motion, Motion, Motion]:
-        """Return x, y, what a servo of a time constant T in [s] makes of it, and y with dy / dT as its rate.
+    def _filtered(self, constant: float) -> tuple[Motion, Motion, Motion]:
+        """Return x, the output y of a servo with a time constant T in [s], and y with -dy / dT as its rate.
 
-        y = x - T x' + T^2 z, z being what the servo makes of x''; y' = x' - T z, and dy / dT, as a rate, is
-        what it makes of y', with the opposite sign. Those of one constant are computed once.
+        y = x - T x' + T^2 z, z being the servo's output for x''; y' = x' - T z, and -dy / dT is the output
+        for y'. The motions of the last constant are kept.
         """
-        parts = self._behinds.get(constant)
+        parts = self._outputs.get(constant)
         if parts is None:
             second = first_order_lag(self.t, self.second, constant)
             rate = self.rate - constant * second
@@ -230,19 +234,19 @@ class Motion:
                 Motion(self.t, value, rate, second),
                 Motion(self.t, value, slope, second),
             )
-            self._behinds.clear()
-            self._behinds[constant] = parts
+            self._outputs.clear()
+            self._outputs[constant] = parts
         return parts
 
-    def _looked_up(
-        self, edits: Edits, at: FloatArray, log_rows: IntArray, late: Mapping[int | None, float]
+    def _look_up(
+        self, edits: Edits, at: FloatArray, log_rows: IntArray, lags: Mapping[int | None, float]
     ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-        """Return `_edited` with some joints at times of their own, by a lag in [s] each."""
+        """Return `_edited` with some joints at earlier times, by a lag in [s] each."""
         *parts, inside = self._edited(edits, at, log_rows)
-        for joint, lag in late.items():
-            *others, known = self._edited(edits, at - lag, log_rows)
-            for part, other in zip(parts, others, strict=True):
-                part[joint] = other[joint]
+        for joint, lag in lags.items():
+            *lagging, known = self._edited(edits, at - lag, log_rows)
+            for part, lagged in zip(parts, lagging, strict=True):
+                part[joint] = lagged[joint]
             inside = inside & known
         value, rate, second = parts
         return value, rate, second, inside
@@ -250,7 +254,7 @@ class Motion:
     def _edited(
         self, edits: Edits, at: FloatArray, log_rows: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-        """Return `at` changed by edits, with the log's rows at these times."""
+        """Return `at` after edits, with the log's rows at these times."""
         q, rate, second, inside = self.at(at)
         for edit in edits:
             q, rate, second = edit.of_joints(log_rows, q, rate, second)
@@ -259,9 +263,9 @@ class Motion:
     def _direction(
         self, edits: Edits, clock: Clock, sample: IntArray, nearest: Callable[[], IntArray], j: int
     ) -> FloatArray:
-        """Return which way a joint moves at some samples, or moved last, shape of these.
+        """Return the direction of a joint's present or last motion at some samples, shape of these.
 
-        Noise does not move it: it moves where its rate is beyond that; before, it is as it moves first. The
+        It moves where its rate exceeds the noise; before that, the direction is that of its first motion. The
         rate is that of three samples: one of five overshoots before a corner.
         """
         if not any(j in edit.joints for edit in edits):
@@ -269,7 +273,7 @@ class Motion:
         if (edits, j) not in self._directions:
             rate = self.value if len(self.t) < 2 else np.gradient(self.value, self.t, axis=1)
             noise = np.zeros(len(rate)) if self.noise is None else self.noise  # of five samples: more
-            parts = np.diag(noise)  # a joint that includes another has the noise of both
+            parts = np.diag(noise)  # a joint that includes another has both noises
             for edit in edits:
                 log_rows = self._log_rows(clock, sample, np.arange(len(self.t)))
                 rate = edit.of_joints(log_rows, rate, rate)[1]
@@ -334,11 +338,11 @@ def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the torques that the joints of an arm at rest need against gravity, shape (joints, n).
 
     Args:
-        chain: The arm; of one without masses it is what 1 kg at its tool centre point takes.
+        chain: The arm; without masses, the torques are those of 1 kg at its tool centre point.
         q: Joints in [rad] or [m], shape (joints, n).
 
     Returns:
-        In [N m] of joints that turn, in [N] of those that slide.
+        In [N m] of revolute joints, in [N] of prismatic ones.
     """
     still = [0.0] * len(q)
     if has_masses(chain):
@@ -352,21 +356,11 @@ def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:
     return np.asarray(np.where(np.abs(result) < WEIGHTLESS, 0.0, result))
 
 
-QUIET = 0.05
-"""Share of a derivative that the noise of the samples may make, root mean square."""
-
-SHARP_GAIN = (0.95, 1.12)
-"""Noise of the first and second derivative by five samples, per noise of a sample and power of the step."""
-
-WIDEST = 20
-"""A derivative is told from a part of a log of at most one in so many."""
-
-
 def motion_of(t: FloatArray | None, values: FloatArray) -> Motion:
-    """Return samples as a motion, with derivatives from so many of them that noise is little of these.
+    """Return samples as a motion, with derivatives from enough of them to keep their noise small.
 
-    Noise of q'' is otherwise the noise of q once more: it would pass for a joint that gives way. Where it is
-    too much of q'' all the same, or the rows are too far apart, q'' is 0: it is not known.
+    Noise of q'' repeats that of q: it would be taken for the compliance of a joint. If it is still too large,
+    or the rows are too far from each other, q'' is 0: it is unknown.
 
     Args:
         t: Times in [s], shape (m,); None without times, and then without derivatives.
@@ -380,36 +374,36 @@ def motion_of(t: FloatArray | None, values: FloatArray) -> Motion:
     for k, row in enumerate(values):
         known = np.isfinite(row)
         if known.sum() > 3:
-            whole = np.interp(t, t[known], row[known])
-            (rate[k], noise[k]), (found, left) = (_derivative(t, whole, order) for order in (1, 2))
-            second[k] = found if left <= QUIET * np.sqrt(np.mean(found**2)) else 0.0
+            filled = np.interp(t, t[known], row[known])
+            (rate[k], noise[k]), (curvature, left) = (_derivative(t, filled, order) for order in (1, 2))
+            second[k] = curvature if left <= MAX_NOISE * np.sqrt(np.mean(curvature**2)) else 0.0
     return Motion(t, values, rate, second, noise)
 
 
 def _derivative(t: FloatArray, values: FloatArray, order: int) -> tuple[FloatArray, float]:
     """Return the first or second derivative, by means of as few samples as its noise allows, and its noise.
 
-    The noise of a sample shows in fifth differences, which take the motion away: their variance is 252 times
-    that of a sample. Where it is small, a rate is that of five samples, and so is the rate of rates.
+    Fifth differences remove the motion; their variance is 252 times that of a sample. If the noise is small,
+    a rate is that of five samples, and so is the rate of rates.
     """
     noise = float(np.sqrt(np.mean(np.diff(values, 5) ** 2) / 252.0)) if len(values) > STENCIL else 0.0
     reach = 1
     while True:
         mean = _mean(values, reach)
-        found = _sharp(t, mean, order) if reach == 1 else _difference(t, mean, reach, order)
+        derivative = _by_stencil(t, mean, order) if reach == 1 else _by_difference(t, mean, reach, order)
         step = reach * float(np.median(np.diff(t)))
-        gain = SHARP_GAIN[order - 1] if reach == 1 else np.sqrt((0.5, 6.0)[order - 1] / reach)
+        gain = STENCIL_NOISE[order - 1] if reach == 1 else np.sqrt((0.5, 6.0)[order - 1] / reach)
         left = noise * gain / step**order
-        if left <= QUIET * float(np.sqrt(np.mean(found**2))) or 2 * reach * WIDEST > len(t):
-            return found, float(left)
+        if left <= MAX_NOISE * float(np.sqrt(np.mean(derivative**2))) or 2 * reach * MIN_WINDOWS > len(t):
+            return derivative, float(left)
         reach *= 2
 
 
-def _sharp(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
-    """Return the first or second derivative by five samples, of fewer by three."""
+def _by_stencil(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
+    """Return the first or second derivative by five samples, or by three of fewer."""
     joined = np.ones(len(t) - 1, dtype=bool)
     if len(t) < STENCIL:
-        return np.asarray(np.gradient(values, t)) if order == 1 else _difference(t, values, 1, order)
+        return np.asarray(np.gradient(values, t)) if order == 1 else _by_difference(t, values, 1, order)
     derivative = values[np.newaxis]
     for _ in range(order):
         derivative, _ = five_point_rates(t, derivative, joined)
@@ -417,7 +411,7 @@ def _sharp(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
 
 
 def _mean(values: FloatArray, width: int) -> FloatArray:
-    """Return the mean of so many samples around each, fewer at the ends."""
+    """Return the moving mean over `width` samples, fewer at the ends."""
     if width < 2:
         return values
     index = np.arange(len(values))
@@ -426,8 +420,8 @@ def _mean(values: FloatArray, width: int) -> FloatArray:
     return np.asarray((total[high] - total[low]) / (high - low))
 
 
-def _difference(t: FloatArray, values: FloatArray, reach: int, order: int) -> FloatArray:
-    """Return a derivative by the values so many samples away on both sides, at the ends the nearest."""
+def _by_difference(t: FloatArray, values: FloatArray, reach: int, order: int) -> FloatArray:
+    """Return a derivative by the values `reach` samples before and after, at the ends that of the nearest."""
     middle = np.arange(reach, len(t) - reach)
     before, after = middle - reach, middle + reach
     back, ahead = t[middle] - t[before], t[after] - t[middle]
@@ -449,7 +443,7 @@ def five_point_rates(t: FloatArray, x: FloatArray, joined: BoolArray) -> tuple[F
     Args:
         t: Times in [s], shape (m,).
         x: Samples in any unit [-], shape (k, m).
-        joined: Which samples a motion joins to the next one, shape (m - 1,).
+        joined: Which samples a motion connects to the next one, shape (m - 1,).
 
     Returns:
         Rates in that unit per [s], shape (k, m), and gains in [1/s], shape (m,).
@@ -458,7 +452,7 @@ def five_point_rates(t: FloatArray, x: FloatArray, joined: BoolArray) -> tuple[F
     if count < STENCIL:
         return np.full(x.shape, np.nan), np.zeros(count)
     index = np.arange(count)
-    first, last = _runs(joined)
+    first, last = _run_ends(joined)
     start = np.clip(index - STENCIL // 2, first, np.maximum(last - STENCIL + 1, first))
     start = np.minimum(start, count - STENCIL)  # of a short run, which has no rate
     neighbours = [start + j + (start + j >= index) for j in pairs]
@@ -476,8 +470,8 @@ def five_point_rates(t: FloatArray, x: FloatArray, joined: BoolArray) -> tuple[F
     return rate, np.sqrt(squares + total**2)
 
 
-def _runs(joined: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the first and the last sample of the run of joined ones that each belongs to, shape (m,)."""
+def _run_ends(joined: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return the first and the last sample of each sample's run of connected ones, shape (m,)."""
     ends = np.append(np.flatnonzero(~joined), len(joined))
     starts = np.append(0, ends[:-1] + 1)
     run = np.searchsorted(ends, np.arange(len(joined) + 1))

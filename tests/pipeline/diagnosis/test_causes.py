@@ -21,14 +21,14 @@ from urmpipe_models.math3d import Transform, from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_pipeline.diagnosis.hypotheses import (
     Group,
+    assign_columns,
     base_groups,
     cause_groups,
     joint_groups,
-    numbered,
+    null_state,
     tool_groups,
-    zero,
 )
-from urmpipe_pipeline.diagnosis.models import TOOL, ArmModel, JointsModel, PlaceModel
+from urmpipe_pipeline.diagnosis.models import TOOL, ArmModel, JointModel, TcpModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, gravity_torques, motion_of
 from urmpipe_pipeline.runs.reading_errors import (
     Edit,
@@ -54,7 +54,7 @@ ORDER = (
 
 
 def groups_of(chain: Chain) -> list[Group]:
-    return [*cause_groups(chain, chain.coordinates, turned=True, timed=True)]
+    return [*cause_groups(chain, chain.coordinates, has_rotation=True, timed=True)]
 
 
 def screw(frame: Transform, axis: tuple[float, float, float], *, about: bool) -> FloatArray:
@@ -128,14 +128,14 @@ def test_play_changes_sides_where_a_joint_turns_back_and_not_by_noise_at_rest() 
     t = np.arange(0.0, 22.0, 0.008)
     there = np.clip(np.sin(0.6 * np.maximum(t - 1.0, 0.0)), -0.7, 0.7)  # rests at first, and at +-0.7
     q = np.array([there + np.random.default_rng(1).normal(0.0, 2e-5, len(t)), -there])
-    groups = numbered(joint_groups(("rad", "rad"), ("a", "b"), None, timed=True))
-    model = JointsModel(groups, motion_of(t, q), Clock(t, -1.0, t), np.arange(len(t)), q, (False, False))
-    play = zero(groups)
+    groups = assign_columns(joint_groups(("rad", "rad"), ("a", "b"), None, timed=True))
+    model = JointModel(groups, motion_of(t, q), Clock(t, -1.0, t), np.arange(len(t)), q, (False, False))
+    play = null_state(groups)
     for group in groups:
         play.values[list(group.columns)] = 0.004 * (group.kind == "backlash")
 
     def added(edits: Edits) -> FloatArray:
-        with_play, without = (replace(state, edits=edits) for state in (play, zero(groups)))
+        with_play, without = (state._replace(edits=edits) for state in (play, null_state(groups)))
         return model.residual(without, np.arange(len(t))) - model.residual(with_play, np.arange(len(t)))
 
     for row, sign in zip(added(()), (1.0, -1.0), strict=True):
@@ -163,11 +163,11 @@ def posed_path(chain: Chain) -> tuple[FloatArray, FloatArray]:
     return position, rotation
 
 
-def place_model(chain: Chain) -> PlaceModel:
+def place_model(chain: Chain) -> TcpModel:
     position, rotation = posed_path(chain)
-    groups = numbered([*tool_groups(Transform(), TOOL, turned=True), *base_groups(Transform())])
+    groups = assign_columns([*tool_groups(Transform(), TOOL, has_rotation=True), *base_groups(Transform())])
     motion = Motion(T, position, np.zeros_like(position), np.zeros_like(position))
-    return PlaceModel(groups, motion, rotation, Clock(T, -1.0, T), EVERY, position, rotation)
+    return TcpModel(groups, motion, rotation, Clock(T, -1.0, T), EVERY, position, rotation)
 
 
 def test_a_base_is_turned_or_mirrored_in_24_and_24_ways_less_one() -> None:
@@ -185,7 +185,9 @@ def test_a_base_is_turned_or_mirrored_in_24_and_24_ways_less_one() -> None:
             back = np.eye(3) if proper else matrix.T
             turned = np.einsum("ij,jkn,kl->iln", matrix, rotation, back)
             data = replace(model, position=there, rotation=turned)
-            assert np.abs(data.residual(replace(zero(model.groups), edits=edits), EVERY)).max() < 1e-12, edits
+            assert (
+                np.abs(data.residual(null_state(model.groups)._replace(edits=edits), EVERY)).max() < 1e-12
+            ), edits
 
 
 def test_of_a_base_that_stands_anywhere_one_is_mirrored_and_all_fit_it() -> None:
@@ -196,7 +198,7 @@ def test_of_a_base_that_stands_anywhere_one_is_mirrored_and_all_fit_it() -> None
         turned = np.einsum("ij,jkn,kl->iln", matrix, rotation, matrix.T)
         model = nominal(UR5E, rich_motion(UR5E), T, oriented=True)
         model = replace(model, position=matrix @ position, rotation=turned, frames_open=True)
-        assert np.abs(model.residual(replace(zero(model.groups), edits=only), EVERY)).max() < 1e-9
+        assert np.abs(model.residual(null_state(model.groups)._replace(edits=only), EVERY)).max() < 1e-9
 
 
 def changed_joints(edit: Edit, q: FloatArray) -> FloatArray:
@@ -220,7 +222,7 @@ def test_a_joint_in_another_unit_or_that_includes_another_is_read_right() -> Non
     for edits in every:
         assert 0 not in edits[0].joints  # a rail
         data = replace(model, position=poses(chain, changed_joints(edits[0], q), oriented=False)[0])
-        state = replace(zero(model.groups), edits=edits)
+        state = null_state(model.groups)._replace(edits=edits)
         np.testing.assert_allclose(data.residual(state, EVERY), 0.0, atol=1e-12 * max(edits[0].value, 1.0))
         at, h = rich_motion(chain)(T + 1e-5), 1e-5
         rates = (changed_joints(edits[0], at) - changed_joints(edits[0], q)) / h
@@ -233,7 +235,7 @@ def test_another_unit_leaves_the_noise_of_the_data_as_it_was_read(kind: str, sid
     model = nominal(UR5E, rich_motion(UR5E), T) if kind == "arm" else place_model(UR5E)
     noise = np.random.default_rng(2).normal(0.0, 1e-3, model.position.shape)
     for edits in unit_edits(side):
-        state, by = replace(zero(model.groups), edits=edits), edits[0].value
+        state, by = null_state(model.groups)._replace(edits=edits), edits[0].value
         if kind == "place" and side == "log":  # the model, beside a reference as it was read
             data, true = replace(model, position=by * model.position + noise), 1.0
         else:
@@ -260,10 +262,10 @@ def several(chain: Chain) -> list[Edits]:
 def test_many_explanations_at_once_leave_what_each_leaves(frames_open: bool) -> None:
     arm = nominal(UR5E, rich_motion(UR5E), T, oriented=True)
     arm = replace(
-        arm, position=arm.position + 0.01, clock=replace(arm.clock, t=T + 1.0), frames_open=frames_open
+        arm, position=arm.position + 0.01, clock=arm.clock._replace(t=T + 1.0), frames_open=frames_open
     )
-    joints = JointsModel(
-        numbered(joint_groups(["rad"] * 6, UR5E.coordinates, UR5E, timed=True)),
+    joints = JointModel(
+        assign_columns(joint_groups(["rad"] * 6, UR5E.coordinates, UR5E, timed=True)),
         arm.motion, arm.clock, EVERY, arm.motion.value + 0.01, (False,) * 6, UR5E,
     )  # fmt: skip
     every = several(UR5E)
@@ -275,8 +277,8 @@ def test_many_explanations_at_once_leave_what_each_leaves(frames_open: bool) -> 
         (place_model(UR5E), placing),
     ):
         left = model.residuals(taken, EVERY)
-        each = [model.residual(replace(zero(model.groups), edits=edits), EVERY) for edits in taken]
-        assert isinstance(model, PlaceModel) or np.isnan(left).any()  # some rows lie outside its time
+        each = [model.residual(null_state(model.groups)._replace(edits=edits), EVERY) for edits in taken]
+        assert isinstance(model, TcpModel) or np.isnan(left).any()  # some rows lie outside its time
         np.testing.assert_allclose(left, each, atol=1e-11)
 
 

@@ -12,7 +12,14 @@ from altered_arm import altered, arm_model, called, nominal, rich_motion, spoilt
 from normal_equations import normal_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.diagnosis.fit import Rows, cost, fitted, inliers, normal_equations, residual
+from urmpipe_pipeline.diagnosis.fit import (
+    WeightedRows,
+    cost,
+    find_inliers,
+    fit_parameters,
+    normal_equations,
+    residual,
+)
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.models import ArmModel
 
@@ -49,7 +56,7 @@ def test_a_fit_is_that_of_scipy() -> None:
     model = log_with(CAUSES)
     groups = groups_of(model, CAUSES)
     columns = [c for group in groups for c in group.columns]
-    rows = Rows(np.arange(20, SAMPLES - 20), np.array([1.0, 2.0, 0.5]))
+    rows = WeightedRows(np.arange(20, SAMPLES - 20), np.array([1.0, 2.0, 0.5]))
 
     def left(x: FloatArray) -> FloatArray:
         values = np.zeros_like(zero_of(model).values)
@@ -57,7 +64,7 @@ def test_a_fit_is_that_of_scipy() -> None:
         return (model.residual(State(values), rows.at) * rows.weight[:, np.newaxis]).ravel()
 
     theirs = least_squares(left, np.zeros(len(columns)), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    ours = fitted(model, zero_of(model), groups, rows)
+    ours = fit_parameters(model, zero_of(model), groups, rows)
     # ours rests where a step takes 1e-8 of the square: 1e-4 of a standard deviation
     slopes = np.asarray(theirs.jac)
     variance = 2.0 * theirs.cost / len(theirs.fun)
@@ -71,9 +78,9 @@ def test_other_numbers_stay_if_they_are_kept() -> None:
     model = log_with(CAUSES)
     start = state_of(model, CAUSES)
     (group,) = groups_of(model, {"joint_offset:phi2": np.zeros(1)})
-    rows = Rows(np.arange(SAMPLES), np.ones(3))
-    kept = fitted(model, start, [group], rows, others=True)
-    alone = fitted(model, start, [group], rows)
+    rows = WeightedRows(np.arange(SAMPLES), np.ones(3))
+    kept = fit_parameters(model, start, [group], rows, keep_others=True)
+    alone = fit_parameters(model, start, [group], rows)
     others = np.delete(np.arange(len(start.values)), group.columns)
     np.testing.assert_array_equal(kept.values[others], start.values[others])
     assert not alone.values[others].any()
@@ -82,7 +89,7 @@ def test_other_numbers_stay_if_they_are_kept() -> None:
 def test_normal_equations_are_those_of_the_rows_that_are_known() -> None:
     model = log_with(CAUSES)
     state = state_of(model, CAUSES)
-    rows = Rows(np.arange(SAMPLES), np.array([1.0, 2.0, 0.5]))
+    rows = WeightedRows(np.arange(SAMPLES), np.array([1.0, 2.0, 0.5]))
     normal = normal_equations(model, state, rows)
     left, jacobian = model.linear(state, rows.at)
     known = np.isfinite(left).all(axis=0)
@@ -97,7 +104,7 @@ def test_normal_equations_are_those_of_the_rows_that_are_known() -> None:
     )
     np.testing.assert_allclose(normal.moment / size, flat @ y.ravel() / size, atol=1e-12)
     assert normal.square == pytest.approx(float((y**2).sum()), rel=1e-12)
-    assert normal.count == y.size
+    assert normal.size == y.size
 
 
 def test_equations_without_columns_are_those_of_what_they_leave() -> None:
@@ -110,7 +117,7 @@ def test_equations_without_columns_are_those_of_what_they_leave() -> None:
     np.testing.assert_allclose(normal.gram, wanted.gram, atol=1e-12 * 50)
     np.testing.assert_allclose(normal.moment, wanted.moment, atol=1e-12 * 50)
     assert normal.square == pytest.approx(wanted.square, rel=1e-12)
-    assert normal.count == 48
+    assert normal.size == 48
 
 
 def test_columns_that_are_held_back_are_ridge_regression() -> None:
@@ -128,10 +135,10 @@ def test_columns_that_are_held_back_are_ridge_regression() -> None:
 def test_outliers_are_left_out_and_gaussian_noise_is_not() -> None:
     rng = np.random.default_rng(8)
     noise = rng.normal(size=(3, 10_000))
-    assert inliers(noise).all()
+    assert find_inliers(noise).all()
     noise[:, ::100] += 60.0
     noise[1, 5] = np.nan
-    kept = inliers(noise)
+    kept = find_inliers(noise)
     assert not kept[::100].any()
     assert not kept[5]
     assert kept.sum() == 10_000 - 100 - 1
@@ -143,10 +150,10 @@ def test_a_fit_to_the_rows_that_are_no_outliers_is_not_led_astray() -> None:
     causes = {"joint_offset:phi2": np.array([0.01])}
     position, _ = altered(clean, moved, causes)
     model = arm_model(URM6, moved, times(SAMPLES), spoilt(np.random.default_rng(9), position))
-    groups, rows = groups_of(model, causes), Rows(np.arange(SAMPLES), np.ones(3))
-    start = fitted(model, zero_of(model), groups, rows)
-    some = rows.trimmed(residual(model, start, rows.at))
+    groups, rows = groups_of(model, causes), WeightedRows(np.arange(SAMPLES), np.ones(3))
+    start = fit_parameters(model, zero_of(model), groups, rows)
+    some = rows.without_outliers(residual(model, start, rows.at))
     assert SAMPLES * 0.97 < len(some.at) < SAMPLES
-    (found,) = fitted(model, start, groups, some).of(groups[0])
+    (found,) = fit_parameters(model, start, groups, some).of(groups[0])
     # 2 mm of noise a coordinate, 400 samples, a lever of 0.5 m: 0.1 mrad
     assert abs(found - 0.01) < 5e-4

@@ -32,13 +32,13 @@ from urmpipe_pipeline.diagnosis.fit import Model
 from urmpipe_pipeline.diagnosis.hypotheses import (
     Group,
     State,
+    assign_columns,
     base_groups,
     joint_groups,
-    numbered,
     time_groups,
     tool_groups,
 )
-from urmpipe_pipeline.diagnosis.models import TOOL, ArmModel, JointsModel, PlaceModel
+from urmpipe_pipeline.diagnosis.models import TOOL, ArmModel, JointModel, TcpModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.runs.reading_errors import Edit, axis_edits
 
@@ -122,7 +122,7 @@ def test_it_is_so_of_a_mirrored_base_in_another_unit() -> None:
     rotation = np.einsum("ij,jkn,kl->iln", mirror, model.rotation, mirror.T)
     edits = (*BASES["base_mirrored"], Edit("path_unit", value=0.5, name="reference in half"))
     assert_linear(
-        replace(model, position=2.0 * mirror @ model.position, rotation=rotation), replace(state, edits=edits)
+        replace(model, position=2.0 * mirror @ model.position, rotation=rotation), state._replace(edits=edits)
     )
 
 
@@ -162,10 +162,10 @@ def test_what_a_servo_makes_of_a_motion_follows_its_equation() -> None:
     """T y' + y = x, of samples 9 ms apart, and its slope by T."""
     t = times(4001)
     moved = rich_motion(rail_arm())
-    groups = numbered(joint_groups(["m", *["rad"] * 5], rail_arm().coordinates, rail_arm(), timed=True))
+    groups = assign_columns(joint_groups(["m", *["rad"] * 5], rail_arm().coordinates, rail_arm(), timed=True))
     motion = Motion(t, *(moved(t, order).T.copy() for order in range(3)))
     rows, clock = np.arange(len(t)), Clock(t, -1.0, t)
-    model = JointsModel(groups, motion, clock, rows, moved(t).T, (True, *[False] * 5), rail_arm())
+    model = JointModel(groups, motion, clock, rows, moved(t).T, (True, *[False] * 5), rail_arm())
     servo = next(group for group in groups if group.kind == "servo_lag")
 
     def behind(constant: float) -> State:
@@ -181,12 +181,12 @@ def test_what_a_servo_makes_of_a_motion_follows_its_equation() -> None:
     np.testing.assert_allclose(slope[:, 500:-2], (slower - later)[:, 500:-2] / 2e-4, atol=1e-4)
 
 
-def joints_model(numbers: float) -> tuple[JointsModel, State]:
+def joints_model(numbers: float) -> tuple[JointModel, State]:
     moved = rich_motion(rail_arm())
     names = rail_arm().coordinates
-    groups = numbered(joint_groups(["m", *["rad"] * 5], names, rail_arm(), timed=True))
+    groups = assign_columns(joint_groups(["m", *["rad"] * 5], names, rail_arm(), timed=True))
     motion = Motion(T, *(moved(T, order).T.copy() for order in range(3)))
-    model = JointsModel(
+    model = JointModel(
         groups, motion, Clock(T, -1.0, T), np.arange(len(T)), moved(T).T, (True, *[False] * 5), rail_arm()
     )
     rng = np.random.default_rng(4)
@@ -197,19 +197,19 @@ def joints_model(numbers: float) -> tuple[JointsModel, State]:
 @pytest.mark.parametrize(("size", "direction"), [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0)])
 def test_the_jacobian_of_joints_is_their_slope(size: float, direction: float) -> None:
     model, state = joints_model(size)
-    assert_linear(replace(model, clock=replace(model.clock, direction=direction)), state)
+    assert_linear(replace(model, clock=model.clock._replace(direction=direction)), state)
 
 
-def place_model(numbers: float) -> tuple[PlaceModel, State]:
+def place_model(numbers: float) -> tuple[TcpModel, State]:
     """A path of poses beside where it would be with all causes of some size."""
     chain, moved = rail_arm(), rich_motion(rail_arm())
     (position, rotation), step = poses(chain, moved(T), oriented=True), 1e-4
     after, before = (poses(chain, moved(T + by), oriented=False)[0] for by in (step, -step))
     motion = Motion(T, position, (after - before) / (2.0 * step), np.zeros_like(position))
-    groups = numbered(
-        [*tool_groups(Transform(), TOOL, turned=True), *base_groups(Transform()), *time_groups()]
+    groups = assign_columns(
+        [*tool_groups(Transform(), TOOL, has_rotation=True), *base_groups(Transform()), *time_groups()]
     )
-    model = PlaceModel(groups, motion, rotation, Clock(T, -1.0, T), np.arange(len(T)), position, rotation)
+    model = TcpModel(groups, motion, rotation, Clock(T, -1.0, T), np.arange(len(T)), position, rotation)
     rng = np.random.default_rng(4)
     state = State(numbers * rng.uniform(-0.2, 0.2, sum(len(group.columns) for group in groups)))
     return model, state

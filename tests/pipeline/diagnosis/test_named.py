@@ -205,7 +205,7 @@ def test_what_the_causes_take_away_leads_from_the_whole_to_what_remains() -> Non
     search, result, _ = found({**CAUSES["r3"], **CAUSES["lag"]}, (Edit("joint_sign", (2,)),))
     causes, _ = causes_of(search, result)
     rows = np.arange(search.model.rows)
-    before, after = (rms(search.model.deviation(one, rows).T) for one in (search.zero, result.best.state))
+    before, after = (rms(search.model.deviation(one, rows).T) for one in (search.null, result.best.state))
     assert [cause.kind for cause in causes] == ["time_lag", "joint_sign", "link_length"]  # clocks first
     assert causes[0].rms_before == pytest.approx(before)
     assert causes[-1].rms_after == pytest.approx(after)
@@ -218,4 +218,4 @@ def test_the_same_log_gives_the_same_answer_to_the_last_bit() -> None:
     np.testing.assert_array_equal(first.best.state.values, second.best.state.values)
     assert first.best.score == second.best.score
     assert first.best.subset == second.best.subset
-    assert [one.score for one in first.others] == [one.score for one in second.others]
+    assert [one.score for one in first.rivals] == [one.score for one in second.rivals]

@@ -12,9 +12,9 @@ from altered_arm import called, nominal, rich_motion, times
 from normal_equations import normal_of
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.diagnosis.fit import Rows, autocorrelation_time, normal_equations
+from urmpipe_pipeline.diagnosis.fit import WeightedRows, autocorrelation_time, normal_equations
 from urmpipe_pipeline.diagnosis.hypotheses import State
-from urmpipe_pipeline.diagnosis.selection import MOST, Selection, Subset, without_twins
+from urmpipe_pipeline.diagnosis.selection import MAX_GROUPS, Selection, Subset, drop_equivalent_groups
 
 ROWS, GROUPS = 90, 7
 COLUMNS: tuple[IntArray, ...] = tuple(np.array(c) for c in ([0], [1], [2, 3, 4], [5], [6], [7, 8, 9], [10]))
@@ -48,7 +48,9 @@ def scored(jacobian: FloatArray, y: FloatArray, subset: Subset, independent: flo
 
 
 def every_subset() -> list[Subset]:
-    return [frozenset(s) for s in chain(*(combinations(range(GROUPS), size) for size in range(MOST + 1)))]
+    return [
+        frozenset(s) for s in chain(*(combinations(range(GROUPS), size) for size in range(MAX_GROUPS + 1)))
+    ]
 
 
 @pytest.mark.parametrize("taken", [(), (1,), (2,), (0, 5), (1, 2, 6), (0, 2, 4, 5)])
@@ -95,10 +97,10 @@ def test_twins_are_told_by_the_first_and_what_moves_nothing_not_at_all() -> None
     jacobian[:, 5] = -3.0 * jacobian[:, 1]
     jacobian[:, 6] = 0.0
     normal = normal_of(jacobian, np.zeros(ROWS))
-    stand, twins = without_twins(normal, COLUMNS, np.diag(normal.gram))
+    stand, twins = drop_equivalent_groups(normal, COLUMNS, np.diag(normal.gram))
     assert stand == [0, 1, 2, 5, 6]
     assert twins == {3: 1}
-    stand, twins = without_twins(normal, COLUMNS, np.diag(normal.gram), (3,))
+    stand, twins = drop_equivalent_groups(normal, COLUMNS, np.diag(normal.gram), (3,))
     assert stand == [0, 2, 3, 5, 6]
     assert twins == {1: 3}
 
@@ -115,7 +117,7 @@ def urm6_gram() -> tuple[FloatArray, dict[str, int]]:
     arm = load_robot("urm6")
     model = nominal(arm, rich_motion(arm), times(500))
     zero = State(np.zeros(sum(len(group.columns) for group in model.groups)))
-    gram = normal_equations(model, zero, Rows(np.arange(500), np.ones(3))).gram
+    gram = normal_equations(model, zero, WeightedRows(np.arange(500), np.ones(3))).gram
     size = np.maximum(np.sqrt(np.diag(gram)), 1e-9)  # gravity does not pull at an upright axis
     places = {
         f"{group.name} {'xyz'[k]}" if len(group.columns) > 1 and group.kind.endswith("shift") else
