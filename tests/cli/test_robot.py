@@ -19,7 +19,13 @@ from urmpipe_models.robots.toml import chain_from_dict
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
 from urmpipe_pipeline.presentation.palette import MASS_COLOUR
-from urmpipe_pipeline.presentation.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected
+from urmpipe_pipeline.presentation.projections import (
+    FRONT,
+    SIDEWAYS,
+    Sketch,
+    draw_projections,
+    label_skeleton,
+)
 
 NAMES = list(robot_names())
 
@@ -254,7 +260,7 @@ def test_export_replaces_an_export_and_nothing_else(urmpipe: Any, tmp_path: Path
 
 
 def picture(skeleton: FloatArray, title: str) -> str:
-    return projected(Sketch([skeleton], spots=chain_spots(skeleton)), (SIDEWAYS, FRONT), title)
+    return draw_projections(Sketch([skeleton], spots=label_skeleton(skeleton)), (SIDEWAYS, FRONT), title)
 
 
 def test_an_arm_of_no_length_is_drawn() -> None:

@@ -76,14 +76,14 @@ def robot(path: Path, made: Path, rng: Random) -> None:
     from urmpipe.printing.mechanisms import chain_at
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
-    from urmpipe_pipeline.presentation.meshes import missing_visuals
+    from urmpipe_pipeline.presentation.meshes import mesh_warnings
     from urmpipe_pipeline.runs.torques import mass_warnings
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     tip = "tool0" if path.suffix == ".urdf" and b"tool0" in path.read_bytes() else None
     chain = urmpipe.load_robot(path, tip_link=tip)
     for one in (
-        *missing_visuals(chain),
+        *mesh_warnings(chain),
         *start_warnings(chain, np.array(chain.start), "q"),
         *mass_warnings(chain),
     ):
@@ -97,13 +97,13 @@ def mesh(path: Path, made: Path, rng: Random) -> None:
     import numpy as np
 
     import urmpipe
-    from urmpipe_pipeline.presentation.meshes import missing_visuals
+    from urmpipe_pipeline.presentation.meshes import mesh_warnings
     from urmpipe_pipeline.recording.views.shapes import bodies_over_log
 
     described = path.with_name("arm.urdf")
     described.write_text(corpus.URDF.replace("MESH", path.name), encoding="utf-8")
     chain = urmpipe.load_robot(described)
-    missing_visuals(chain)
+    mesh_warnings(chain)
     bodies_over_log(chain, np.array([chain.start]))
 
 

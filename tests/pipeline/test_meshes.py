@@ -14,7 +14,7 @@ from urmpipe_models.math3d import translation
 from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.presentation.meshes import drawable, missing_visuals
+from urmpipe_pipeline.presentation.meshes import is_drawable, mesh_warnings
 from urmpipe_pipeline.runs.ingest import tcp_motion
 
 
@@ -27,15 +27,15 @@ def test_one_warning_tells_of_all_meshes_that_are_missing(tmp_path: Path) -> Non
     meshes = [Mesh(str(file)) for file in [*files, tmp_path / "picture.png", "package://gone/a.dae"]]
     visuals = (Visual(None, Box((1.0, 1.0, 1.0))), *(Visual(None, mesh) for mesh in meshes))
     robot = Chain("arm", (Joint("j"),), visuals=visuals)
-    assert missing_visuals(robot) == [
+    assert mesh_warnings(robot) == [
         LogWarning(
             "visual-missing",
             f"4 of 5 mesh files of robot arm cannot be drawn, the first {tmp_path / 'gone.stl'}:"
             " solids stand for the links; allowed: .stl, .obj, .glb, .gltf, .dae files that are there",
         )
     ]
-    assert missing_visuals(replace(robot, visuals=visuals[:2])) == []
-    assert tcp_motion(robot, *(np.zeros((1, 1)),) * 3)[1] == missing_visuals(robot)
+    assert mesh_warnings(replace(robot, visuals=visuals[:2])) == []
+    assert tcp_motion(robot, *(np.zeros((1, 1)),) * 3)[1] == mesh_warnings(robot)
 
 
 def test_a_mesh_that_the_description_may_not_take_is_told_and_not_drawn(tmp_path: Path) -> None:
@@ -48,8 +48,8 @@ def test_a_mesh_that_the_description_may_not_take_is_told_and_not_drawn(tmp_path
     )
     robot = read_urdf(tmp_path / "my arm" / "arm.urdf")
     for one in (robot, chain_from_dict(chain_to_dict(robot))):  # as a recording keeps it
-        assert not any(map(drawable, one.visuals))
-        assert missing_visuals(one) == [
+        assert not any(map(is_drawable, one.visuals))
+        assert mesh_warnings(one) == [
             LogWarning(
                 "visual-missing",
                 "1 of 1 mesh files of robot arm are outside its folder and not drawn, the first"
@@ -72,11 +72,11 @@ def test_a_mesh_that_the_description_may_not_take_is_told_and_not_drawn(tmp_path
 def test_a_gltf_that_needs_other_files_is_not_drawn(document: object, whole: bool, tmp_path: Path) -> None:
     path = tmp_path / "arm.gltf"
     path.write_text(json.dumps(document), encoding="utf-8")
-    assert drawable(Visual(None, Mesh(str(path)), translation(0.0, 0.0, 0.0))) is whole
+    assert is_drawable(Visual(None, Mesh(str(path)), translation(0.0, 0.0, 0.0))) is whole
 
 
 def test_a_gltf_of_many_brackets_or_of_no_text_is_not_drawn(tmp_path: Path) -> None:
     path = tmp_path / "arm.gltf"
     for content in (b"[" * 100_000, b'{"buffers":' * 100_000, b"\xff\xfe", b"9" * 5000):
         path.write_bytes(content)
-        assert not drawable(Visual(None, Mesh(str(path))))
+        assert not is_drawable(Visual(None, Mesh(str(path))))

@@ -15,7 +15,7 @@ from urmpipe_pipeline.presentation.palette import (
     JOINT_COLOURS,
     REFERENCE_COLOUR,
     RUN_COLOURS,
-    colour_word,
+    colour_name,
     joint_colour,
     rgb,
     run_colour,
@@ -98,4 +98,4 @@ def test_colours_stand_out_on_white_and_in_the_viewer(colour: str) -> None:
 
 def test_colours_start_again() -> None:
     assert joint_colour(0) == joint_colour(8) == JOINT_COLOURS[0]
-    assert (run_colour(8), colour_word("#21c3ff")) == ("#21c3ff", "sky blue")
+    assert (run_colour(8), colour_name("#21c3ff")) == ("#21c3ff", "sky blue")

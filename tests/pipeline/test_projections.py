@@ -21,10 +21,10 @@ from urmpipe_pipeline.presentation.projections import (
     MASS_PX,
     SIDEWAYS,
     Mass,
+    ProjectionView,
     Sketch,
-    View,
     chain_masses,
-    projected,
+    draw_projections,
 )
 from urmpipe_pipeline.presentation.scene import Spot
 
@@ -35,8 +35,8 @@ ROUNDED = 0.11
 """Places are written to 0.1 px: two of them differ by as much."""
 
 
-def drawn(sketch: Sketch, views: tuple[View, ...] = VIEWS) -> ET.Element:
-    return ET.fromstring(projected(sketch, views, "an arm"))
+def drawn(sketch: Sketch, views: tuple[ProjectionView, ...] = VIEWS) -> ET.Element:
+    return ET.fromstring(draw_projections(sketch, views, "an arm"))
 
 
 def points(svg: ET.Element) -> list[FloatArray]:

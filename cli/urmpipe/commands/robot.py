@@ -79,8 +79,8 @@ def show(
         SIDEWAYS,
         Sketch,
         chain_masses,
-        chain_spots,
-        projected,
+        draw_projections,
+        label_skeleton,
     )
     from urmpipe_pipeline.runs.torques import mass_warnings
     from urmpipe_pipeline.solved_targets.request import joint_values
@@ -92,8 +92,10 @@ def show(
     posed = chain_at(chain, values.tolist())
     if picture is not None:
         masses = chain_masses(chain, values)
-        sketch = Sketch([posed.skeleton], spots=chain_spots(posed.skeleton), masses=masses)
-        write_export(picture, projected(sketch, (SIDEWAYS, FRONT), posed.title, EXPORT_MARK), Path(name))
+        sketch = Sketch([posed.skeleton], spots=label_skeleton(posed.skeleton), masses=masses)
+        write_export(
+            picture, draw_projections(sketch, (SIDEWAYS, FRONT), posed.title, EXPORT_MARK), Path(name)
+        )
     terminal.answer(posed.to_dict, lambda: print_chain(posed))
     return 0
 

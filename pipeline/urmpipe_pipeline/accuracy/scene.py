@@ -14,7 +14,7 @@ from urmpipe_pipeline.comparison.scene import drawn_larger
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import ends, spot_at
-from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
+from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS, Sketch, draw_projections
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Spot
 from urmpipe_pipeline.trajectories import extent
 
@@ -64,7 +64,9 @@ def arm_drawing(result: Accuracy) -> Drawing:
     arms = points_over_log(result.robot, motion.q[at])
     words = "real path" if larger is None else larger.name
     title = f"{result.robot.name} at {at_velocity(motion.velocity)}: planned path grey, {words} orange"
-    svg = projected(Sketch(list(arms), run, (spot,), asked=motion.planned), (SIDEWAYS, FRONT, ABOVE), title)
+    svg = draw_projections(
+        Sketch(list(arms), run, (spot,), commanded=motion.planned), (SIDEWAYS, FRONT, ABOVE), title
+    )
     alt = (
         f"The arm at {len(at)} poses from the side, from the front and from above, planned path and {words}."
     )

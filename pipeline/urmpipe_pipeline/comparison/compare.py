@@ -37,7 +37,7 @@ from urmpipe_pipeline.comparison.warnings import (
 from urmpipe_pipeline.diagnosis.diagnose import Compared, Limit, diagnose
 from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
-from urmpipe_pipeline.presentation.meshes import missing_visuals
+from urmpipe_pipeline.presentation.meshes import mesh_warnings
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.runs.recorded_tcp import missing_tool_warning
 from urmpipe_pipeline.runs.run import Run
@@ -417,7 +417,7 @@ def _comparison(
 
 def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
     """Return what cannot be drawn of the arms any more: a recording keeps the names of mesh files only."""
-    gone = dict.fromkeys(warning for run in runs if run.robot for warning in missing_visuals(run.robot))
+    gone = dict.fromkeys(warning for run in runs if run.robot for warning in mesh_warnings(run.robot))
     return [warning for warning in gone if not any(warning in run.warnings for run in runs)]
 
 

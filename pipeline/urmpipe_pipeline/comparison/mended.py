@@ -16,8 +16,8 @@ from urmpipe_pipeline.diagnosis.result import Diagnosis, format_residual
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,
+    CORRECTED_COLOUR,
     DEVIATION_COLOUR,
-    MENDED_COLOUR,
     joint_colour,
 )
 from urmpipe_pipeline.presentation.scene import ArmMark, Path
@@ -80,7 +80,7 @@ def mended_path(one: Deviation) -> Iterator[Path]:
     position = np.asarray(one.reference)[own] - np.asarray(found.mended)[mended]
     t_ns = one.t_ns[own] if one.run.timed else None
     yield Path(
-        "without the causes", position, t_ns, MENDED_COLOUR, supposed=True, sample=both, line=one.run.timed
+        "without the causes", position, t_ns, CORRECTED_COLOUR, supposed=True, sample=both, line=one.run.timed
     )
 
 

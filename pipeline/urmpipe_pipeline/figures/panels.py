@@ -21,6 +21,7 @@ from urmpipe_pipeline.presentation.curves import (
     Curve,
     Span,
     across,
+    choose_point_count,
     cloud_rows,
     curves_of,
     decimate,
@@ -28,7 +29,6 @@ from urmpipe_pipeline.presentation.curves import (
     logarithmic_ends,
     out_of_limit,
     place_of,
-    points_for,
     shown_unit,
     stretches,
 )
@@ -107,7 +107,7 @@ def _scale(axes: Axes, panel: Panel, curves: Sequence[Curve], factor: float) -> 
     if panel.logarithmic:
         joined = panel.over is not None and panel.over.joined
         axes.set_yscale("log")
-        axes.set_ylim(*logarithmic_ends(curves, limit, whole=joined))
+        axes.set_ylim(*logarithmic_ends(curves, limit, all_values=joined))
         axes.yaxis.set_major_locator(LogLocator(numticks=6))
         axes.yaxis.set_major_formatter(FuncFormatter(_plain))
         axes.yaxis.set_minor_locator(NullLocator())
@@ -144,7 +144,7 @@ def _lines(axes: Axes, panel: Panel, curves: Sequence[Curve]) -> Entries:
     for one in curves:
         dash = DASHES[1 if one.line.dashed else seen[one.colour] % len(DASHES)]
         seen[one.colour] += not one.line.dashed
-        kept = np.union1d(decimate(one.values, points_for(one.t_ns), one.x), _rows(panel.peaks))
+        kept = np.union1d(decimate(one.values, choose_point_count(one.t_ns), one.x), _rows(panel.peaks))
         alone = np.count_nonzero(np.isfinite(one.values)) == 1  # a line through one point is nothing to see
         points = one.line.points or one.t_ns is None
         (line,) = axes.plot(
@@ -167,7 +167,7 @@ def _areas(axes: Axes, curves: Sequence[Curve]) -> Entries:
     if not curves:
         return found
     values = np.column_stack([one.values for one in curves])
-    kept = decimate(values, points_for(curves[0].t_ns), curves[0].x)
+    kept = decimate(values, choose_point_count(curves[0].t_ns), curves[0].x)
     shown = np.nan_to_num(values[kept])
     for sign in (np.fmax, np.fmin):
         parts = sign(shown, 0.0)

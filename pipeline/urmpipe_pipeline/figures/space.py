@@ -25,7 +25,7 @@ from urmpipe_pipeline.figures.panels import in_unit
 from urmpipe_pipeline.figures.sheet import INCH, Sheet, em, fitting, sheet
 from urmpipe_pipeline.figures.size import Size
 from urmpipe_pipeline.joint_log import ns_to_seconds
-from urmpipe_pipeline.presentation.curves import decimate, points_for
+from urmpipe_pipeline.presentation.curves import choose_point_count, decimate
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
 from urmpipe_pipeline.presentation.palette import VALUE_SCALE
@@ -213,7 +213,9 @@ def _kept(path: Path) -> tuple[FloatArray, FloatArray, float | None, str]:
     rows = np.arange(len(position)) if path.sample is None else np.asarray(path.sample[:])
     t = np.asarray(rows + 1.0) if path.t_ns is None else ns_to_seconds(path.t_ns[:])
     columns = position if path.values is None else np.column_stack([position, values])
-    kept = np.union1d(decimate(columns, points_for(path.t_ns), t), np.asarray(path.kept, dtype=np.int64))
+    kept = np.union1d(
+        decimate(columns, choose_point_count(path.t_ns), t), np.asarray(path.kept, dtype=np.int64)
+    )
     gaps = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)[kept]
     breaks = np.flatnonzero(np.diff(gaps) > 0) + 1
     place = np.insert(position[kept], breaks, np.nan, axis=0)

@@ -13,7 +13,7 @@ from urmpipe_models.networks.file import Network
 from urmpipe_pipeline.networks.parts_in_space import body_points, find_plane, parts, placed
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.networks.sketch import mechanism_pieces
-from urmpipe_pipeline.presentation.projections import Piece, drawn_pieces
+from urmpipe_pipeline.presentation.projections import Piece, draw_sorted
 
 SMALL_PX, HEAD_PX, ABREAST = 190.0, 44.0, 5
 """Width and height of a small picture, room for a title, and pictures beside each other."""
@@ -100,5 +100,5 @@ def _small(
 
     yield f'<text x="{left + 6:.0f}" y="{top + 12:.0f}">assembly {k + 1}</text>'
     yield '<g stroke-opacity="0.8">'
-    yield from drawn_pieces(pieces, flat, np.cross(look[0], look[1]))
+    yield from draw_sorted(pieces, flat, np.cross(look[0], look[1]))
     yield "</g>"

@@ -14,7 +14,7 @@ from urmpipe_pipeline.networks.graph_layout import TEXT_PX, Edge, GraphLayout, g
 from urmpipe_pipeline.networks.parts_in_space import BODY_COLOURS, CONTROL_COLOUR, body_colour
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.presentation.palette import INK_COLOUR
-from urmpipe_pipeline.presentation.projections import Box, width_of
+from urmpipe_pipeline.presentation.projections import Box, text_width
 
 MARGIN_PX, HEAD_PX, ROW_PX = 30.0, 40.0, 19.0
 """Around the graph, above it for the title, and for a line of the key, in pixels."""
@@ -45,8 +45,8 @@ def graph_svg(result: NetworkResult) -> str:
     layout = graph_layout(network.body_names, edges)
     bounds, key = layout.bounds.grown(MARGIN_PX), list(_key(result))
     title = f"Graph of {network.name}: {result.structure}"
-    room = max([width_of(words, TEXT_PX) for words, _ in key], default=0.0) + 2.0 * MARGIN_PX
-    wide = max(bounds.right - bounds.left, room, width_of(title, 17.0) + 2.0 * MARGIN_PX)
+    room = max([text_width(words, TEXT_PX) for words, _ in key], default=0.0) + 2.0 * MARGIN_PX
+    wide = max(bounds.right - bounds.left, room, text_width(title, 17.0) + 2.0 * MARGIN_PX)
     high = HEAD_PX + bounds.bottom - bounds.top
     full = high + ROW_PX * len(key) + (14.0 if key else 0.0)
     shift = f"translate({(wide - bounds.left - bounds.right) / 2.0:.1f} {HEAD_PX - bounds.top:.1f})"

@@ -13,7 +13,13 @@ from itertools import combinations
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.presentation.projections import HIGH, Box, box_about, freest, width_of
+from urmpipe_pipeline.presentation.projections import (
+    LINE_HEIGHT,
+    Box,
+    least_overlapping,
+    text_box,
+    text_width,
+)
 
 TEXT_PX = 13.0
 """Size of letters in pixels."""
@@ -94,7 +100,7 @@ class GraphLayout:
 
 def graph_layout(names: Sequence[str], edges: Sequence[Edge]) -> GraphLayout:
     """Return a layout of bodies, the ground first, and what edges them."""
-    sizes = np.array([[max(LEAST_PX, width_of(name, TEXT_PX) + 2.0 * PAD_PX), NODE_PX] for name in names])
+    sizes = np.array([[max(LEAST_PX, text_width(name, TEXT_PX) + 2.0 * PAD_PX), NODE_PX] for name in names])
     numbers = {name: k for k, name in enumerate(names)}
     ends = np.array([[numbers[name] for name in edge.bodies] for edge in edges], dtype=np.int64).reshape(
         -1, 2
@@ -115,7 +121,9 @@ def _ways(sizes: FloatArray, ends: IntArray, edges: Sequence[Edge]) -> FloatArra
     np.fill_diagonal(ways, 0.0)
     for (i, j), edge in zip(ends.tolist(), edges, strict=True):
         beside = int((np.sort(ends, axis=1) == sorted((i, j))).all(axis=1).sum()) - 1
-        length = (sizes[i, 0] + sizes[j, 0]) / 2.0 + width_of(edge.words, TEXT_PX) + SPACE_PX + 10.0 * beside
+        length = (
+            (sizes[i, 0] + sizes[j, 0]) / 2.0 + text_width(edge.words, TEXT_PX) + SPACE_PX + 10.0 * beside
+        )
         ways[i, j] = ways[j, i] = max(length, ways[i, j] if np.isfinite(ways[i, j]) else 0.0)
     for k in range(n):
         ways = np.minimum(ways, ways[:, k : k + 1] + ways[k : k + 1])
@@ -243,7 +251,7 @@ def _laid_out(
     curves = list(_curves(places, taken, edges, ends))
     for edge, curve in zip(edges, curves, strict=True):
         spots = curve[[round(share * CURVE) for share in ALONG]].tolist()
-        words = freest([box_about(x, y, edge.words, TEXT_PX) for x, y in spots], taken)
+        words = least_overlapping([text_box(x, y, edge.words, TEXT_PX) for x, y in spots], taken)
         taken.append(words)
         lines.append(Line(edge, curve, words))
     return GraphLayout(nodes, tuple(lines))
@@ -260,8 +268,8 @@ def _curves(
         u = (high - low) / max(float(np.linalg.norm(high - low)), 1e-9)
         normal = np.array([-u[1], u[0]])
         if len(alike) > 1:
-            wide = max(width_of(edges[m].words, TEXT_PX) for m in alike)
-            step = abs(normal[0]) * wide + abs(normal[1]) * HIGH * TEXT_PX + 8.0
+            wide = max(text_width(edges[m].words, TEXT_PX) for m in alike)
+            step = abs(normal[0]) * wide + abs(normal[1]) * LINE_HEIGHT * TEXT_PX + 8.0
             bow = step * (alike.index(k) - (len(alike) - 1) / 2.0)
         else:
             others = [box for m, box in enumerate(nodes) if m not in (i, j)]

@@ -240,7 +240,7 @@ def _ghost(at: Placed) -> Iterator[Piece]:
     """Yield a further instant: moving bodies and elements, faintly."""
     seen = [part for part in parts(at) if part.kind != "joint" and part.name != at.network.ground]
     for piece in mechanism_pieces(at.network, seen):
-        yield replace(piece, width=0.8, opacity=GHOST_OPACITY, faint=True)
+        yield piece._replace(width=0.8, opacity=GHOST_OPACITY, faint=True)
 
 
 def _curve_ends(name: str, position: FloatArray, colour: str) -> Iterator[Spot]:

@@ -24,8 +24,8 @@ from urmpipe_pipeline.presentation.projections import (
     SIDEWAYS,
     Piece,
     Sketch,
-    projected,
-    projected_along,
+    draw_along_normal,
+    draw_projections,
 )
 from urmpipe_pipeline.presentation.scene import PlaneView, Spot
 
@@ -61,8 +61,8 @@ def mechanism_svg(result: NetworkResult) -> str:
 def sketch_svg(sketch: Sketch, plane: PlaneView | None, heading: str) -> str:
     """Return a sketch along the normal of a plane, or in three projections if there is none."""
     if plane is None:
-        return projected(sketch, (SIDEWAYS, FRONT, ABOVE), heading)
-    return projected_along(sketch, plane, heading)
+        return draw_projections(sketch, (SIDEWAYS, FRONT, ABOVE), heading)
+    return draw_along_normal(sketch, plane, heading)
 
 
 def view_words(plane: PlaneView | None) -> str:

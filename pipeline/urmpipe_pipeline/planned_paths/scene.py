@@ -15,7 +15,7 @@ from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.palette import DEVIATION_COLOUR, INK_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import spot_at, within_words
-from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
+from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS, Sketch, draw_projections
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Sheets, Spot, Targets
 
 NAMED = 12
@@ -86,7 +86,7 @@ def arm_drawing(plan: PlannedPath) -> Iterator[Drawing]:
         for place, row in zip(plan.position[at], rows.tolist(), strict=True)
     ]
     title = f"{chain.name} at the rows of {plan.name}"
-    svg = projected(Sketch(list(arms), plan.position, spots), (SIDEWAYS, FRONT, ABOVE), title)
+    svg = draw_projections(Sketch(list(arms), plan.position, spots), (SIDEWAYS, FRONT, ABOVE), title)
     alt = f"The arm at {len(rows)} rows from the side, from the front and from above, with the path."
     yield Drawing("Arm at the rows", alt, svg)
 

@@ -1,4 +1,4 @@
-"""The mesh files that show what an arm looks like: which can be drawn, and what to say of the others."""
+"""The mesh files of an arm: which can be drawn, and warnings about the others."""
 
 from __future__ import annotations
 
@@ -15,54 +15,51 @@ MEDIA_TYPES = {
     ".glb": "model/gltf-binary",
     ".gltf": "model/gltf+json",
     ".dae": "model/vnd.collada+xml",
-}
-"""The meshes that the viewer reads, by the end of their name."""
+}  # of the meshes that the viewer reads, by suffix
 
-VISUAL_MISSING = "visual-missing"
-"""The kind of the warning about meshes that cannot be drawn."""
+VISUAL_MISSING = "visual-missing"  # kind of the warning about meshes that cannot be drawn
 
-
-WITHIN = "files in the folder of its description, in ROS packages around it, and in folders of"
-"""Which meshes a description may take, but for the name of the variable that lists folders."""
+# Of meshes that a description may use; the name of the variable that lists folders follows.
+ALLOWED_FOLDERS = "files in the folder of its description, in ROS packages around it, and in folders of"
 
 
-def drawable(visual: Visual) -> bool:
-    """Tell whether a shape can be drawn: a mesh if its file is there, of a known form, and needs no other."""
+def is_drawable(visual: Visual) -> bool:
+    """Return whether a shape can be drawn: a mesh if its file exists, is readable and needs no other."""
     if not isinstance(visual.shape, Mesh):
         return True
-    if visual.shape.file.startswith(FILE):  # the description may not take it
+    if visual.shape.file.startswith(FILE):  # the description may not use it
         return False
     path = Path(visual.shape.file)
     suffix = path.suffix.lower()
     try:
-        there = suffix in MEDIA_TYPES and path.is_file()
-    except OSError:  # such as a folder that may not be looked into
+        exists = suffix in MEDIA_TYPES and path.is_file()
+    except OSError:  # such as a folder that may not be searched
         return False
-    return there and (suffix != ".gltf" or _self_contained(path))
+    return exists and (suffix != ".gltf" or _self_contained(path))
 
 
-def missing_visuals(robot: Chain) -> list[LogWarning]:
-    """Return a warning about meshes of an arm that cannot be drawn, and one about those it may not take."""
+def mesh_warnings(robot: Chain) -> list[LogWarning]:
+    """Return warnings about meshes of an arm that cannot be drawn, and about those that it may not use."""
     meshes = {visual.shape.file: visual for visual in robot.visuals if isinstance(visual.shape, Mesh)}
     outside = [file for file in meshes if file.startswith(FILE)]
-    missing = [file for file, visual in meshes.items() if file not in outside and not drawable(visual)]
-    found = (
+    missing = [file for file, visual in meshes.items() if file not in outside and not is_drawable(visual)]
+    problems = (
         (missing, "cannot be drawn", f"{', '.join(MEDIA_TYPES)} files that are there"),
-        (outside, "are outside its folder and not drawn", f"{WITHIN} {PACKAGE_PATH}"),
+        (outside, "are outside its folder and not drawn", f"{ALLOWED_FOLDERS} {PACKAGE_PATH}"),
     )
     return [
         LogWarning(
             VISUAL_MISSING,
-            f"{len(files)} of {len(meshes)} mesh files of robot {robot.name} {said}, the first"
+            f"{len(files)} of {len(meshes)} mesh files of robot {robot.name} {problem}, the first"
             f" {unquote(files[0].removeprefix(FILE))}: solids stand for the links; allowed: {allowed}",
         )
-        for files, said, allowed in found
+        for files, problem, allowed in problems
         if files
     ]
 
 
 def _self_contained(path: Path) -> bool:
-    """Tell whether a glTF file names no other file, which would not be in the recording."""
+    """Return whether a glTF file names no other file, which would not be in the recording."""
     try:
         document = parse_json(path.read_bytes())
         parts = [*document.get("buffers", []), *document.get("images", [])]

@@ -13,6 +13,7 @@ from urmpipe_pipeline.presentation.curves import (
     Curve,
     Span,
     across,
+    choose_point_count,
     cloud_rows,
     curves_of,
     decimate,
@@ -20,7 +21,6 @@ from urmpipe_pipeline.presentation.curves import (
     logarithmic_ends,
     out_of_limit,
     place_of,
-    points_for,
     shown_unit,
 )
 from urmpipe_pipeline.presentation.figure import Mark, Over, Panel, Shape
@@ -106,7 +106,7 @@ def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Pan
     look: Spec = {"rangemode": "normal" if panel.signed else "tozero"}
     if panel.logarithmic:
         joined = panel.over is not None and panel.over.joined
-        ends = logarithmic_ends(curves, (panel.limit or 0.0) * factor, whole=joined)
+        ends = logarithmic_ends(curves, (panel.limit or 0.0) * factor, all_values=joined)
         look = {"type": "log", "range": np.log10(ends).tolist()}
     elif scales is not None:
         look = _broken(panel, scales, factor)
@@ -157,7 +157,7 @@ def _lines(
         more: Spec = names.entry(one.name, number) | {"line": style}
         if one.line.points or one.t_ns is None:
             more |= {"mode": "markers", "marker": {"color": one.colour, "size": 7}, "cliponaxis": False}
-        points = points_for(one.t_ns)
+        points = choose_point_count(one.t_ns)
         more |= {"points": points, "keep": panel.peaks, "at": _at(one, scales)}
         trace = line(one.x, one.values, one.name, one.colour, unit, **more)
         trace["hovertemplate"] += names.extra(one.name, panel.title)
@@ -172,7 +172,7 @@ def _areas(panel: Panel, curves: Sequence[Curve], number: int, names: Names, uni
     if not curves:
         return
     values = np.column_stack([one.values for one in curves])
-    kept = decimate(values, points_for(curves[0].t_ns), curves[0].x)
+    kept = decimate(values, choose_point_count(curves[0].t_ns), curves[0].x)
     for one, column in zip(curves, values[kept].T, strict=True):
         digits = pointer_digits(unit, column)
         area: Spec = {

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import ns_to_seconds
-from urmpipe_pipeline.presentation.curves import decimate, points_for
+from urmpipe_pipeline.presentation.curves import choose_point_count, decimate
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
 from urmpipe_pipeline.presentation.palette import VALUE_SCALE
@@ -86,7 +86,9 @@ def _path(path: Path, width: int, dot: int) -> Spec:
     unit, factor = text.SHOWN.get(path.unit, (path.unit, 1.0))
     values = np.full(len(position), np.nan) if path.values is None else factor * np.asarray(path.values[:])
     columns = position if path.values is None else np.column_stack([position, values])
-    kept = np.union1d(decimate(columns, points_for(path.t_ns), t), np.asarray(path.kept, dtype=np.int64))
+    kept = np.union1d(
+        decimate(columns, choose_point_count(path.t_ns), t), np.asarray(path.kept, dtype=np.int64)
+    )
     place, t, shown = (_picked(one, kept, path.sample) for one in (position, t, values))
     said = "t %{customdata[0]:.3f} s" if timed else "row %{customdata[0]}"
     said += "<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"

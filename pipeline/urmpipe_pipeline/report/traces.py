@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import escape_control_characters
 from urmpipe_pipeline import text
-from urmpipe_pipeline.presentation.curves import POINTS, decimate, stretches
+from urmpipe_pipeline.presentation.curves import MAX_POINTS, decimate, stretches
 from urmpipe_pipeline.report.spec import BAND, FAULT, INK, MUTED, Spec, typed
 from urmpipe_pipeline.text import DIGITS
 
@@ -44,7 +44,7 @@ def line(
     colour: str,
     unit: str,
     *,
-    points: int = POINTS,
+    points: int = MAX_POINTS,
     keep: Sequence[int] = (),
     at: FloatArray | None = None,
     **more: Any,

@@ -21,7 +21,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, LogError, OptionError, check_choice
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING, missing_visuals
+from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING, mesh_warnings
 from urmpipe_pipeline.provenance import Provenance, build_provenance
 from urmpipe_pipeline.repolarization.audit import AuditResult, audit_log, is_revolute
 from urmpipe_pipeline.runs.derivatives import Method, log_derivatives
@@ -207,7 +207,7 @@ def tcp_motion(
         allowed = f"{len(robot.coordinates)}, as robot {robot.name} has"
         raise LogError(f"found {q.shape[1]} joints, allowed: {allowed}")
     tcp = point_over_log(robot, q, qd, qdd)
-    warnings = [*missing_visuals(robot), *mass_warnings(robot)]
+    warnings = [*mesh_warnings(robot), *mass_warnings(robot)]
     if tcp.singular.any():
         count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))
         message = f"at {count} samples from {first} on ry is +-90 deg: rz and rx are not separately defined"

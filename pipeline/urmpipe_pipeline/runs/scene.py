@@ -15,8 +15,8 @@ from urmpipe_pipeline.presentation.projections import (
     SIDEWAYS,
     Sketch,
     chain_masses,
-    chain_spots,
-    projected,
+    draw_projections,
+    label_skeleton,
 )
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
 from urmpipe_pipeline.runs.figures import times_of
@@ -66,10 +66,10 @@ def mass_drawing(run: Run) -> Iterator[Drawing]:
     q, name = np.asarray(run.q)[there[0]], run.robot.name
     (skeleton,) = points_over_log(run.robot, q[np.newaxis])
     masses = chain_masses(run.robot, q)
-    sketch = Sketch([skeleton], spots=chain_spots(skeleton), masses=masses)
+    sketch = Sketch([skeleton], spots=label_skeleton(skeleton), masses=masses)
     alt = f"{name} from the side and from the front, with the centres of"
     alt += f" its {len(masses)} masses, {sum(one.mass for one in masses):.4g} kg in all."
-    svg = projected(sketch, (SIDEWAYS, FRONT), f"{name} at the start of {run.name}")
+    svg = draw_projections(sketch, (SIDEWAYS, FRONT), f"{name} at the start of {run.name}")
     yield Drawing("Mass centres", alt, svg)
 
 

@@ -13,7 +13,7 @@ from urmpipe_models.ik.closed import format_method
 from urmpipe_models.ik.limits import TURN, joint_periods
 from urmpipe_models.ik.path import JointPath, Jump, SpeedViolation
 from urmpipe_pipeline import text
-from urmpipe_pipeline.presentation.palette import colour_word, ghost_colour, run_colour
+from urmpipe_pipeline.presentation.palette import colour_name, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of
 from urmpipe_pipeline.presentation.section import Cell, Column, Event, Fact, Place, Table, Value
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -111,9 +111,9 @@ def tables(one: SolvedTargets) -> Iterator[Table]:
         yield joints_table(one)
     if found := ghosts(one):
         heads = {"branch": "Branch", "drawn": "Drawn", "rows": "Rows"}
-        chosen = ("chosen", f"solid, its tip {colour_word(run_colour(0))}", Value(int(one.reached.sum())))
+        chosen = ("chosen", f"solid, its tip {colour_name(run_colour(0))}", Value(int(one.reached.sum())))
         others = (
-            (ghost.name, colour_word(ghost_colour(i)), Value(int(np.isfinite(ghost.q).all(axis=1).sum())))
+            (ghost.name, colour_name(ghost_colour(i)), Value(int(np.isfinite(ghost.q).all(axis=1).sum())))
             for i, ghost in enumerate(found)
         )
         yield table_of("Branches", heads, [chosen, *others])

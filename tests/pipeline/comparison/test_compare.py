@@ -17,7 +17,7 @@ from urmpipe_models.kinematics.forward import points_over_log, positions_over_lo
 from urmpipe_models.math3d import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.joint_log import LogColumn, LogWarning
-from urmpipe_pipeline.presentation.meshes import missing_visuals
+from urmpipe_pipeline.presentation.meshes import mesh_warnings
 from urmpipe_pipeline.repolarization.audit import audit_log
 
 COLUMNS = tuple(LogColumn(f"q{i + 1}", f"q{i + 1}", "joint", i, "rad") for i in range(6))
@@ -280,7 +280,7 @@ def test_meshes_that_went_away_since_the_log_was_read_are_told_once(q: FloatArra
     path = path_run(points_over_log(URM6, q)[:, -1])
     assert compare_runs(path, logs).warnings == ()
     mesh.unlink()
-    gone = missing_visuals(shown)
+    gone = mesh_warnings(shown)
     assert compare_runs(path, logs).warnings == tuple(gone)
     assert [warning.kind for warning in gone] == ["visual-missing"]
     told = [replace(log, warnings=tuple(gone)) for log in logs]  # read when they were gone already

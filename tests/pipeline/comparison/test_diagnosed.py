@@ -17,7 +17,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.facts import decisive_facts
 from urmpipe_pipeline.comparison.mended import cause_marks
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, diagnosis_tables
-from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR, MENDED_COLOUR
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, CORRECTED_COLOUR, DEVIATION_COLOUR
 from urmpipe_pipeline.presentation.scene import ArmMark
 from urmpipe_pipeline.presentation.section import Advice, Fact
 from urmpipe_pipeline.results import present
@@ -130,7 +130,7 @@ def test_the_mended_path_lies_beside_the_reference_by_what_stays(paths: Compared
     result = diagnosed(paths({"log": off(0.01)}))
     one = result.runs[0]
     (mended,) = (path for path in scene_of(present(result)).paths if path.name == "without the causes")
-    assert mended.colour == MENDED_COLOUR
+    assert mended.colour == CORRECTED_COLOUR
     np.testing.assert_array_equal(mended.position, (one.reference - one.delta[:, :3] / 100.0)[::2])
     np.testing.assert_array_equal(mended.t_ns, one.t_ns[::2])
 

@@ -21,10 +21,10 @@ from urmpipe_pipeline.presentation.projections import (
     Box,
     Piece,
     Sketch,
-    box_about,
-    freest,
-    outline,
-    projected,
+    convex_hull,
+    draw_projections,
+    least_overlapping,
+    text_box,
 )
 from urmpipe_pipeline.presentation.scene import Spot
 
@@ -93,7 +93,7 @@ def test_what_is_nearer_hides_what_is_behind() -> None:
     )
     line = Piece(square[:2] + np.array([0.0, 2.0, 0.0]), "#0000ff", front=True)
     for pieces in ([near, far, line], [line, far, near]):
-        svg = ET.fromstring(projected(Sketch(pieces=pieces), (SIDEWAYS,), "two"))
+        svg = ET.fromstring(draw_projections(Sketch(pieces=pieces), (SIDEWAYS,), "two"))
         drawn = [
             one.get("fill") or one.get("stroke")
             for one in svg
@@ -105,18 +105,18 @@ def test_what_is_nearer_hides_what_is_behind() -> None:
 def test_the_outline_of_a_solid_is_its_convex_hull() -> None:
     inner = np.array([[1.0, 1.0], [0.5, 1.5]])
     corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
-    assert outline(np.concatenate((inner, corners))) == [tuple(one) for one in corners.tolist()]
-    assert outline(np.array([[3.0, 4.0]])) == [(3.0, 4.0)]
-    assert sorted(outline(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]))) == [(0.0, 0.0), (2.0, 2.0)]
+    assert convex_hull(np.concatenate((inner, corners))) == [tuple(one) for one in corners.tolist()]
+    assert convex_hull(np.array([[3.0, 4.0]])) == [(3.0, 4.0)]
+    assert sorted(convex_hull(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]))) == [(0.0, 0.0), (2.0, 2.0)]
 
 
 def test_names_stand_beside_each_other() -> None:
     spots = [Spot((0.02 * k, 0.0, 0.0), f"name {k}", "#000000") for k in range(4)]
     sketch = Sketch(pieces=[Piece(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]), "#000000")], names=spots)
-    svg = ET.fromstring(projected(sketch, (SIDEWAYS, FRONT, ABOVE), "names"))
+    svg = ET.fromstring(draw_projections(sketch, (SIDEWAYS, FRONT, ABOVE), "names"))
     shown = [one for one in svg.iter(f"{SVG}text") if one.get("class") == "name"]
     sideways = {one.text: (float(there(one.get("x"))), float(there(one.get("y")))) for one in shown[:4]}
-    boxes = [box_about(x, y - 4.5, "name 0", 12.0) for x, y in sideways.values()]
+    boxes = [text_box(x, y - 4.5, "name 0", 12.0) for x, y in sideways.values()]
     assert len(boxes) == 4 or any("," in (one or "") for one in sideways)
     assert sum(a.shared(b) for k, a in enumerate(boxes) for b in boxes[:k]) == 0.0
 
@@ -124,5 +124,5 @@ def test_names_stand_beside_each_other() -> None:
 def test_a_box_is_put_where_most_is_free() -> None:
     taken = [Box(0.0, 0.0, 10.0, 10.0)]
     first, second = Box(5.0, 5.0, 15.0, 15.0), Box(10.0, 10.0, 20.0, 20.0)
-    assert freest([first, second], taken) == second
-    assert freest([first, second], []) == first
+    assert least_overlapping([first, second], taken) == second
+    assert least_overlapping([first, second], []) == first

@@ -14,7 +14,7 @@ from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.presentation.meshes import MEDIA_TYPES, drawable
+from urmpipe_pipeline.presentation.meshes import MEDIA_TYPES, is_drawable
 from urmpipe_pipeline.presentation.palette import NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.layout import keys, shown_path
 
@@ -50,7 +50,7 @@ class Body:
 
 def own_shapes(robot: Chain) -> list[Visual]:
     """Return the shapes of an arm's description that can be drawn."""
-    return [visual for visual in robot.visuals if drawable(visual)]
+    return [visual for visual in robot.visuals if is_drawable(visual)]
 
 
 def bodies_over_log(

@@ -9,7 +9,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
 from urmpipe_pipeline.presentation.digits import units_differ, written
-from urmpipe_pipeline.presentation.palette import colour_word
+from urmpipe_pipeline.presentation.palette import colour_name
 from urmpipe_pipeline.presentation.scene import Path, Scene
 from urmpipe_pipeline.presentation.section import Cell, Fact, Judged, Presentation, Ref, Section, Table
 
@@ -85,7 +85,7 @@ def _table(table: Table) -> Iterator[str]:
 
 def _coloured(cell: Cell, *, unit: bool = False) -> str:
     """Return a cell, with the word for the colour in which its subject is drawn."""
-    word = colour_word(cell.colour) if isinstance(cell, Ref) else ""
+    word = colour_name(cell.colour) if isinstance(cell, Ref) else ""
     return f"{written(cell, unit=unit)} ({word})" if word else written(cell, unit=unit)
 
 
@@ -95,7 +95,7 @@ def _row(cells: Iterable[str]) -> str:
 
 def _colours(paths: Sequence[Path], told: str) -> Iterator[str]:
     """Yield which path has which colour, where there are several, but for those that are told already."""
-    words = ((plain(one.name), colour_word(one.colour), ", dashed" if one.asked else "") for one in paths)
+    words = ((plain(one.name), colour_name(one.colour), ", dashed" if one.asked else "") for one in paths)
     looks = dict.fromkeys(look for look in words if look[1])
     named = [f"{name} {word}{dashed}" for name, word, dashed in looks if f"{name} ({word})" not in told]
     if len(looks) > 1 and named:
