@@ -1,4 +1,10 @@
-"""How a test after ISO 9283 shows itself: its verdict and criteria, then poses, path, corners and speed."""
+"""How a test after ISO 9283 is shown.
+
+1. Headline and facts: the verdict, the criterion that decides, what was tested.
+2. Sections: failed cycles, poses, path, corners, speed, and the changes since a baseline.
+3. Scene: the command, the mean path with its tube, attained poses, and all cycles on one clock. The
+   deviations of poses and path are enlarged by the same factor.
+"""
 
 from __future__ import annotations
 
@@ -14,43 +20,44 @@ from urmpipe_pipeline.comparison.baseline_section import baseline_section, crite
 from urmpipe_pipeline.comparison.comparison import BaselineComparison, Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.verdict import UNITS
-from urmpipe_pipeline.iso9283.criteria import Criterion, combine_verdicts
+from urmpipe_pipeline.iso9283.criteria import combine_verdicts
 from urmpipe_pipeline.iso9283.figures import (
     CYCLES_COLOUR,
     TUBE_COLOUR,
-    command_path,
+    command_line,
     corner_drawing,
+    criterion_by_pose,
     deviation_figure,
-    enlarged,
-    mean_of,
+    display_factor,
+    mean_line,
     path_figure,
     pose_drawing,
     speed_figure,
-    tube_of,
+    tube,
 )
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest
 from urmpipe_pipeline.iso9283.tables import (
-    amount_words,
-    check_words,
     corner_table,
     criteria_rows,
     criteria_tables,
-    criteria_words,
     cycles_table,
-    decisive,
-    failed_cycles_words,
     failed_table,
+    find_decisive,
+    find_worst_place,
+    format_criteria,
+    format_criterion,
     format_failed_cycle,
+    format_failed_cycles,
+    format_failure,
+    format_tolerance,
     leg_table,
     meaning,
     not_judged_findings,
-    overall_of,
+    overall_of_part,
     plane_table,
     pose_tables,
-    tolerance_words,
-    value_of,
-    where,
-    worst_first,
+    sort_worst_first,
+    to_value,
 )
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.palette import DEVIATION_COLOUR, REFERENCE_COLOUR
@@ -79,12 +86,12 @@ from urmpipe_pipeline.runs.figures import times_of
 
 
 def present_test(result: Comparison, test: IsoTest) -> Presentation:
-    """Return what a comparison shows that is a test after ISO 9283."""
+    """Return the presentation of a comparison that is a test after ISO 9283."""
     return Presentation(
         name=result.name,
         headline=headline(result, test),
         verdict=result.verdict,
-        facts=(*_decisive_facts(test), *_against(result, test)),
+        facts=(*_decisive_facts(test), *_basic_facts(result, test)),
         body=_body(result, test),
         word="" if result.verdict else "incomplete" if test.not_judged else "measured",
         scene=partial(iso_scene, result, test),
@@ -95,84 +102,84 @@ def present_test(result: Comparison, test: IsoTest) -> Presentation:
 
 
 def headline(result: Comparison, test: IsoTest) -> str:
-    """Return which cycles failed, which criteria are out of tolerance or how close to it; against what."""
+    """Return the failed cycles, the criteria out of tolerance or the one that is closest to it."""
     against = f"against {result.reference.name}"
-    worst = decisive(test)
-    failed = [one for one in worst_first(test.overall) if one.verdict == "fail"]
+    worst = find_decisive(test)
+    failed = [criterion for criterion in sort_worst_first(test.overall) if criterion.verdict == "fail"]
     if worst is None:
-        said = f"{against}: no criterion is judged, none has a tolerance"
+        message = f"{against}: no criterion is judged, none has a tolerance"
     elif failed:
-        said = f"out of tolerance {against}: {criteria_words(failed)}"
+        message = f"out of tolerance {against}: {format_criteria(failed)}"
     else:
-        said = f"within tolerance {against}: {amount_words(worst)}"
+        message = f"within tolerance {against}: {format_criterion(worst)}"
     if test.failed_cycles:
         count = text.counted(len(test.failed_cycles), "cycle")
-        named = failed_cycles_words(test.failed_cycles)
-        said = f"followed {result.reference.name}; {count} failed: {named}; the others {said}"
-    said = f"{_cycles(result, test)} {said}"
+        names = format_failed_cycles(test.failed_cycles)
+        message = f"followed {result.reference.name}; {count} failed: {names}; the others {message}"
+    message = f"{_cycle_count(result, test)} {message}"
     if test.not_judged:
-        said += f"; not judged: {', '.join(one.name for one in test.not_judged)}"
+        message += f"; not judged: {', '.join(criterion.name for criterion in test.not_judged)}"
     if result.baseline is not None:
         worse = f"{'and' if failed else 'but'} worse" if result.baseline.verdict == "fail" else "not worse"
-        said += f", {worse} than the baseline {result.baseline.name}"
-    return said + format_assumptions(result.assumptions) + format_defaults(result.provenance)
+        message += f", {worse} than the baseline {result.baseline.name}"
+    return message + format_assumptions(result.assumptions) + format_defaults(result.provenance)
 
 
-def _cycles(result: Comparison, test: IsoTest) -> str:
-    """Return how many cycles there are, and of which log if they are of one."""
-    count = test.cycle_count
-    files = {one.run.log.files for one in result.runs}
+def _cycle_count(result: Comparison, test: IsoTest) -> str:
+    """Return the number of cycles, and their log if they are of one."""
+    files = {run.run.log.files for run in result.runs}
     name = result.name.removesuffix(f"-against-{result.reference.name}")
-    return f"{count} of {name}" if len(files) == 1 and name else count
+    return f"{test.cycle_count} of {name}" if len(files) == 1 and name else test.cycle_count
 
 
 def _decisive_facts(test: IsoTest) -> Iterator[Fact]:
-    """Yield which criterion decided, how much of its tolerance it uses up, and where."""
+    """Yield the criterion that decides, its utilisation, and its place."""
     if test.failed_cycles:
         yield Fact("Failed cycles", Value(len(test.failed_cycles)))
-    one = decisive(test)
-    if one is not None and (one.verdict == "fail" or not test.failed_cycles):
-        used = text.portion(one.utilisation or 0.0)
-        yield Fact("Decided by", f"{amount_words(one)} ({used} the tolerance)", meaning(one.name))
-        yield Fact("Where", where(test, one))
+    criterion = find_decisive(test)
+    if criterion is not None and (criterion.verdict == "fail" or not test.failed_cycles):
+        portion = text.portion(criterion.utilisation or 0.0)
+        value = f"{format_criterion(criterion)} ({portion} the tolerance)"
+        yield Fact("Decided by", value, meaning(criterion.name))
+        yield Fact("Where", find_worst_place(test, criterion))
 
 
-def _against(result: Comparison, test: IsoTest) -> Iterator[Fact]:
-    """Yield what is worse than a baseline, how much was tested, against what, and what is allowed."""
-    since = result.baseline
-    yield from worse_facts(since) if since is not None and since.verdict == "fail" else ()
+def _basic_facts(result: Comparison, test: IsoTest) -> Iterator[Fact]:
+    """Yield what is worse than a baseline, what was tested, the reference and the tolerance."""
+    baseline = result.baseline
+    yield from worse_facts(baseline) if baseline is not None and baseline.verdict == "fail" else ()
     parts = [test.cycle_count]
     parts += [text.counted(len(test.poses.command), "pose")] if test.poses is not None else []
     parts += [text.counted(len(test.path.s), "plane")] if test.path is not None else []
     yield Fact("After ISO 9283", text.enumerated(parts))
     yield Fact("Reference", result.reference.name, brief=False)
-    yield Fact("Tolerance", tolerance_words(result.tolerance), brief=False)
+    yield Fact("Tolerance", format_tolerance(result.tolerance), brief=False)
 
 
 def _body(result: Comparison, test: IsoTest) -> Section:
     sections = list(_sections(test))
     if result.baseline is not None:
-        sections.append(_against_baseline(result.baseline, len(sections)))
-    worst = sorted(sections, key=lambda one: one.verdict != "fail")  # what fails is read first
+        sections.append(_baseline_section(result.baseline, len(sections)))
+    failed_first = sorted(sections, key=lambda section: section.verdict != "fail")
     return Section(
         f"Test {result.name}",
         result.verdict,
         (
-            *_against(result, test),
+            *_basic_facts(result, test),
             Fact("Made", minute(result.provenance), brief=False),
             recording_fact(result.recording),
         ),
         (*criteria_tables(test), cycles_table(test)),
         blocks=partial(_files, result),
         warnings=tuple(_warnings(result)),
-        sections=tuple(replace(one, rank=worst.index(one)) for one in sections),
+        sections=tuple(replace(section, rank=failed_first.index(section)) for section in sections),
     )
 
 
 def _warnings(result: Comparison) -> Iterator[LogWarning]:
     """Yield the warnings of the comparison, and those of its logs by their names."""
     yield from result.warnings
-    yield from (one.of(run.name) for run in result.runs for one in run.run.warnings)
+    yield from (warning.of(run.name) for run in result.runs for warning in run.run.warnings)
 
 
 def _files(result: Comparison) -> Iterator[Block]:
@@ -184,21 +191,21 @@ def _files(result: Comparison) -> Iterator[Block]:
 
 
 def _sections(test: IsoTest) -> Iterator[Section]:
-    """Yield a section about each part that there is of a test."""
+    """Yield one section per part of the test."""
     poses, path = test.poses, test.path
     if test.failed_cycles:
+        count = f"{len(test.failed_cycles)} of {len(test.failed_cycles) + len(test.cycles)}"
+        checks = [
+            Check(cycle.name, "fail", format_failed_cycle(cycle), kind="failed-cycle")
+            for cycle in test.failed_cycles
+            if test.verdict == "fail"
+        ]
         yield Section(
             "Failed cycles",
             test.verdict and "fail",
-            (
-                Fact(
-                    "Failed",
-                    f"{len(test.failed_cycles)} of {len(test.failed_cycles) + len(test.cycles)}",
-                    brief=False,
-                ),
-            ),
+            (Fact("Failed", count, brief=False),),
             (failed_table(test),),
-            checks=tuple(_failed_checks(test)),
+            checks=tuple(checks),
         )
     if test.not_judged:
         yield Section("Criteria without a verdict", errors=tuple(not_judged_findings(test)))
@@ -216,15 +223,14 @@ def _sections(test: IsoTest) -> Iterator[Section]:
     )
     yield _section(test, "Path", facts, (), partial(_path_blocks, test, path))
     if path.corners:
-        yield _section(
-            test, "Corners", (), (corner_table(test, path),), lambda: (corner_drawing(test, path),)
-        )
+        tables = (corner_table(test, path),)
+        yield _section(test, "Corners", (), tables, lambda: (corner_drawing(path),))
     if path.legs:
         yield _section(test, "Speed", (), (leg_table(test, path),), lambda: (speed_figure(path),))
 
 
 def _path_blocks(test: IsoTest, path: CutPath) -> Iterator[Block]:
-    """Yield what a page shows of a path; of one without a leg that is judged its speed, too."""
+    """Yield what a page shows of a path; of one without a leg its speed, too."""
     yield path_figure(path)
     yield deviation_figure(test, path)
     if not path.legs:
@@ -239,40 +245,32 @@ def _section(
     tables: Iterable[Table],
     blocks: Callable[[], Iterable[Block]],
 ) -> Section:
-    """Return the section about a part of a test."""
-    criteria = overall_of(test, part)
-    decided = decisive(test, part)
-    first = () if decided is None else (
-        Fact(decided.name, value_of(decided), meaning(decided.name), brief=False),
-        Fact("Where", where(test, decided), brief=False),
-    )  # fmt: skip
+    """Return the section of a part of a test, with a check for each criterion that has a tolerance."""
+    criteria = overall_of_part(test, part)
+    decisive = find_decisive(test, part)
+    if decisive is not None:
+        place = Fact("Where", find_worst_place(test, decisive), brief=False)
+        value = Fact(decisive.name, to_value(decisive), meaning(decisive.name), brief=False)
+        facts = (value, place, *facts)
+    checks = [
+        Check(c.name, c.verdict, format_failure(test, c) if c.verdict == "fail" else "")
+        for c in criteria
+        if c.verdict is not None
+    ]
     return Section(
         part,
-        combine_verdicts(one.verdict for one in criteria),
-        (*first, *facts),
+        combine_verdicts(criterion.verdict for criterion in criteria),
+        facts,
         tuple(tables),
         blocks=blocks,
-        checks=tuple(_checks(test, criteria)),
-        properties={one.name: one.value for one in criteria if one.value is not None},
+        checks=tuple(checks),
+        properties={c.name: c.value for c in criteria if c.value is not None},
     )
 
 
-def _failed_checks(test: IsoTest) -> Iterator[Check]:
-    if test.verdict == "fail":
-        for cycle in test.failed_cycles:
-            yield Check(cycle.name, "fail", format_failed_cycle(cycle), kind="failed-cycle")
-
-
-def _checks(test: IsoTest, criteria: Iterable[Criterion]) -> Iterator[Check]:
-    """Yield a check for each criterion that has a tolerance."""
-    for one in criteria:
-        if one.verdict is not None:
-            yield Check(one.name, one.verdict, check_words(test, one) if one.verdict == "fail" else "")
-
-
-def _against_baseline(found: BaselineComparison, rank: int) -> Section:
-    """Return what changed since an earlier comparison, with its checks: no section of a cycle holds them."""
-    return replace(baseline_section(found, rank), checks=tuple(criterion_checks(found)))
+def _baseline_section(baseline: BaselineComparison, rank: int) -> Section:
+    """Return what changed since an earlier comparison, with its checks: no section of a cycle has them."""
+    return replace(baseline_section(baseline, rank), checks=tuple(criterion_checks(baseline)))
 
 
 def _line(result: Comparison, test: IsoTest) -> Mapping[str, Cell]:
@@ -286,72 +284,58 @@ def _line(result: Comparison, test: IsoTest) -> Mapping[str, Cell]:
         "Cycles": Value(len(test.cycles)),
         "Failed cycles": Value(len(test.failed_cycles)) if test.failed_cycles else None,
         "Assuming": "; ".join(result.assumptions),
-        **{one.name: value_of(one) for one in test.overall},
+        **{criterion.name: to_value(criterion) for criterion in test.overall},
     }
 
 
 def iso_scene(result: Comparison, test: IsoTest) -> Scene:
-    """Return the command, what was attained of it, enlarged, and the cycles that move on one clock.
-
-    The deviations of poses and path are enlarged by the same factor.
-    """
-    factor = enlarged(test.path, test.poses)
-    shown = next((one for one in result.runs if one.run.tcp is not None), None)
-    arms = () if shown is None else tuple(_arm(shown))
-    paths = [*(_cycle(one) for one in result.runs if one.run.timed)]
+    """Return the command, the attained path and poses, enlarged, and the cycles that move on one clock."""
+    factor = display_factor(test.path, test.poses)
+    with_arm = next((run for run in result.runs if run.run.tcp is not None), None)
+    arms = () if with_arm is None else tuple(_arm(with_arm))
+    paths = [_cycle_point(run) for run in result.runs if run.run.timed]
+    titles = [f"arm of {with_arm.name}"] if with_arm is not None and arms else []
+    balls = None
     if test.path is not None:
-        tube = tube_of(test.path, factor)
-        paths = [
-            command_path(test.path),
-            *paths,
-            *([] if tube is None else [tube]),
-            mean_of(test.path, factor),
-        ]
+        of_tube = tube(test.path, factor)
+        paths = [command_line(test.path), *paths, *(() if of_tube is None else (of_tube,))]
+        paths.append(mean_line(test.path, factor))
+        titles += ["mean path coloured by AT", "tube of RT"]
     if test.poses is not None:
         paths += _clouds(test.poses, factor)
-    of_arm = [f"arm of {shown.name}"] if shown is not None and arms else []
-    title = ", ".join((*of_arm, *_titled(test)))
-    balls = None if test.poses is None else _balls(test, test.poses, factor)
-    return Scene(
-        f"{title[0].upper()}{title[1:]} [m], deviations drawn x{factor}", arms, tuple(paths), balls=balls
-    )
+        titles += ["attained poses", "balls of RP"]
+        balls = _balls(test, test.poses, factor)
+    title = ", ".join(titles)
+    title = f"{title[0].upper()}{title[1:]} [m], deviations drawn x{factor}"
+    return Scene(title, arms, tuple(paths), balls=balls)
 
 
-def _titled(test: IsoTest) -> list[str]:
-    """Return what is shown of a test."""
-    of_path = ["mean path coloured by AT", "tube of RT"] if test.path is not None else []
-    of_poses = ["attained poses", "balls of RP"] if test.poses is not None else []
-    return of_path + of_poses
+def _arm(cycle: Deviation) -> Iterator[Arm]:
+    """Yield the arm of a cycle, with times from its start; none without kinematics."""
+    if cycle.run.robot is not None:
+        t_ns = times_of(cycle.run)
+        since_start = None if t_ns is None else t_ns[:] - t_ns[0]
+        yield Arm(placed(cycle.run.robot, cycle.alignment), cycle.run.q, since_start, CYCLES_COLOUR)
 
 
-def _arm(one: Deviation) -> Iterator[Arm]:
-    """Yield the arm of a cycle, on its own clock from its start on; nothing without kinematics."""
-    if one.run.robot is not None:
-        t_ns = times_of(one.run)
-        since = None if t_ns is None else t_ns[:] - t_ns[0]
-        yield Arm(placed(one.run.robot, one.alignment), one.run.q, since, CYCLES_COLOUR)
-
-
-def _cycle(one: Deviation) -> Path:
-    """Return the point that moves as a cycle does, on its own clock from its start on."""
-    since = one.t_ns[:] - one.run.t_ns[0]
-    return Path("cycles", one.actual, since, CYCLES_COLOUR, sample=one.sample, line=False)
+def _cycle_point(cycle: Deviation) -> Path:
+    """Return the point that moves as a cycle does, with times from its start."""
+    since_start = cycle.t_ns[:] - cycle.run.t_ns[0]
+    return Path("cycles", cycle.actual, since_start, CYCLES_COLOUR, sample=cycle.sample, line=False)
 
 
 def _clouds(poses: AttainedPoses, factor: int) -> Iterator[Path]:
-    """Yield the commanded poses, and where they were attained, enlarged about them."""
+    """Yield the commanded poses, and the attained ones, enlarged around them."""
     cloud = poses.command + factor * (poses.attained - poses.command)
     yield Path("commanded poses", poses.command, None, REFERENCE_COLOUR, asked=True, line=False)
     yield Path(f"attained x{factor}", cloud.reshape(-1, 3), None, DEVIATION_COLOUR, line=False)
 
 
 def _balls(test: IsoTest, poses: AttainedPoses, factor: int) -> Balls | None:
-    """Return balls of the radius RP about the barycentres; None of one cycle."""
-    found = {one.at: one.value for one in test.criteria if one.name == "RP"}
-    radius = [found.get(f"pose {k + 1}") for k in range(len(poses.command))]
-    known = np.array([one is not None for one in radius], dtype=np.bool_)
+    """Return balls of the radius RP around the barycentres; None for one cycle."""
+    radii = criterion_by_pose(test, "RP", len(poses.command))
+    known = np.isfinite(radii)
     if not known.any():
         return None
     centre = poses.command + factor * (poses.attained.mean(axis=0) - poses.command)
-    sizes = factor * np.array([one for one in radius if one is not None])
-    return Balls(f"RP x{factor}", centre[known], sizes, TUBE_COLOUR)
+    return Balls(f"RP x{factor}", centre[known], factor * radii[known], TUBE_COLOUR)

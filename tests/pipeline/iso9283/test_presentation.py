@@ -25,7 +25,7 @@ from urmpipe_pipeline.comparison.exports import exports
 from urmpipe_pipeline.iso9283.criteria import UNITS, judge_criterion
 from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.iso9283.result import IsoTest
-from urmpipe_pipeline.iso9283.tables import meaning, tolerance_words, value_of, worst_first
+from urmpipe_pipeline.iso9283.tables import format_tolerance, meaning, sort_worst_first, to_value
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.presentation.section import Judged, Presentation, Section, Table
 from urmpipe_pipeline.report.render import render_report
@@ -185,12 +185,12 @@ def test_rows_and_exports_are_the_criteria(result: Comparison, iso: IsoTest, sho
 
 def test_a_share_is_shown_in_percent_and_a_speed_in_m_per_s() -> None:
     away, fast = judge_criterion("AV", None, -0.05, 3, {"AV": 0.1}), judge_criterion("FV", None, 0.002, 3, {})
-    assert (there(value_of(away)).unit, there(value_of(fast)).unit) == ("%", "m/s")
+    assert (there(to_value(away)).unit, there(to_value(fast)).unit) == ("%", "m/s")
     assert (
-        tolerance_words({"AP": 4e-4, "AV": 0.05, "AP_rz": math.pi / 180}) == "AP 0.4 mm, AV 5 %, AP_rz 1 deg"
+        format_tolerance({"AP": 4e-4, "AV": 0.05, "AP_rz": math.pi / 180}) == "AP 0.4 mm, AV 5 %, AP_rz 1 deg"
     )
     near = judge_criterion("AP", None, 1e-6, 3, {"AP": 1.1e-6})
-    assert worst_first([away, fast, near]) == [near, away, fast]
+    assert sort_worst_first([away, fast, near]) == [near, away, fast]
 
 
 # --- JUnit, report, terminal -----------------------------------------------------------------------

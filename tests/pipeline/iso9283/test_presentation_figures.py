@@ -21,19 +21,19 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.iso9283.figures import (
-    AROUND,
     FACTORS,
-    MOST,
-    SEEN,
+    MAX_DISPLAYED,
+    MAX_DRAWN,
+    RING_PIECES,
     circles,
     corner_drawing,
     deviation_figure,
-    enlarged,
-    mean_of,
+    display_factor,
+    mean_line,
     path_figure,
     pose_drawing,
     speed_figure,
-    tube_of,
+    tube,
 )
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest
 from urmpipe_pipeline.presentation.figure import Figure, Panel
@@ -123,9 +123,9 @@ def test_of_many_poses_the_worst_are_drawn(iso: IsoTest) -> None:
     ap = np.linalg.norm(attained.mean(axis=0) - command, axis=1)
     criteria = tuple(replace(iso.criteria[0], at=f"pose {k + 1}", name="AP", value=ap[k]) for k in range(50))
     drawing = pose_drawing(replace(iso, criteria=criteria), poses)
-    assert len(dots(ET.fromstring(drawing.svg))) == 3 * MOST and "12 worst of 50 poses" in drawing.alt
+    assert len(dots(ET.fromstring(drawing.svg))) == 3 * MAX_DRAWN and "12 worst of 50 poses" in drawing.alt
     told = {int(number) for number in re.findall(r"pose (\d+): AP", drawing.alt)}
-    assert told == {k + 1 for k in np.argsort(-ap)[:MOST].tolist()}
+    assert told == {k + 1 for k in np.argsort(-ap)[:MAX_DRAWN].tolist()}
 
 
 def lengths(root: ET.Element, name: str) -> Iterator[float]:
@@ -137,7 +137,7 @@ def lengths(root: ET.Element, name: str) -> Iterator[float]:
 
 
 def test_corners_show_their_lengths(iso: IsoTest, path: CutPath) -> None:
-    drawing = corner_drawing(iso, path)
+    drawing = corner_drawing(path)
     root = ET.fromstring(drawing.svg)
     assert len(frames(root)) == len(path.corners) > 1
     rounding, beyond = list(lengths(root, "CR")), list(lengths(root, "CO"))
@@ -162,7 +162,7 @@ def test_a_corner_that_turns_back_has_a_plane(iso: IsoTest, path: CutPath) -> No
         mean=np.array([[-0.1, 0, 0], [-1e-4, 0, 0], [-0.1, 0, 0]]), nearest=np.array([-1e-4, 0, 0]),
         rounding=1e-4, beyond=None, foot=None, overshoot=0.0,
     )  # fmt: skip
-    root = ET.fromstring(corner_drawing(iso, replace(path, corners=(back,))).svg)
+    root = ET.fromstring(corner_drawing(replace(path, corners=(back,))).svg)
     assert len(list(lengths(root, "CR"))) == 1 and not list(lengths(root, "CO"))
 
 
@@ -170,7 +170,7 @@ def test_a_small_overshoot_far_from_its_corner_is_told_and_not_drawn(iso: IsoTes
     one = path.corners[0]
     far = one.point + 0.08 * (one.command[-1] - one.point) / np.linalg.norm(one.command[-1] - one.point)
     aside = replace(one, beyond=far + np.array([1e-5, 0.0, 0.0]), foot=far, overshoot=1e-5)
-    drawing = corner_drawing(iso, replace(path, corners=(aside,)))
+    drawing = corner_drawing(replace(path, corners=(aside,)))
     assert not list(lengths(ET.fromstring(drawing.svg), "CO"))
     assert "CO: 80.00 mm from the corner" in drawing.svg and "CO 0.01000 mm" in drawing.alt
 
@@ -232,15 +232,15 @@ def _length(path: CutPath) -> FloatArray:
 
 def test_the_tube_is_as_wide_as_rt_about_the_mean_path(path: CutPath) -> None:
     factor = 20
-    rings = there(tube_of(path, factor)).position.reshape(len(path.s), AROUND + 2, 3)
+    rings = there(tube(path, factor)).position.reshape(len(path.s), RING_PIECES + 2, 3)
     assert np.isnan(rings[:, -1]).all()
     rings = rings[:, :-1]
     centre = path.command + factor * (path.mean - path.command)
     off = rings - centre[:, np.newaxis]
-    expected = factor * np.repeat(there(path.repeatability)[:, np.newaxis], AROUND + 1, axis=1)
+    expected = factor * np.repeat(there(path.repeatability)[:, np.newaxis], RING_PIECES + 1, axis=1)
     np.testing.assert_allclose(np.linalg.norm(off, axis=2), expected, rtol=1e-12)
     np.testing.assert_allclose(np.einsum("rpi,ri->rp", off, path.normal), 0.0, atol=1e-15)
-    mean = mean_of(path, factor)
+    mean = mean_line(path, factor)
     known = np.isfinite(mean.position).all(axis=1)
     np.testing.assert_array_equal(mean.position[known], centre)
     np.testing.assert_array_equal(np.asarray(mean.values)[known], path.accuracy)
@@ -254,14 +254,14 @@ def test_circles_stand_across_any_direction() -> None:
 
 
 def test_a_deviation_is_enlarged_as_far_as_the_scene_allows(iso: IsoTest, path: CutPath) -> None:
-    factor = enlarged(path, None)
+    factor = display_factor(path, None)
     radius = float(np.linalg.norm(np.ptp(path.path, axis=0))) / 2.0
     largest = float((path.accuracy + there(path.repeatability)).max())
-    assert factor * largest <= SEEN * radius < FACTORS[FACTORS.index(factor) - 1] * largest
+    assert factor * largest <= MAX_DISPLAYED * radius < FACTORS[FACTORS.index(factor) - 1] * largest
     assert f"x{factor}" in path_figure(path).caption
     poses = there(iso.poses)
     far = replace(poses, attained=poses.attained + 1.0)
-    assert enlarged(path, far) == 1
+    assert display_factor(path, far) == 1
 
 
 # --- recording -------------------------------------------------------------------------------------
@@ -275,7 +275,7 @@ def test_the_recording_holds_balls_tube_and_a_point_each_cycle(
     file = tmp_path / "test.rrd"
     write_recording(result, file)
     scene, poses = scene_of(present(result)), there(iso.poses)
-    factor = enlarged(path, poses)
+    factor = display_factor(path, poses)
     assert f"x{factor}" in scene.title
     radius = [factor * there(there(iso.at(f"pose {k + 1}", "RP")).value) for k in range(len(poses.command))]
     sizes = np.array(static(file, f"{SCENE}/balls", "Ellipsoids3D:half_sizes"))
