@@ -1,4 +1,4 @@
-"""The motion of a driven arm along a path at one velocity, beside what was planned."""
+"""The motion of a driven arm along a path at one velocity, and its errors."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from urmpipe_pipeline.joint_log import ns_to_seconds
 
 @dataclass(frozen=True, slots=True)
 class Diverged:
-    """Where a motion ends that leaves its set points by more than a turn.
+    """The end of a motion that leaves its set points by more than a turn.
 
     Attributes:
-        t: When, in [s].
-        joint: Which joint did.
+        t: Time in [s].
+        joint: The joint that did.
     """
 
     t: float
@@ -28,14 +28,14 @@ class Diverged:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """How far a motion is from its path, and how often a drive was at its voltage limit.
+    """The errors of a motion, and how often a drive was at its voltage limit.
 
     Attributes:
-        velocity: What was asked for in [m/s].
+        velocity: Commanded in [m/s].
         reached: The largest speed of the plan in [m/s].
         error: Largest distance from the set point of the same time in [m]; None if it diverged.
         path_error: Largest distance from the nearest point of the path in [m]; None if it diverged.
-        saturated: Share of the samples at which a voltage is at its limit, 0..1; until it diverged.
+        saturated: Fraction of the samples at which a voltage is at its limit, 0..1; until it diverged.
         diverged: Where it left its set points; None if it did not.
     """
 
@@ -52,20 +52,20 @@ class DrivenMotion:
     """The motion of an arm with drives along a path at one velocity; n samples, k joints, d of them driven.
 
     Attributes:
-        velocity: What was asked for in [m/s].
+        velocity: Commanded in [m/s].
         t_ns: Times in integer [ns], shape (n,).
-        planned: Where the tool centre point shall be in [m], shape (n, 3).
-        set_q: Set values of the joints in [rad] or [m], shape (n, k).
+        planned: Planned position of the tool centre point in [m], shape (n, 3).
+        set_q: Set points of the joints in [rad] or [m], shape (n, k).
         set_qd: Their rates in [rad/s] or [m/s], shape (n, k).
         speed: Planned speed along the path in [m/s], shape (n,).
-        position: Where the tool centre point is in [m], shape (n, 3).
+        position: Position of the tool centre point in [m], shape (n, 3).
         q: Values of the joints in [rad] or [m], shape (n, k).
         qd: Their rates in [rad/s] or [m/s], shape (n, k).
         voltage: Of the drives in [V], shape (n, d).
         current: Of the drives in [A], shape (n, d).
         limits: Their largest voltages in [V], shape (d,).
         corner_ns: Times at which the middles of the path's arcs are passed in integer [ns], shape (arcs,).
-        diverged: Where it ends before its time; None if it does not.
+        diverged: Where it ended early; None if it did not.
     """
 
     velocity: float
@@ -97,8 +97,8 @@ class DrivenMotion:
 
         Source: [Iso9283]_ eq. 6 and 7.
         """
-        sides = ((one[:, 0], one[:, 1], one[:, 2]) for one in (self.planned, self.position))
-        return np.column_stack(delta(*sides))
+        planned, position = ((p[:, 0], p[:, 1], p[:, 2]) for p in (self.planned, self.position))
+        return np.column_stack(delta(planned, position))
 
     @cached_property
     def from_path(self) -> FloatArray:
@@ -108,24 +108,24 @@ class DrivenMotion:
 
     @cached_property
     def at_limit(self) -> FloatArray:
-        """Share of the samples at which each voltage is at its limit [-], 0..1, shape (d,)."""
+        """Fraction of the samples at which each voltage is at its limit [-], 0..1, shape (d,)."""
         return np.asarray((np.abs(self.voltage) >= self.limits).mean(axis=0))
 
     @property
     def worst(self) -> int:
-        """The sample at which it is furthest from the set point of the same time."""
+        """The sample with the largest distance from the set point of the same time."""
         return int(np.argmax(self.delta[:, 3]))
 
     @property
     def errors(self) -> Errors:
         """Its largest distances."""
-        ended = self.diverged is not None
+        has_diverged = self.diverged is not None
         saturated = (np.abs(self.voltage) >= self.limits).any(axis=1)
         return Errors(
             velocity=self.velocity,
             reached=float(self.speed.max()),
-            error=None if ended else float(self.delta[:, 3].max()),
-            path_error=None if ended else float(self.from_path.max()),
+            error=None if has_diverged else float(self.delta[:, 3].max()),
+            path_error=None if has_diverged else float(self.from_path.max()),
             saturated=float(saturated.mean()),
             diverged=self.diverged,
         )

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
-from urmpipe_pipeline.accuracy.parts import MEANT, at_velocity
+from urmpipe_pipeline.accuracy.parts import ERROR_DEFINITIONS, format_velocity
 from urmpipe_pipeline.accuracy.published import published_points
 from urmpipe_pipeline.accuracy.result import DECIDES, Accuracy
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Over, Panel, View
@@ -63,11 +63,11 @@ def velocity_figure(result: Accuracy) -> Figure:
             found,
             "diamond",
             colour,
-            f"{at_velocity(one.velocity)}: {text.quantity(found, 'm')}",
+            f"{format_velocity(one.velocity)}: {text.quantity(found, 'm')}",
             name,
         )
         for one in result.errors
-        if (found := result.judged(one)) is not None
+        if (found := result.judged_error(one)) is not None
     ]
     over = Over(np.array(at), "velocity", "m/s", joined=True)
     panel = Panel(
@@ -81,7 +81,7 @@ def velocity_figure(result: Accuracy) -> Figure:
         (View("error over velocity", (panel,)),),
         {}
         if result.running_speed is None
-        else {at.index(result.running_speed): f"{at_velocity(result.running_speed)}"},
+        else {at.index(result.running_speed): f"{format_velocity(result.running_speed)}"},
     )
 
 
@@ -97,19 +97,19 @@ def motion_figures(result: Accuracy, motion: DrivenMotion) -> Iterator[Figure]:
 
 def _velocity_caption(result: Accuracy, *, published: bool) -> str:
     said = "The axis is logarithmic. Strong: the error that decides,"
-    said += f" {MEANT[result.decides]}. Diamonds: velocities asked for."
+    said += f" {ERROR_DEFINITIONS[result.decides]}. Diamonds: velocities asked for."
     said += " Dashed: the limit." if result.limit is not None else ""
     said += " Dotted: the running speed, the largest within it." if result.running_speed is not None else ""
     said += ' Dark crosses: [Iso9283] Fig. 7; at the triangle only "more than" is known.' if published else ""
-    gone = [at_velocity(one.velocity) for one in result.errors if one.diverged is not None]
+    gone = [format_velocity(one.velocity) for one in result.errors if one.diverged is not None]
     return said + (f" No point at {text.enumerated(gone)}: the arm diverged." if gone else "")
 
 
 def _errors_told(result: Accuracy) -> str:
     """Return the error that decides at each velocity."""
-    said = ((one, result.judged(one)) for one in result.errors)
+    said = ((one, result.judged_error(one)) for one in result.errors)
     return "; ".join(
-        f"{at_velocity(one.velocity)} {'diverged' if found is None else text.quantity(found, 'm')}"
+        f"{format_velocity(one.velocity)} {'diverged' if found is None else text.quantity(found, 'm')}"
         for one, found in said
     )
 
@@ -135,8 +135,8 @@ def _deviation(result: Accuracy, motion: DrivenMotion) -> Figure:
         "Deviation over time",
         "Δ is planned minus real at the same time; path is the distance from the nearest point of the path."
         f" Diamonds: the largest. Dotted: middles of corners.{drawn}",
-        f"Deviation at {at_velocity(motion.velocity)}: at most {text.quantity(float(norm.max()), 'm')} from"
-        f" the set point, {text.quantity(float(far.max()), 'm')} from the path.",
+        f"Deviation at {format_velocity(motion.velocity)}: at most {text.quantity(float(norm.max()), 'm')}"
+        f" from the set point, {text.quantity(float(far.max()), 'm')} from the path.",
         (View("delta = planned - real", tuple(panels)), View("Distance from the path", (path,))),
         _instants(motion),
         opened=0 if result.decides == "time" else 1,
@@ -166,7 +166,8 @@ def _joints(result: Accuracy, motion: DrivenMotion) -> Figure:
     return Figure(
         "Joints over time",
         "Values and rates of the joints. Grey, dashed: what was set.",
-        f"Values and rates of {', '.join(names)} at {at_velocity(motion.velocity)}, each with what was set.",
+        f"Values and rates of {', '.join(names)} at {format_velocity(motion.velocity)}, each with what was"
+        " set.",
         views,
         share=2.0,
     )
@@ -205,7 +206,7 @@ def _drives(result: Accuracy, motion: DrivenMotion) -> Figure:
     return Figure(
         "Voltages and currents",
         "Voltages of the drives, dashed: the largest that they have; and their currents.",
-        f"Voltages and currents of {', '.join(names)} at {at_velocity(motion.velocity)}. At the limit:"
+        f"Voltages and currents of {', '.join(names)} at {format_velocity(motion.velocity)}. At the limit:"
         f" {text.percent(motion.errors.saturated)} of the samples.",
         (View("Voltages", tuple(panels)), View("Currents", (current,))),
         share=1.6,

@@ -8,13 +8,13 @@ from functools import partial
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.figures import motion_figures, velocity_figure
 from urmpipe_pipeline.accuracy.parts import (
-    at_velocity,
     error_cell,
     events,
     facts,
+    format_velocity,
     headline,
     motion_facts,
-    shown_motion,
+    select_shown_motion,
     velocities_table,
 )
 from urmpipe_pipeline.accuracy.result import Accuracy
@@ -35,7 +35,7 @@ from urmpipe_pipeline.presentation.section import (
 
 def present(result: Accuracy) -> Presentation:
     """Return what an accuracy shows."""
-    every, motion = tuple(facts(result)), shown_motion(result)
+    every, motion = tuple(facts(result)), select_shown_motion(result)
     return Presentation(
         name=result.name,
         headline=headline(result),
@@ -63,8 +63,8 @@ def line(result: Accuracy) -> Mapping[str, Cell]:
         "Decides": result.decides,
     }
     for one in dict.fromkeys((slow, fast)):
-        found[f"Error at {at_velocity(one.velocity)}"] = error_cell(result, one, result.decides)
-        found[f"At voltage limit at {at_velocity(one.velocity)}"] = Value(one.saturated, "%")
+        found[f"Error at {format_velocity(one.velocity)}"] = error_cell(result, one, result.decides)
+        found[f"At voltage limit at {format_velocity(one.velocity)}"] = Value(one.saturated, "%")
     return found
 
 
@@ -96,12 +96,12 @@ def _body(result: Accuracy, every: tuple[Fact, ...]) -> Section:
 def _checks(result: Accuracy) -> Iterator[Check]:
     """Yield a check a velocity; nothing without a limit."""
     for one in result.errors:
-        verdict = result.within(one)
+        verdict = result.judge(one)
         if verdict is not None:
             found = error_cell(result, one, result.decides)
             allowed = written(Value(result.limit, "m", given=True), unit=True)
             said = f"{written(found, unit=True)} ({result.decides}), allowed: {allowed}"
-            yield Check(at_velocity(one.velocity), verdict, said if verdict == "fail" else "")
+            yield Check(format_velocity(one.velocity), verdict, said if verdict == "fail" else "")
 
 
 def _page(result: Accuracy) -> Iterator[Block]:
@@ -117,10 +117,10 @@ def _page(result: Accuracy) -> Iterator[Block]:
 def _motion(result: Accuracy, motion: DrivenMotion) -> Section:
     """Return the section of a motion."""
     return Section(
-        at_velocity(motion.velocity),
-        result.within(motion.errors),
+        format_velocity(motion.velocity),
+        result.judge(motion.errors),
         tuple(motion_facts(result, motion)),
         figures=partial(motion_figures, result, motion),
         events=partial(events, motion),
-        opened=motion is shown_motion(result),
+        opened=motion is select_shown_motion(result),
     )

@@ -1,4 +1,4 @@
-"""What is published of an arm's accuracy, to be drawn beside what is simulated."""
+"""Published accuracy of an arm, to be drawn with the simulated one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Point(NamedTuple):
     Attributes:
         velocity: In [m/s].
         error: In [m].
-        least: Whether it is only said that the error is more than that.
+        least: Whether the source states only that the error is larger.
     """
 
     velocity: float
@@ -32,8 +32,7 @@ FIG7 = (
 )
 """[Iso9283] Fig. 7 of the robot IRb-60: its labels, read with conclusion 4, which says "exceeds 0,017 m"."""
 
-FIG7_ROBOT = "irb60"
-"""How the names of the robot and of its variants begin."""
+FIG7_ROBOT = "irb60"  # the names of the robot and of its variants begin so
 
 
 def fig7_rows() -> PathRows:
@@ -42,8 +41,8 @@ def fig7_rows() -> PathRows:
 
 
 def published_points(robot: str, rows: PathRows) -> tuple[Point, ...]:
-    """Return what is published of a robot on a path; nothing of any other."""
-    wanted = fig7_rows()
-    same = rows.position.shape == wanted.position.shape and np.allclose(rows.position, wanted.position)
-    same = same and np.allclose(rows.radius, wanted.radius)
+    """Return the published errors of a robot on a path; none of any other."""
+    contour = fig7_rows()
+    same = rows.position.shape == contour.position.shape and np.allclose(rows.position, contour.position)
+    same = same and np.allclose(rows.radius, contour.radius)
     return FIG7 if same and robot.startswith(FIG7_ROBOT) else ()

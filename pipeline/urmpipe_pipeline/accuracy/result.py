@@ -1,4 +1,4 @@
-"""The accuracy of a driven arm on a path: errors over velocity, and how fast it may run within a limit."""
+"""The accuracy of a driven arm on a path: errors over velocity, and its largest velocity within a limit."""
 
 from __future__ import annotations
 
@@ -26,39 +26,37 @@ if TYPE_CHECKING:
 
 Decides = Literal["time", "path"]
 DECIDES: tuple[Decides, ...] = ("time", "path")
-"""Which error is judged: from the set point of the same time, or from the nearest point of the path."""
+"""The error that is judged: from the set point of the same time, or from the nearest point of the path."""
 
-SLOWEST, FASTEST = 0.01, 10.0
-"""Between which velocities in [m/s] the running speed is looked for."""
-
-FINE = 1.01
-"""The running speed is known when the next velocity that is too fast is this many times it, or less."""
+SLOWEST, FASTEST = 0.01, 10.0  # m/s, between which the running speed is searched for
+FINE = 1.01  # ratio of the next velocity that is too fast to the running speed, at most
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Accuracy(Result):
-    """How far a driven arm is from its path at which velocity, and how fast it may run within a limit.
+    """The errors of a driven arm on a path over velocity, and its largest velocity within a limit.
 
     Attributes:
-        name: What the path is called: its file, or its test cube.
+        name: The path: its file, or its test cube.
         robot: The arm, with masses and drives, base and tool.
         rows: The rows of the path.
-        law: How time runs along it.
+        law: The law of time along it.
         acceleration: The largest acceleration along the path in [m/s2], the same for all velocities; None:
             only the joints limit it.
         jerk: The largest jerk of the law jerk in [m/s3].
-        period: From sample to sample in [s].
-        force: What acts on the tool from outside in [N], along the axes of the world.
-        motions: Those at the velocities that were asked for, in their order.
-        tried: The errors of all that were run to find the running speed, by velocity; none without a limit.
+        period: Sample period in [s].
+        force: External force on the tool in [N], along the axes of the world.
+        motions: The motions at the requested velocities, in their order.
+        tried: The errors of all motions that were run to find the running speed, by velocity; empty without a
+            limit.
         running: The motion at the running speed; None without a limit, or if no velocity is within it.
         limit: The largest error allowed in [m], or None.
-        decides: Which error is judged.
+        decides: The error that is judged.
         loop_radius: Largest spectral radius of the sampled loop along the path [-]; below 1 it is stable.
         compiled: Whether the arm ran as machine code; else in NumPy.
-        warnings: What a person should know.
+        warnings: Warnings for the user.
         provenance: How to repeat it.
-        recording: Where it was written.
+        recording: The file to which it was written.
     """
 
     name: str
@@ -87,26 +85,26 @@ class Accuracy(Result):
 
     @cached_property
     def errors(self) -> tuple[Errors, ...]:
-        """The errors of the velocities that were asked for, in their order."""
-        return tuple(one.errors for one in self.motions)
+        """The errors at the requested velocities, in their order."""
+        return tuple(motion.errors for motion in self.motions)
 
-    def judged(self, one: Errors) -> float | None:
-        """Return the error that is judged in [m]; None of a motion that diverged."""
-        return one.error if self.decides == "time" else one.path_error
+    def judged_error(self, errors: Errors) -> float | None:
+        """Return the error that is judged in [m]; None if the motion diverged."""
+        return errors.error if self.decides == "time" else errors.path_error
 
-    def within(self, one: Errors) -> Verdict | None:
+    def judge(self, errors: Errors) -> Verdict | None:
         """Return whether an error is within the limit; None without a limit."""
         if self.limit is None:
             return None
-        found = self.judged(one)
-        return "pass" if found is not None and found <= self.limit else "fail"
+        error = self.judged_error(errors)
+        return "pass" if error is not None and error <= self.limit else "fail"
 
     @property
     def verdict(self) -> Verdict | None:
-        """Pass if every velocity that was asked for is within the limit; None without a limit."""
+        """Pass if each requested velocity is within the limit; None without a limit."""
         if self.limit is None:
             return None
-        return "fail" if any(self.within(one) == "fail" for one in self.errors) else "pass"
+        return "fail" if any(self.judge(errors) == "fail" for errors in self.errors) else "pass"
 
     @property
     def running_speed(self) -> float | None:
@@ -116,42 +114,42 @@ class Accuracy(Result):
     @property
     def joint_units(self) -> list[str]:
         """The SI unit of each joint, rad or m."""
-        return ["rad" if one.kind == "revolute" else "m" for one in self.robot.moving]
+        return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
 
     @property
     def driven(self) -> tuple[str, ...]:
         """The joints that have a drive, in the order of the voltages."""
-        held = {one.joint for one in self.robot.drives if not hasattr(one, "drive")}
-        return tuple(name for name in self.robot.coordinates if name not in held)
+        passive = {drive.joint for drive in self.robot.drives if not hasattr(drive, "drive")}
+        return tuple(name for name in self.robot.coordinates if name not in passive)
 
     def _headline(self) -> str:
         """Return its verdict, the arm, and the running speed or the largest error."""
-        found = self.running_speed
-        said = "" if self.limit is None else "no velocity within the limit"
-        if found is not None:
-            said = f"{found:.4g} m/s within {self.limit:g} m"
-        return format_headline(self.name, self.verdict, self.robot.name, said)
+        speed = self.running_speed
+        summary = "" if self.limit is None else "no velocity within the limit"
+        if speed is not None:
+            summary = f"{speed:.4g} m/s within {self.limit:g} m"
+        return format_headline(self.name, self.verdict, self.robot.name, summary)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a velocity that was asked for or tried, by velocity.
+        """Return one row per velocity that was requested or tried, by velocity.
 
-        Its columns: velocity, reached [m/s], error, path_error [m], saturated [-], and whether it was asked
-        for.
+        Its columns: velocity, reached [m/s], error, path_error [m], saturated [-], and whether it was
+        requested.
         """
         import pandas as pd
 
-        asked = {one.velocity for one in self.errors}
-        every = {one.velocity: one for one in (*self.tried, *self.errors)}
+        requested = {errors.velocity for errors in self.errors}
+        by_velocity = {errors.velocity: errors for errors in (*self.tried, *self.errors)}
         rows = [
             {
-                "velocity": one.velocity,
-                "reached": one.reached,
-                "error": np.nan if one.error is None else one.error,
-                "path_error": np.nan if one.path_error is None else one.path_error,
-                "saturated": one.saturated,
-                "asked": one.velocity in asked,
+                "velocity": velocity,
+                "reached": errors.reached,
+                "error": np.nan if errors.error is None else errors.error,
+                "path_error": np.nan if errors.path_error is None else errors.path_error,
+                "saturated": errors.saturated,
+                "asked": velocity in requested,
             }
-            for _, one in sorted(every.items())
+            for velocity, errors in sorted(by_velocity.items())
         ]
         return pd.DataFrame(rows)
 
@@ -161,19 +159,19 @@ class Accuracy(Result):
             "schema": SCHEMA,
             "robot": self.robot.name,
             "path": self.name,
-            "velocities": [one.velocity for one in self.errors],
-            "reached": [one.reached for one in self.errors],
-            "errors": [one.error for one in self.errors],
-            "path_errors": [one.path_error for one in self.errors],
-            "saturated": [one.saturated for one in self.errors],
-            "diverged": [None if one.diverged is None else asdict(one.diverged) for one in self.errors],
+            "velocities": [errors.velocity for errors in self.errors],
+            "reached": [errors.reached for errors in self.errors],
+            "errors": [errors.error for errors in self.errors],
+            "path_errors": [errors.path_error for errors in self.errors],
+            "saturated": [errors.saturated for errors in self.errors],
+            "diverged": [None if e.diverged is None else asdict(e.diverged) for e in self.errors],
             "running_speed": self.running_speed,
-            "tried": [asdict(one) for one in self.tried],
+            "tried": [asdict(errors) for errors in self.tried],
             "limit": self.limit,
             "decides": self.decides,
             "loop_radius": self.loop_radius,
             "compiled": self.compiled,
             "verdict": self.verdict,
-            "warnings": [one.to_dict() for one in self.warnings],
+            "warnings": [warning.to_dict() for warning in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

@@ -8,7 +8,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
-from urmpipe_pipeline.accuracy.parts import at_velocity, shown_motion
+from urmpipe_pipeline.accuracy.parts import format_velocity, select_shown_motion
 from urmpipe_pipeline.accuracy.result import Accuracy
 from urmpipe_pipeline.comparison.scene import drawn_larger
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
@@ -24,27 +24,27 @@ ARMS = 8
 
 def accuracy_scene(result: Accuracy) -> Scene:
     """Return the arm along the contour, what was planned, and where it was, coloured by its deviation."""
-    motion = shown_motion(result)
+    motion = select_shown_motion(result)
     at = motion.worst
     arm = Arm(result.robot, motion.q, motion.t_ns, run_colour(0), kept=(at,))
     now = Path("planned", motion.planned, motion.t_ns, REFERENCE_COLOUR, asked=True, kept=(at,), line=False)
     larger = _larger(motion)
     by = "‖Δ‖" if result.decides == "time" else "its distance from the planned one"
     said = f"real path coloured by {by}{f', in crimson the {larger.name}' if larger else ''}"
-    title = f"Arm and paths at {at_velocity(motion.velocity)} [m], {said}"
+    title = f"Arm and paths at {format_velocity(motion.velocity)} [m], {said}"
     return Scene(title, (arm,), (*_paths(result, motion), now), (_worst(motion),))
 
 
 def path_figure(result: Accuracy) -> SpaceFigure:
     """Return the planned and the real path of the shown motion, and its deviation enlarged."""
-    motion = shown_motion(result)
+    motion = select_shown_motion(result)
     larger = _larger(motion)
     nearest = "set point" if result.decides == "time" else "planned path"
     drawn = f" Crimson: {larger.name}." if larger else ""
     return SpaceFigure(
-        f"Path in space at {at_velocity(motion.velocity)}",
+        f"Path in space at {format_velocity(motion.velocity)}",
         f"Equal scale on all axes. Grey: planned; the colour is the distance from the {nearest}.{drawn}",
-        f"Planned and real path at {at_velocity(motion.velocity)} in space. {_worst(motion).words}.",
+        f"Planned and real path at {format_velocity(motion.velocity)} in space. {_worst(motion).words}.",
         _paths(result, motion),
         (*ends(motion.position), _worst(motion)),
     )
@@ -55,7 +55,7 @@ def arm_drawing(result: Accuracy) -> Drawing:
 
     Source: [Iso9283]_ Fig. 4.
     """
-    motion = shown_motion(result)
+    motion = select_shown_motion(result)
     larger, asked = _larger(motion), np.clip(motion.corner_ns, 0, motion.t_ns[-1])
     at = np.unique(np.searchsorted(motion.t_ns, [motion.t_ns[0], *asked, motion.t_ns[-1]]))
     at = at[np.unique(np.linspace(0, len(at) - 1, ARMS).astype(np.intp))]
@@ -63,14 +63,14 @@ def arm_drawing(result: Accuracy) -> Drawing:
     spot = Spot(spot_at(run[motion.worst]), "largest error", DEVIATION_COLOUR)
     arms = points_over_log(result.robot, motion.q[at])
     words = "real path" if larger is None else larger.name
-    title = f"{result.robot.name} at {at_velocity(motion.velocity)}: planned path grey, {words} orange"
+    title = f"{result.robot.name} at {format_velocity(motion.velocity)}: planned path grey, {words} orange"
     svg = draw_projections(
         Sketch(list(arms), run, (spot,), commanded=motion.planned), (SIDEWAYS, FRONT, ABOVE), title
     )
     alt = (
         f"The arm at {len(at)} poses from the side, from the front and from above, planned path and {words}."
     )
-    return Drawing(f"Arm on the path at {at_velocity(motion.velocity)}", alt, svg)
+    return Drawing(f"Arm on the path at {format_velocity(motion.velocity)}", alt, svg)
 
 
 def _paths(result: Accuracy, motion: DrivenMotion) -> tuple[Path, ...]:
