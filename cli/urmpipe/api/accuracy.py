@@ -145,7 +145,7 @@ def accuracy(
         runs, notes = _runs(
             given, request, pushed, backend, tell, lambda share: done(RUNNING * share), asked[0]
         )
-        motions = runs.at(asked)
+        motions = runs.run(asked)
         speed = None if limit is None else running_speed(_judge(runs, limit, error), asked)
         result = _accuracy(given, request, runs, motions, speed, limit, error, notes)
         refuse_warnings(strict, [one for one in result.warnings if one.kind != ON_PYTHON])
@@ -262,7 +262,7 @@ def _judge(runs: ArmRuns, limit: float, error: str) -> Callable[[Sequence[float]
 
     def within(velocities: Sequence[float]) -> list[bool]:
         """Tell of each velocity whether it is within the limit."""
-        found = [one.errors for one in runs.at(velocities)]
+        found = [one.errors for one in runs.run(velocities)]
         judged = [one.error if error == "time" else one.path_error for one in found]
         reached = [one.reached >= REACHED * one.velocity for one in found]
         return [one is not None and one <= limit and ran for one, ran in zip(judged, reached, strict=True)]
@@ -285,7 +285,7 @@ def _accuracy(
     longest = max(motions, key=len)
     poses = np.unique(np.linspace(0, len(longest.set_q) - 1, POSES).astype(int))
     radius = max(spectral_radius(arm, longest.set_q[k]) for k in poses)
-    every = {one.velocity: one.errors for one in runs.found.values()}
+    every = {one.velocity: one.errors for one in runs.motions.values()}
     options: dict[str, Any] = {**timing.options, "robot": arm.name, "force": list(runs.arm.force)}
     options |= {"velocities": [one.velocity for one in motions], "limit": limit, "error": error}
     return Accuracy(
@@ -299,7 +299,7 @@ def _accuracy(
         force=runs.arm.force,
         motions=tuple(motions),
         tried=() if limit is None else tuple(one for _, one in sorted(every.items())),
-        running=None if speed is None else runs.found[speed],
+        running=None if speed is None else runs.motions[speed],
         limit=limit,
         decides=error,
         loop_radius=radius,
