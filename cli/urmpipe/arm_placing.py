@@ -1,4 +1,4 @@
-"""The arm that keywords name, place and cut."""
+"""The robot of a command: loaded by name or file, cut at links, placed on its base, with its tool."""
 
 from __future__ import annotations
 
@@ -17,14 +17,9 @@ from urmpipe_models.math3d import Transform, from_offset, matrix_to_rpy
 from urmpipe_models.robots.catalogue import load_robot
 
 Robot = Chain | str | Path
-Frame = Transform | Sequence[float] | FloatArray
-"""A frame: x, y, z in [m] and, if it turns, rx, ry, rz in [rad]; or a 4 by 4 matrix; or a `Transform`."""
-
+Frame = Transform | Sequence[float] | FloatArray  # x, y, z[, rx, ry, rz] in [m], [rad]; matrix; transform
 FRAME_ALLOWED = "x, y, z in m and rx, ry, rz in rad (3 or 6 numbers), a 4 x 4 matrix, or a Transform"
-
-GIANT = 10
-"""A tool that is more times as long as its arm was written in mm: 13 of them would be 13 m on a UR5e."""
-
+MAX_TOOL_RATIO = 10  # lengths of the robot; a longer tool is in mm: ten are 13 m on a UR5e
 NO_ROBOT = (Hint("robot", None, "sets one"),)
 
 
@@ -36,27 +31,26 @@ def place_robot(
     base_link: str | None = None,
     tip_link: str | None = None,
 ) -> Chain | None:
-    """Return the arm on its base and with its tool; None without a robot.
+    """Return the robot on its base and with its tool; None without a robot.
 
     Args:
-        robot: Name, file (TOML, URDF) or chain of the arm.
-        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
-        tool: The tool centre point in the frame of the arm's tip, likewise.
-        base_link: Link of a URDF where the arm begins.
+        robot: Name, file (TOML, URDF) or chain of the robot.
+        base: Pose of the robot's base in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: Pose of the tool centre point in the frame of the robot's tip, likewise.
+        base_link: Link of a URDF where the robot begins.
         tip_link: Link of a URDF where it ends.
 
     Raises:
-        RobotError: If the robot is unknown, or with everything that is wrong with its file.
-        OptionError: If the arm is placed or cut, but there is none; if the tool dwarfs it.
+        RobotError: If the robot is unknown, or with all faults of its file.
+        OptionError: If the robot is placed or cut, but there is none; if the tool dwarfs it.
     """
-    given = {"base": base, "tool": tool, "base_link": base_link, "tip_link": tip_link}
-    frames = (frame_of("base", base), frame_of("tool", tool))
+    placing = {"base": base, "tool": tool, "base_link": base_link, "tip_link": tip_link}
+    base_frame, tool_frame = parse_frame("base", base), parse_frame("tool", tool)
     if robot is None:
-        unused = [name for name, value in given.items() if value is not None]
+        unused = [name for name, value in placing.items() if value is not None]
         if unused:
-            raise OptionError(
-                *(Finding("found without a robot", parameter=name, hints=NO_ROBOT) for name in unused)
-            )
+            message = "found without a robot"
+            raise OptionError(*(Finding(message, parameter=name, hints=NO_ROBOT) for name in unused))
         return None
     links = {"base_link": base_link, "tip_link": tip_link}
     if isinstance(robot, Chain):
@@ -65,57 +59,52 @@ def place_robot(
             allowed = "with a URDF file; the links of a Chain are fixed"
             raise OptionError(*(Finding(parameter=name, found="a Chain", allowed=allowed) for name in cut))
     chain = robot if isinstance(robot, Chain) else load_robot(robot, **links)
-    _refuse_giant_tool(chain, frames[1])
-    return chain.placed(*frames)
+    if tool_frame is not None:
+        from urmpipe_models.kinematics.singularity import characteristic_length
+
+        reach, length = characteristic_length(chain), math.hypot(*tool_frame.translation)
+        if length > MAX_TOOL_RATIO * reach:
+            value = f"{length:g} m from the tip, {length / reach:.0f} times the length of {chain.name}"
+            allowed = f"up to {MAX_TOOL_RATIO} times it; a number without a unit is in m"
+            raise OptionError(Finding(parameter="tool", found=value, allowed=allowed))
+    return chain.placed(base_frame, tool_frame)
 
 
-def _refuse_giant_tool(chain: Chain, tool: Transform | None) -> None:
-    """Raise an `OptionError` for a tool many times as long as its arm: it was written in mm."""
-    if tool is None:
-        return
-    from urmpipe_models.kinematics.singularity import characteristic_length
-
-    reach, length = characteristic_length(chain), math.hypot(*tool.translation)
-    if length > GIANT * reach:
-        found = f"{length:g} m from the tip, {length / reach:.0f} times the length of {chain.name}"
-        allowed = f"up to {GIANT} times it; a number without a unit is in m"
-        raise OptionError(Finding(parameter="tool", found=found, allowed=allowed))
-
-
-def frame_of(name: str, given: Frame | None) -> Transform | None:
-    """Return the frame that was given; None for none.
+def parse_frame(name: str, frame: Frame | None) -> Transform | None:
+    """Return a frame as a transform; None for None.
 
     Args:
         name: The keyword, for messages.
-        given: x, y, z in [m] and, if it turns, rx, ry, rz in [rad]; a homogeneous matrix, shape (4, 4); or a
+        frame: x, y, z in [m] and, if it turns, rx, ry, rz in [rad]; a homogeneous matrix, shape (4, 4); or a
             transform.
 
     Raises:
-        OptionError: If it is anything else, or its matrix does not turn.
+        OptionError: If it is anything else, or its matrix is not a rigid motion.
     """
-    if given is None or isinstance(given, Transform):
-        return given
+    if frame is None or isinstance(frame, Transform):
+        return frame
     try:
-        values = np.asarray(given, dtype=float)
+        values = np.asarray(frame, dtype=float)
     except (TypeError, ValueError):
-        raise OptionError(Finding(parameter=name, found=format_value(given), allowed=FRAME_ALLOWED)) from None
+        raise OptionError(Finding(parameter=name, found=format_value(frame), allowed=FRAME_ALLOWED)) from None
     if values.shape not in ((3,), (6,), (4, 4)) or not np.isfinite(values).all():
-        found = f"{format_value(given)} of shape {values.shape}"
-        raise OptionError(Finding(parameter=name, found=found, allowed=f"{FRAME_ALLOWED}, all finite"))
+        value = f"{format_value(frame)} of shape {values.shape}"
+        raise OptionError(Finding(parameter=name, found=value, allowed=f"{FRAME_ALLOWED}, all finite"))
     if values.ndim == 1:
         return from_offset(values.tolist())
-    turn = values[:3, :3]
-    proper = np.abs(turn @ turn.T - np.eye(3)).max() < ROTATION_TOLERANCE and np.linalg.det(turn) > 0.0
-    if not proper or np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROTATION_TOLERANCE:
-        found, allowed = "a matrix that is not a rigid motion", "a rotation and a translation"
-        raise OptionError(Finding(parameter=name, found=found, allowed=allowed))
-    rows, place = tuple(map(tuple, turn.tolist())), tuple(values[:3, 3].tolist())
-    return Transform(cast("Any", rows), cast("Any", place))
+    rotation = values[:3, :3]
+    error = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    is_rotation = error < ROTATION_TOLERANCE and np.linalg.det(rotation) > 0.0
+    if not is_rotation or np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROTATION_TOLERANCE:
+        value, allowed = "a matrix that is not a rigid motion", "a rotation and a translation"
+        raise OptionError(Finding(parameter=name, found=value, allowed=allowed))
+    rows, translation = tuple(map(tuple, rotation.tolist())), tuple(values[:3, 3].tolist())
+    return Transform(cast("Any", rows), cast("Any", translation))
 
 
 def offset_of(frame: Transform) -> tuple[float, ...]:
-    """Return a frame as X, Y, Z in [m], with RX, RY, RZ in [rad] if it turns; nothing for none at all."""
+    """Return a frame as X, Y, Z in [m], with RX, RY, RZ in [rad] if it turns; empty for the identity."""
     if frame == Transform():
         return ()
-    turn = () if frame.rotation == Transform().rotation else matrix_to_rpy(frame.rotation)
-    return tuple(float(value) + 0.0 for value in (*frame.translation, *turn))  # + 0.0: no -0.0 in the file
+    angles = () if frame.rotation == Transform().rotation else matrix_to_rpy(frame.rotation)
+    return tuple(float(value) + 0.0 for value in (*frame.translation, *angles))  # + 0.0: no -0.0 in the file

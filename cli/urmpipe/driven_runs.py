@@ -2,7 +2,7 @@
 
 1. Unit: set points in; joints, rates, voltages and currents out, until the robot leaves its set points.
 2. Runs: as machine code, one process per velocity; or in NumPy, where each value of one instance has one
-   element per velocity. An element that is no longer finite is removed, the others go on.
+   element per velocity. An element that is no longer finite is removed, the others continue.
 3. Running speed: the largest velocity within a limit, found from below by halving ratios.
 """
 
@@ -39,7 +39,7 @@ from urmpipe_pipeline.planned_paths.result import PlannedPath
 SET_POINT_ENDINGS = ("", "d", "dd")  # value, rate, second derivative
 MAX_PRISMATIC_DEVIATION = 1.0  # m from its set point, where a run ends; of a revolute joint a turn
 BLOCK = "arm"
-NON_FINITE = "not finite"  # these words of a unit tell a run that diverges from one that fails
+NON_FINITE = "not finite"  # in the message of a run that diverges; other messages are errors
 HALVINGS_AT_ONCE = 2  # all velocities that they may need run side by side
 Within = Callable[
     [Sequence[float]], Sequence[bool]

@@ -38,7 +38,7 @@ class HeadedOption(click.Option):
     Args:
         heading: The heading.
         declarations: The names of the option.
-        settings: What `click.Option` takes besides.
+        settings: Further arguments of `click.Option`.
     """
 
     def __init__(self, *declarations: Any, heading: Heading, **settings: Any) -> None:

@@ -1,1 +1,1 @@
-"""What people read in a terminal."""
+"""Text in a terminal, and results in a notebook."""

@@ -1,7 +1,7 @@
 """Any result in a terminal or a notebook: its verdict, and the facts and tables that are brief.
 
 1. Result: the verdict with its facts, the body, then the sections: of many judged ones those that fail.
-2. Columns: a table that is wider than the terminal goes on below, each part with its key columns again.
+2. Columns: a table that does not fit the terminal continues below, each part with its key columns.
 3. Notebook: the same content as HTML; every public result shows itself with it.
 """
 

@@ -100,7 +100,7 @@ def simulation_of(plan: Plan, recorded: CosimulationRecord, blocks: Blocks, svg:
             *_non_finite_warnings(non_finite),
         ),
         provenance=build_provenance("simulate", options, [fingerprint(path) for path in files]),
-        connections={str(one.connection.destination): str(one.connection.source) for one in plan.links},
+        connections={str(link.connection.destination): str(link.connection.source) for link in plan.links},
         arms=tuple(_iter_robots(plan, recorded, blocks)),
         verdicts=tuple(_iter_verdicts(plan, recorded, non_finite)),
         loop_seconds=recorded.loop_seconds,
@@ -246,13 +246,13 @@ def _iter_verdicts(
     for name in _meter_names(plan.system) if len(recorded.t_ns) else ():
         columns = [recorded.column(name, f"delta[{i}]") for i in (1, 2, 3)]
         tolerance = {"axis": _start_value(plan, Port(name, TOLERANCE))}
-        doubts = tuple(_iter_doubts(plan, recorded, non_finite, name))
-        verdict = delta_verdict(name, recorded.t_ns, np.column_stack(columns), tolerance, doubts)
+        reasons = tuple(_iter_uncertainties(plan, recorded, non_finite, name))
+        verdict = delta_verdict(name, recorded.t_ns, np.column_stack(columns), tolerance, reasons)
         if verdict is not None:
             yield verdict
 
 
-def _iter_doubts(
+def _iter_uncertainties(
     plan: Plan, recorded: CosimulationRecord, non_finite: Mapping[Port, NonFiniteValues], meter: str
 ) -> Iterator[str]:
     """Yield the reasons why a delta meter does not pass even if no sample is out of tolerance.

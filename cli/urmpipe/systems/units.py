@@ -46,11 +46,11 @@ def unit_of(
 
     Args:
         unit: A name, a Python file, or a unit.
-        robot: The arm, for a unit that has one; for one that plays a log it tells how to read it.
+        robot: The robot, for a unit that has one; for one that plays a log it states the joints of the log.
         log: A log for a unit that plays one, or what `read_table` made of it.
         options: Further options of the unit. Of a log, `columns` names columns of any table; without it
             they are the joints, or the x, y, z of a path.
-        log_map: How to read the log where it cannot tell by itself.
+        log_map: How to read the log where it does not show it.
 
     Raises:
         UrmpipeError: With everything that is wrong with the unit or its options.
@@ -62,8 +62,8 @@ def unit_of(
         ]
         if unexpected:
             name = unit.name if isinstance(unit, BlockModel) else unit
-            found = ", ".join(unexpected)
-            raise OptionError(f"unit {name}: found {found}, allowed: no options, it is complete")
+            options_text = ", ".join(unexpected)
+            raise OptionError(f"unit {name}: found {options_text}, allowed: no options, it is complete")
         if isinstance(unit, BlockModel):
             return unit
         from urmpipe_fmus.blocks.user import load_block_file

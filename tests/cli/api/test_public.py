@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import urmpipe
-from urmpipe.arm_placing import frame_of
+from urmpipe.arm_placing import parse_frame
 from urmpipe_models.math3d import Transform, from_offset
 
 COMMANDS = ("ingest", "compare", "ik", "report", "export", "simulate", "build_fmu", "view")
@@ -105,7 +105,7 @@ def test_a_frame_is_numbers_a_matrix_or_a_transform(given: Any) -> None:
     wanted = from_offset([float(value) for value in given])
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = wanted.rotation, wanted.translation
-    assert frame_of("tool", given) == frame_of("tool", wanted) == frame_of("tool", matrix) == wanted
+    assert parse_frame("tool", given) == parse_frame("tool", wanted) == parse_frame("tool", matrix) == wanted
 
 
 @pytest.mark.parametrize(
