@@ -1,11 +1,16 @@
-"""Operands of a command: a log, a folder of plots, a path, a recording or a simulation, each as a run."""
+"""Operands of a command: a log, a folder of plots, a path, a recording or a simulation, each as a run.
+
+- `load_runs`: the runs of several operands, or of both sides of one log, with all errors at once.
+- `recording_to_run`, `load_comparison`: the run or the comparison of a recording.
+- `is_log`, `log_files`: whether an operand is to be read, and the files of one log.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import compress
-from os.path import isdir, isfile  # of a name that no file may have Path raises
+from os.path import isdir, isfile  # Path raises for a name that no file can have
 from pathlib import Path
 from typing import TypeAlias, TypeVar
 
@@ -39,23 +44,19 @@ from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
 from urmpipe_pipeline.text import counted
 
-JUDGED = "found the recording of {}, allowed: one that ingest wrote"
-
+NOT_A_RUN = "found the recording of {}, allowed: one that ingest wrote"
 BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
-
 BASELINE_HINT = Hint("baseline", None, "compares it, alone, with an earlier one")
 
+# Results that are a run, or contain one.
 RunLike: TypeAlias = Run | SolvedTargets | PlannedPath | NetworkMotion
 RUN_LIKE: tuple[type[RunLike], ...] = (Run, SolvedTargets, PlannedPath, NetworkMotion)
-"""Results that are a run, or have one."""
 
 Operand: TypeAlias = Path | Held | RunLike | Simulation
-"""What stands for a run, or is read as one."""
 
-MAX_VALUE = 1e12
-"""In [m] or [rad]: the last digit of a double beyond is 0.1 mm, and powers of it overflow in a comparison."""
+MAX_VALUE = 1e12  # m or rad; larger doubles have a last digit of 0.1 mm, and powers that overflow
 
-Given = TypeVar("Given")
+Item = TypeVar("Item")
 
 
 def load_runs(
@@ -67,237 +68,240 @@ def load_runs(
     tsp: float | None = None,
     derivative: Method | None = None,
     block: str | Sequence[str] | None = None,
-    judged: Sequence[Hint] = (BASELINE_HINT,),
-    unjudged: list[Unjudged] | None = None,
+    comparison_hints: Sequence[Hint] = (BASELINE_HINT,),
+    failed: list[Unjudged] | None = None,
 ) -> list[Run]:
-    """Return the runs of several operands, or both sides of one log; the reading options hold for every log.
+    """Return the runs of several operands, or both sides of one log; the reading options apply to all logs.
 
     Args:
-        operands: Recordings (.rrd), logs and paths (CSV), folders whose CSV files make one log; tables in
-            memory, runs, solved targets as theirs, and simulations as the motion of a block.
-        sides: What was asked for, then what was done, of one log that is yet to be read: a word in the names
-            of the columns of each side, or "rest" for all others.
-        robot: The arm; of a recording or a run it replaces the one inside.
-        read: How to read the CSV files, all of them; the unit of a column holds for those that have it.
-        tsp: Period of the grid in [s], of the CSV files.
-        derivative: How the joints of CSV files are differentiated.
-        block: The block whose motion is meant of every simulation, or one for each of them in their order.
-        judged: What the recording of a comparison, which is no operand, can be given to.
-        unjudged: Takes the logs behind the reference that cannot be read, if another can; None: none may be.
+        operands: Recordings (.rrd), logs and paths (CSV), folders whose CSV files make one log, tables in
+            memory, runs, results that contain a run, and simulations, of which a block moves.
+        sides: Command and measurement of one log that is to be read: a word in the names of the columns of
+            each side, or "rest" for all others.
+        robot: The arm; it replaces the one of a recording or a run.
+        read: How to read the logs; the unit of a column applies to those logs that have it.
+        tsp: Period of the grid of the logs in [s].
+        derivative: How the joints of the logs are differentiated.
+        block: The block whose motion is used, of every simulation, or one per simulation.
+        comparison_hints: What to do with the recording of a comparison, which is no operand.
+        failed: List that receives the logs after the reference that cannot be read, if another log can; None:
+            a log that cannot be read is an error.
 
     Raises:
-        UrmpipeError: With everything that is wrong with any of them: a bad CSV, a recording without a run.
-        OptionError: If sides are wanted of anything but one log, or blocks of no simulation.
+        UrmpipeError: With all errors of all operands: a bad CSV, a recording without a run.
+        OptionError: If there are sides of anything except one log, or blocks without a simulation.
     """
     shared = sum(map(is_log, operands)) > 1
     read, blocks = replace(read or ReadOptions(), shared=shared), _Blocks(block)
 
-    def run_of(one: tuple[Operand, tuple[str, str] | None]) -> Run:
-        """Return the run that an operand is, has recorded, or is read as, with values to compare."""
-        operand, side = one
-        made = _recorded(operand, judged) if isinstance(operand, Path) and _is_recording(operand) else operand
+    def load(operand_side: tuple[Operand, tuple[str, str] | None]) -> Run:
+        operand, side = operand_side
+        if isinstance(operand, Path) and _is_recording(operand):
+            operand = _read_run_like(operand, comparison_hints)
         try:
-            if isinstance(made, (Path, Held)):
-                return _refuse_huge(_read(made, replace(read, side=side), robot, tsp, derivative))
-            if isinstance(made, Simulation):
-                return _refuse_huge(run_of_block(made, blocks.next(), robot))
-            return _refuse_huge(with_robot(made.as_run(), robot))
-        except LogError as error:  # of several operands, each is named
-            name = str(operand) if isinstance(operand, Path) else None
-            raise LogError(*(replace(one, file=one.file or name) for one in error.findings)) from error
+            if isinstance(operand, (Path, Held)):
+                run = _ingest(operand, replace(read, side=side), robot, tsp, derivative)
+            elif isinstance(operand, Simulation):
+                run = run_of_block(operand, blocks.next(), robot)
+            else:
+                run = with_robot(operand.as_run(), robot)
+            _check_values(run)
+        except LogError as error:  # the findings of several operands need their files
+            file = str(operand_side[0]) if isinstance(operand_side[0], Path) else None
+            findings = (replace(finding, file=finding.file or file) for finding in error.findings)
+            raise LogError(*findings) from error
+        return run
 
     if sides is not None:
-        _refuse_sides(operands, sides)
-        both = map_collecting_errors(run_of, [(operands[0], one) for one in (sides, sides[::-1])])
-        blocks.refuse_unused()
-        _refuse_unturned(read, both)
-        return _on_one_arm(both)
-    found = (map_collecting_errors if unjudged is None else _runs_or_errors)(
-        run_of, [(one, None) for one in operands]
-    )
-    blocks.refuse_unused()
-    runs = [one for one in found if isinstance(one, Run)]
-    if shared and len(runs) == len(found):
-        _refuse_unreached(read, runs)
-        _refuse_unturned(read, runs)
-    named = list(zip(_names(operands, found), found, strict=True))
-    if unjudged is not None:
-        unjudged += [Unjudged(name, one.findings) for name, one in named if isinstance(one, UrmpipeError)]
-    return [replace(one, name=name) for name, one in named if isinstance(one, Run)]
+        _check_sides(operands, sides)
+        runs = map_collecting_errors(load, [(operands[0], side) for side in (sides, sides[::-1])])
+        blocks.check_all_used()
+        _check_intervals(read, runs)
+        arm = next((run.robot for run in runs if run.robot), None)  # may be inferred from one side only
+        return [with_robot(run, arm) if run.log.joints and run.robot is None else run for run in runs]
+    load_each = map_collecting_errors if failed is None else _map_keeping_errors
+    results: Sequence[Run | UrmpipeError] = load_each(load, [(operand, None) for operand in operands])
+    blocks.check_all_used()
+    runs = [result for result in results if isinstance(result, Run)]
+    if shared and len(runs) == len(results):
+        _check_units(read, runs)
+        _check_intervals(read, runs)
+    named = list(zip(_unique_names(operands, results), results, strict=True))
+    if failed is not None:
+        failed += [Unjudged(name, error.findings) for name, error in named if isinstance(error, UrmpipeError)]
+    return [replace(run, name=name) for name, run in named if isinstance(run, Run)]
 
 
-def _refuse_huge(run: Run) -> Run:
-    """Return a run; raise a `LogError` with each column of its log that has values beyond `MAX_VALUE`."""
-    log = run.log
-    positions = [] if log.tcp_position is None else [*zip(("x", "y", "z"), log.tcp_position.T, strict=True)]
-    faults = []
-    for name, values in (*zip(log.joints, log.q.T, strict=True), *positions):
-        rows = np.flatnonzero(np.abs(values) > MAX_VALUE)
-        if len(rows):
-            said = f"found {values[rows[0]]:g} (in SI) and {len(rows) - 1} more, allowed: up to {MAX_VALUE:g}"
-            faults.append(Finding(said.replace(" and 0 more", ""), row=int(rows[0]) + 1, column=name))
-    if faults:
-        raise LogError(*faults)
-    return run
-
-
-def _read(
+def _ingest(
     log: Path | Held, read: ReadOptions, robot: Chain | None, tsp: float | None, derivative: Method | None
 ) -> Run:
-    """Return the run that a log, a folder, or a side of a log is read as."""
+    """Return the run of a log, a folder, or a side of a log."""
     files = [log] if isinstance(log, Held) else log_files(log)
     name = log.resolve().name if isinstance(log, Path) and log.is_dir() else None
-    stem = log.name if isinstance(log, Held) else log.resolve().stem
-    name = name if read.side is None else f"{stem} ({read.side[0]})"
+    if read.side is not None:
+        name = f"{log.name if isinstance(log, Held) else log.resolve().stem} ({read.side[0]})"
     return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
 
 
-def _runs_or_errors(make: Callable[[Given], Run], each: Sequence[Given]) -> Sequence[Run | UrmpipeError]:
-    """Return what a function makes of the reference and of logs, or what is wrong with a log.
+def _check_values(run: Run) -> None:
+    log = run.log
+    positions = [] if log.tcp_position is None else [*zip(("x", "y", "z"), log.tcp_position.T, strict=True)]
+    findings = []
+    for name, values in (*zip(log.joints, log.q.T, strict=True), *positions):
+        rows = np.flatnonzero(np.abs(values) > MAX_VALUE)
+        if len(rows):
+            more = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
+            message = f"found {values[rows[0]]:g} (in SI){more}, allowed: up to {MAX_VALUE:g}"
+            findings.append(Finding(message, row=int(rows[0]) + 1, column=name))
+    if findings:
+        raise LogError(*findings)
+
+
+def _map_keeping_errors(
+    function: Callable[[Item], Run], items: Sequence[Item]
+) -> Sequence[Run | UrmpipeError]:
+    """Return the run or the error of each item.
 
     Raises:
-        UrmpipeError: With all that is wrong, if it is the reference, or every log.
+        UrmpipeError: With all errors, if the first item or all others have one.
     """
 
-    def tried(one: Given) -> Run | UrmpipeError:
+    def run_or_error(item: Item) -> Run | UrmpipeError:
         try:
-            return make(one)
+            return function(item)
         except UrmpipeError as error:
             return error
 
-    def made(one: Run | UrmpipeError) -> Run:
-        if isinstance(one, Run):
-            return one
-        raise one
+    def raise_error(result: Run | UrmpipeError) -> Run:
+        if isinstance(result, Run):
+            return result
+        raise result
 
-    found = [tried(one) for one in each]
-    reference, *logs = (isinstance(one, Run) for one in found)
-    return found if reference and any(logs) else map_collecting_errors(made, found)
+    results = [run_or_error(item) for item in items]
+    reference, *logs = (isinstance(result, Run) for result in results)
+    return results if reference and any(logs) else map_collecting_errors(raise_error, results)
 
 
 class _Blocks:
-    """The blocks whose motions are meant: one for every simulation, or one for each in their order.
+    """The blocks whose motions are used: one for all simulations, or one per simulation.
 
     Args:
-        named: The names; None for the only block that has a motion.
+        names: Their names; None for the only block that has a motion.
     """
 
-    def __init__(self, named: str | Sequence[str] | None) -> None:
-        self._named = [named] if isinstance(named, str) else list(named or ())
+    def __init__(self, names: str | Sequence[str] | None) -> None:
+        self._names = [names] if isinstance(names, str) else list(names or ())
         self._simulations = 0
 
     def next(self) -> str | None:
-        """Return the block of the next simulation; None where none is named."""
+        """Return the block of the next simulation; None without a name."""
         self._simulations += 1
-        if len(self._named) == 1:
-            return self._named[0]
-        return self._named[self._simulations - 1] if self._simulations <= len(self._named) else None
+        if len(self._names) == 1:
+            return self._names[0]
+        return self._names[self._simulations - 1] if self._simulations <= len(self._names) else None
 
-    def refuse_unused(self) -> None:
-        """Raise an `OptionError` if blocks are named of no simulation, or of more or fewer than there are."""
-        if len(self._named) in {0, 1, self._simulations} and (self._simulations or not self._named):
+    def check_all_used(self) -> None:
+        """Raise an `OptionError` if there is no simulation for a name, or no name for one of several."""
+        if len(self._names) in {0, 1, self._simulations} and (self._simulations or not self._names):
             return
-        found = (
-            ", ".join(map(format_value, self._named)) + f" with {counted(self._simulations, 'simulation')}"
-        )
+        names = ", ".join(map(format_value, self._names))
+        found = f"{names} with {counted(self._simulations, 'simulation')}"
         allowed = "a block of a simulation, or one for each of several"
         raise OptionError(Finding(parameter="block", found=found, allowed=allowed))
 
 
-def _refuse_sides(operands: Sequence[Operand], sides: tuple[str, str]) -> None:
-    """Raise an `OptionError` if there is more than one log, it was read before, or its sides are one."""
-    log, several = operands[0], len(operands) > 1
-    if several or not is_log(log) or sides[0].lower() == sides[1].lower():
+def _check_sides(operands: Sequence[Operand], sides: tuple[str, str]) -> None:
+    several = len(operands) > 1
+    if several or not is_log(operands[0]) or sides[0].lower() == sides[1].lower():
         found = ",".join(sides) + (" with several logs" if several else "")
         allowed = "two words for two sides of one log that is yet to be read"
         raise OptionError(Finding(parameter="sides", found=found, allowed=allowed))
 
 
-def _on_one_arm(runs: Sequence[Run]) -> list[Run]:
-    """Return runs of which those without an arm have the one that another singles out."""
-    arm = next((run.robot for run in runs if run.robot), None)
-    return [with_robot(run, arm) if run.log.joints and run.robot is None else run for run in runs]
-
-
-def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
-    """Raise an `OptionError` with each column that is given a unit, and that no log of several has in use."""
-    columns = [one for run in runs for one in run.log.columns]
-    used = {called for one in columns for called in (one.name, one.header, key(one.name), str(one.number))}
-    lost = [name for name in read.unit if name and not {name, key(name)} & used]
-    if lost:
+def _check_units(read: ReadOptions, runs: Sequence[Run]) -> None:
+    """Raise an `OptionError` with each column that has a unit among the options, and that no log uses."""
+    columns = [column for run in runs for column in run.log.columns]
+    used = {
+        name
+        for column in columns
+        for name in (column.name, column.header, key(column.name), str(column.number))
+    }
+    unused = [name for name in read.unit if name and not {name, key(name)} & used]
+    if unused:
         allowed = "a column that a log has, and that is read"
-        said = (
-            Finding(parameter="unit", found=f"no column {format_value(name)}", allowed=allowed)
-            for name in lost
+        raise OptionError(
+            *(
+                Finding(parameter="unit", found=f"no column {format_value(name)}", allowed=allowed)
+                for name in unused
+            )
         )
-        raise OptionError(*said)
 
 
-def _refuse_unturned(read: ReadOptions, runs: Sequence[Run]) -> None:
-    """Raise an `OptionError` with each joint that is given an interval, and that turns in no run."""
-    turn = (name for run in runs for name in compress(run.log.joints, is_revolute(run.log, run.robot)))
-    check_joint_names(read.interval, turn)
+def _check_intervals(read: ReadOptions, runs: Sequence[Run]) -> None:
+    revolute = (name for run in runs for name in compress(run.log.joints, is_revolute(run.log, run.robot)))
+    check_joint_names(read.interval, revolute)
 
 
-def _names(operands: Sequence[Operand], runs: Sequence[Run | UrmpipeError]) -> list[str]:
-    """Return names of runs, of which no two are one: of files by these, or by their folders, too."""
-    files = [one.resolve() if isinstance(one, Path) else None for one in operands]
-    stems = ["" if path is None else path.name if path.is_dir() else path.stem for path in files]
-    own = [
-        run.name if isinstance(run, Run) else stem or operand.name
-        for operand, run, stem in zip(operands, runs, stems, strict=True)
+def _unique_names(operands: Sequence[Operand], results: Sequence[Run | UrmpipeError]) -> list[str]:
+    """Return unique names of runs: of files with the same name by their stems, or also by their folders."""
+    files = [operand.resolve() if isinstance(operand, Path) else None for operand in operands]
+    stems = ["" if file is None else file.name if file.is_dir() else file.stem for file in files]
+    names = [
+        result.name if isinstance(result, Run) else stem or operand.name
+        for operand, result, stem in zip(operands, results, stems, strict=True)
     ]
+    unique = []
+    for name, file, stem in zip(names, files, stems, strict=True):
+        if file is None or names.count(name) == 1:
+            unique.append(name)
+        else:
+            unique.append(stem if stems.count(stem) == 1 else f"{stem} ({file.parent.name})")
+    return unique
 
-    def named(name: str, path: Path | None, stem: str) -> str:
-        """Return a name of its own."""
-        if path is None or own.count(name) == 1:
-            return name
-        return stem if stems.count(stem) == 1 else f"{stem} ({path.parent.name})"
 
-    return [named(*each) for each in zip(own, files, stems, strict=True)]
+def _read_run_like(path: Path, comparison_hints: Sequence[Hint]) -> RunLike | Simulation:
+    """Return the result of a recording that contains a run or motions.
 
-
-def _recorded(operand: Path, judged: Sequence[Hint]) -> RunLike | Simulation:
-    """Return the result of a recording that a run can be made of, or raise a `RecordingError`: what it is."""
-    result = read_recording(operand)
+    Raises:
+        RecordingError: If it is another kind of result.
+    """
+    result = read_recording(path)
     if isinstance(result, (RUN_LIKE, Simulation)):
         return result
-    hints = judged if isinstance(result, Comparison) else ()
-    raise RecordingError(
-        Finding(JUDGED.format(result_kind(result).with_article), str(operand), hints=tuple(hints))
-    )
+    hints = tuple(comparison_hints) if isinstance(result, Comparison) else ()
+    raise RecordingError(Finding(NOT_A_RUN.format(result_kind(result).with_article), str(path), hints=hints))
 
 
 def recording_to_run(
     files: Sequence[Path | Held], robot: Chain | None, reading: Mapping[str, object]
 ) -> Run | None:
-    """Return the run of a recording, on another arm if one is given; None of logs, which are to be read.
+    """Return the run of a recording, with another arm if one is given; None for logs, which are to be read.
 
     Args:
-        files: A recording alone, or the files of a log.
-        robot: The arm that replaces the one inside.
-        reading: How a log is read, by keyword; None or False where nothing is said.
+        files: One recording, or the files of a log.
+        robot: The arm that replaces the one of the recording.
+        reading: Reading options by keyword; None or False if unset.
 
     Raises:
-        RecordingError: If it is a recording without a run, or stands among other files.
-        OptionError: With all that says how a log is read: a recording stands as it was ingested.
+        RecordingError: If it is a recording without a run, or one of several files.
+        OptionError: With all reading options: a recording is used as it was ingested.
     """
-    recordings = [one for one in files if isinstance(one, Path) and _is_recording(one)]
+    recordings = [file for file in files if isinstance(file, Path) and _is_recording(file)]
     if not recordings:
         return None
     if len(files) > 1:
-        said = "found a recording among files of one log, allowed: it alone, or the files"
-        raise RecordingError(*(Finding(said, str(one)) for one in recordings))
+        message = "found a recording among files of one log, allowed: it alone, or the files"
+        raise RecordingError(*(Finding(message, str(file)) for file in recordings))
     reject_reading_options(reading)
-    made = _recorded(recordings[0], ())
-    if isinstance(made, Simulation):
-        said = JUDGED.format("a simulation")
-        raise RecordingError(Finding(said, str(recordings[0]), hints=(BLOCK_HINT,)))
-    return with_robot(made.as_run(), robot)
+    result = _read_run_like(recordings[0], ())
+    if isinstance(result, Simulation):
+        message = NOT_A_RUN.format("a simulation")
+        raise RecordingError(Finding(message, str(recordings[0]), hints=(BLOCK_HINT,)))
+    return with_robot(result.as_run(), robot)
 
 
 def reject_reading_options(reading: Mapping[str, object]) -> None:
-    """Raise an `OptionError` with all keywords that say how a log is read, as there is none to be read."""
+    """Raise an `OptionError` with all reading options that are set, as there is no log to be read."""
     unused = [name for name, value in reading.items() if value is not None and value is not False]
     if unused:
         found = "found with an ingested log"
@@ -306,17 +310,17 @@ def reject_reading_options(reading: Mapping[str, object]) -> None:
 
 
 def load_comparison(operand: Path) -> Comparison | None:
-    """Return the comparison that an operand is the recording of; None if it is anything else.
+    """Return the comparison in a recording; None if the operand is anything else.
 
     Raises:
-        RecordingError: If it is a recording, and bad.
+        RecordingError: If it is a damaged recording.
     """
     result = read_recording(operand) if _is_recording(operand) else None
     return result if isinstance(result, Comparison) else None
 
 
 def is_log(operand: object) -> bool:
-    """Return whether an operand is a log that is yet to be read."""
+    """Return whether an operand is a log that is to be read."""
     return isinstance(operand, Held) or (isinstance(operand, Path) and not _is_recording(operand))
 
 
@@ -328,12 +332,12 @@ def log_files(operand: Path) -> list[Path]:
     """Return the files of one log: the file itself, or the CSV files of a folder by name.
 
     Raises:
-        LogError: If a folder holds no CSV file.
+        LogError: If a folder has no CSV file.
     """
     if not isdir(operand):  # noqa: PTH112
         return [operand]
     files = sorted(path for path in operand.iterdir() if path.suffix.lower() in (".csv", ".txt"))
     if not files:
-        said = "found a folder without CSV files, allowed: the plots of one log"
-        raise LogError(Finding(said, file=str(operand)))
+        message = "found a folder without CSV files, allowed: the plots of one log"
+        raise LogError(Finding(message, file=str(operand)))
     return files

@@ -1,4 +1,9 @@
-"""What a result rests on: inputs by hash, options, versions; and the assumptions of a verdict."""
+"""What a result depends on.
+
+- `Provenance`, `build_provenance`: inputs by hash, options and versions, to repeat it.
+- `format_defaults`, `list_assumptions`, `format_assumptions`: options from files and assumptions in the line
+  of a verdict.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +17,21 @@ from typing import Any
 
 from urmpipe_pipeline.joint_log import SourceFile
 
-LIBRARIES = ("urmpipe", "numpy", "pyarrow", "rerun-sdk")
-"""The distributions whose code made the numbers or the recording."""
+LIBRARIES = ("urmpipe", "numpy", "pyarrow", "rerun-sdk")  # distributions that compute or record
+MAX_NAMED_LOGS = 3  # of an assumption; more are counted
 
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """What is needed to repeat a run.
+    """Inputs, options and versions of a result, to repeat it.
 
     Attributes:
-        command: Which function made it, such as ingest, compare or ik.
-        options: The options that were given, by name.
-        inputs: The files it came from.
+        command: The function, such as ingest, compare or ik.
+        options: Its options by name.
+        inputs: The input files.
         versions: Versions of urmpipe, Python and the libraries that computed.
-        created: When, in UTC, ISO 8601.
-        defaults: Options that decide a verdict and that a file set: "tolerance=2mm from ../urmpipe.toml".
+        created: Time in UTC, ISO 8601.
+        defaults: Options from a file that decide a verdict: "tolerance=2mm from ../urmpipe.toml".
     """
 
     command: str
@@ -40,48 +45,39 @@ class Provenance:
 def build_provenance(
     command: str, options: Mapping[str, Any], inputs: Sequence[SourceFile], defaults: tuple[str, ...] = ()
 ) -> Provenance:
-    """Return the provenance of a result made now; options that were left at None are left out."""
-    given = {name: value for name, value in options.items() if value is not None}
+    """Return the provenance of a result that is made now; options that are None are left out."""
+    options = {name: value for name, value in options.items() if value is not None}
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    return Provenance(command, given, tuple(dict.fromkeys(inputs)), dict(_versions()), created, defaults)
+    return Provenance(command, options, tuple(dict.fromkeys(inputs)), dict(_versions()), created, defaults)
 
 
-def format_defaults(made: Provenance) -> str:
-    """Return what a verdict's line adds of options from files: "; sync=auto from ../urmpipe.toml"."""
-    return "".join(f"; {one}" for one in made.defaults)
-
-
-@cache
+@cache  # reading them takes a tenth of the time of a short log
 def _versions() -> Mapping[str, str]:
-    """Return the versions of Python and the libraries: reading them takes a tenth of a short log's time."""
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
-NAMED = 3
-"""Logs that an assumption names; more are only counted."""
+def format_defaults(provenance: Provenance) -> str:
+    """Return the options from files for the line of a verdict: "; sync=auto from ../urmpipe.toml"."""
+    return "".join(f"; {option}" for option in provenance.defaults)
 
 
-def list_assumptions(found: Iterable[tuple[str, str]], every: Collection[str] = ()) -> tuple[str, ...]:
-    """Return assumptions, each once, with the logs that it is about where these are not all of them.
+def list_assumptions(assumptions: Iterable[tuple[str, str]], logs: Collection[str] = ()) -> tuple[str, ...]:
+    """Return assumptions, each once, with the names of their logs unless these are all logs.
 
     Args:
-        found: Each with the name of its log: ("the joints are in deg", "matlab").
-        every: The names of all logs; without them each assumption has the names of its own.
+        assumptions: Each with the name of its log: ("the joints are in deg", "matlab").
+        logs: Names of all logs; without them the logs of each assumption are named.
     """
     names: dict[str, dict[str, None]] = {}
-    for said, name in found:
-        names.setdefault(said, {})[name] = None
-    return tuple(
-        said if set(about) == set(every) else f"{said} ({_named(list(about))})"
-        for said, about in names.items()
-    )
-
-
-def _named(names: Sequence[str]) -> str:
-    """Return some logs by their names, or how many they are."""
-    return ", ".join(names) if len(names) <= NAMED else f"{len(names)} logs"
+    for assumption, log in assumptions:
+        names.setdefault(assumption, {})[log] = None
+    listed = []
+    for assumption, log_names in names.items():
+        about = ", ".join(log_names) if len(log_names) <= MAX_NAMED_LOGS else f"{len(log_names)} logs"
+        listed.append(assumption if set(log_names) == set(logs) else f"{assumption} ({about})")
+    return tuple(listed)
 
 
 def format_assumptions(assumptions: Sequence[str]) -> str:
-    """Return what a verdict's line ends with: ", assuming the joints are in deg"; perhaps nothing."""
+    """Return the end of the line of a verdict: ", assuming the joints are in deg"; empty without any."""
     return f", assuming {' and '.join(assumptions)}" if assumptions else ""

@@ -1,14 +1,14 @@
-"""The kinds of results: what each is called in a recording, its class, and how it presents itself.
+"""The kinds of results: the name of each in a recording, its class, its presenter and its exports.
 
-A new kind is a folder with its result and its presenter, and its line here.
+A new kind is a folder with its result and its presenter, and a line in `KINDS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, NamedTuple, TypeGuard
 
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.accuracy import exports as accuracy_exports
@@ -39,15 +39,14 @@ from urmpipe_pipeline.solved_targets import presenter as solved_targets
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 
-@dataclass(frozen=True, slots=True)
-class Kind:
+class Kind(NamedTuple):
     """A kind of result.
 
     Attributes:
-        name: What a recording calls it.
+        name: Its name in a recording.
         cls: Its dataclass.
-        present: Returns what a result of it shows.
-        exports: Returns what can leave of a result of it; None where nothing can.
+        present: Returns the presentation of a result.
+        exports: Returns the tables of a result; None if the kind has none.
     """
 
     name: str
@@ -72,11 +71,10 @@ KINDS: tuple[Kind, ...] = (
     Kind("network", NetworkResult, networks.present),
     Kind("network motion", NetworkMotion, network_motion.present, network_motion.exports),
 )
-"""Every kind."""
 
 
 def is_result(value: Any) -> TypeGuard[Result]:
-    """Tell whether a value is a result of any kind."""
+    """Return whether a value is a result of any kind."""
     return any(kind.cls is type(value) for kind in KINDS)
 
 
@@ -86,54 +84,54 @@ def result_kind(result: Result) -> Kind:
 
 
 def enclosing_result(result: Result) -> Result:
-    """Return what is recorded and reported of a result: of a diagnosis the comparison that it stands in."""
+    """Return the result that is recorded and reported: of a diagnosis its comparison, if it has one."""
     return (result.comparison if isinstance(result, Diagnosis) else None) or result
 
 
 def write_recording(
     result: Result, path: Path, inputs: Sequence[Path] = (), progress: Callable[[float], None] | None = None
 ) -> Path:
-    """Write the recording of a result, read it back, put it in its place, and return its path.
+    """Write the recording of a result, verify it, and return its path.
 
     Args:
-        result: What to record.
-        path: The file (.rrd); replaced if it is a recording of urmpipe's.
-        inputs: The files the result was made from: none of them is replaced.
-        progress: Told the share of the data that is written, 0..1.
+        result: The result.
+        path: The file (.rrd); replaced if it is a recording by urmpipe.
+        inputs: The files of the result, which are not replaced.
+        progress: Called with the share of the data that is written, 0..1.
 
     Raises:
-        OutputError: If the file may not be written there, or did not read back as it was written.
+        OutputError: If the file may not be written there, or differs when it is read back.
     """
-    shown = enclosing_result(result)
-    write_result(shown, result_kind(shown).name, present(shown), path, inputs, progress)
+    result = enclosing_result(result)
+    write_result(result, result_kind(result).name, present(result), path, inputs, progress)
     return path
 
 
 def read_recording(path: Path, *, lazy: bool = False) -> Result:
-    """Return the result that a recording holds.
+    """Return the result in a recording.
 
     Args:
-        path: A recording (.rrd) that urmpipe wrote.
-        lazy: Whether arrays are read when they are used; the file must stand as long.
+        path: A recording (.rrd) by urmpipe.
+        lazy: Whether arrays are read when they are used; the file must exist until then.
 
     Raises:
-        RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.
+        RecordingError: If it is no recording, is incomplete, not by urmpipe, or of another layout.
     """
-    found: Result = read_result(path, {kind.name: kind.cls for kind in KINDS}, lazy=lazy)
-    return found
+    result: Result = read_result(path, {kind.name: kind.cls for kind in KINDS}, lazy=lazy)
+    return result
 
 
 def present(result: Result) -> Presentation:
-    """Return what a result shows."""
-    shown = result_kind(result).present(result)
-    return replace(shown, recording=result.recording.name) if result.recording else shown
+    """Return the presentation of a result."""
+    presentation = result_kind(result).present(result)
+    return replace(presentation, recording=result.recording.name) if result.recording else presentation
 
 
 def exports(result: Result) -> Exports:
-    """Return what can leave of a result.
+    """Return the tables of a result.
 
     Raises:
-        OptionError: If nothing can.
+        OptionError: If it has none.
     """
     kind = result_kind(result)
     if kind.exports is None:

@@ -174,7 +174,7 @@ def compare(
         earlier = None if baseline is None else _earlier(baseline)
         load = partial(
             load_runs, sides=sides, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative,
-            block=block, judged=() if diagnose else (BASELINE_HINT,),
+            block=block, comparison_hints=() if diagnose else (BASELINE_HINT,),
         )  # fmt: skip
 
         def checked(made: Comparison) -> Comparison:
@@ -262,7 +262,7 @@ def _compared(
     if any(isinstance(one, Comparison) for one in operands):
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
     given = (Path(one) if isinstance(one, (str, Path)) else one for one in operands)
-    first, *others = load([one for one in given if not isinstance(one, Comparison)], unjudged=unjudged)
+    first, *others = load([one for one in given if not isinstance(one, Comparison)], failed=unjudged)
     if options.iso is not None and not others:
         raise OptionError(Finding(parameter="iso", found="no log", allowed="a reference and its cycles"))
     if not others:

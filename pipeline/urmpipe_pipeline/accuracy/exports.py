@@ -18,13 +18,13 @@ from urmpipe_pipeline.presentation.exports import (
     Times,
     columns_of,
 )
-from urmpipe_pipeline.runs.exports import poses_by_kinematics, provenance_of
+from urmpipe_pipeline.runs.exports import export_metadata, poses_by_kinematics
 from urmpipe_pipeline.text import encodable
 
 
 def exports(result: Accuracy) -> Exports:
     """Return what can leave of an accuracy."""
-    about = provenance_of(result.name, result.provenance) | {
+    about = export_metadata(result.name, result.provenance) | {
         "robot": result.robot.name,
         "running_speed": result.running_speed,
         "limit": result.limit,

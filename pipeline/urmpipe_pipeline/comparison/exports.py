@@ -24,7 +24,7 @@ from urmpipe_pipeline.presentation.exports import (
     Times,
     columns_of,
 )
-from urmpipe_pipeline.runs.exports import clock_stamps, provenance_of
+from urmpipe_pipeline.runs.exports import clock_stamps, export_metadata
 from urmpipe_pipeline.text import encodable
 from urmpipe_pipeline.trajectories import joint_order
 
@@ -36,7 +36,7 @@ NO_ORIENTATION = LogWarning(
 
 def exports(comparison: Comparison) -> Exports:
     """Return what can leave of a comparison."""
-    about = provenance_of(comparison.name, comparison.provenance) | {
+    about = export_metadata(comparison.name, comparison.provenance) | {
         "reference": comparison.reference.name,
         "tolerance": dict(comparison.tolerance),
         "verdict": comparison.verdict,

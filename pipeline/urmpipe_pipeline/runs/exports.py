@@ -1,4 +1,4 @@
-"""What leaves of a run: its grid in SI, the columns of its file, and its poses."""
+"""The tables of a run for export: its grid in SI, the columns of its file, and its poses."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from urmpipe_pipeline.text import encodable
 
 
 def exports(run: Run) -> Exports:
-    """Return what can leave of a run."""
-    about = provenance_of(run.name, run.provenance) | {
+    """Return the tables of a run."""
+    about = export_metadata(run.name, run.provenance) | {
         "source": run.log.source,
         "robot": run.robot.name if run.robot else None,
         "joints": list(run.log.joints),
@@ -53,31 +53,31 @@ def exports(run: Run) -> Exports:
     return Exports("run", about, rows, poses, {"recorded": "file"})
 
 
-def provenance_of(name: str, made: Provenance) -> dict[str, Any]:
-    """Return what every export tells: the name of the result, and how it was made."""
+def export_metadata(name: str, provenance: Provenance) -> dict[str, Any]:
+    """Return the metadata of every export: the name of the result, and its provenance."""
     return {
         "name": name,
-        "inputs": [asdict(one) for one in made.inputs],
-        "command": made.command,
-        "options": dict(made.options),
-        "versions": dict(made.versions),
-        "created": made.created,
+        "inputs": [asdict(file) for file in provenance.inputs],
+        "command": provenance.command,
+        "options": dict(provenance.options),
+        "versions": dict(provenance.versions),
+        "created": provenance.created,
     }
 
 
 def grid_table(run: Run) -> ExportTable:
     """Return the run on its grid in SI, each name with its unit: t, q, q', q'', torques, tool centre point.
 
-    Of single poses the row stands for t, and there is nothing per second: no motion joins them.
+    Static poses have the row in place of t, and no derivatives.
     """
-    moves = run.timed
+    timed = run.timed
     columns = [ExportColumn("t [s]", "s", Times(run.t_ns, "s"))]
-    if not moves:
+    if not timed:
         columns = [ExportColumn("row", "", np.arange(1, len(run.t_ns) + 1))]
     units = run.joint_units
     joints = [encodable(name) for name in run.log.joints]
     orders = (("", "", run.q), ("d_", "/s", run.qd), ("dd_", "/s2", run.qdd))
-    for prefix, order, values in orders[: 3 if moves else 1]:
+    for prefix, order, values in orders[: 3 if timed else 1]:
         names = [prefix + name for name in joints]
         columns += columns_of(names, [unit + order for unit in units], values)
     if run.tau is not None:
@@ -86,7 +86,7 @@ def grid_table(run: Run) -> ExportTable:
         points = (
             ("p", "m", run.tcp.position), ("v", "m/s", run.tcp.velocity), ("a", "m/s2", run.tcp.acceleration),
         )  # fmt: skip
-        for name, unit, values in points[: 3 if moves else 1]:
+        for name, unit, values in points[: 3 if timed else 1]:
             columns += columns_of([name + axis for axis in "xyz"], [unit] * 3, values)
         columns += columns_of(["rz", "ry", "rx"], ["rad"] * 3, run.tcp.euler_zyx)
     if run.tcp_recorded is not None:
@@ -95,33 +95,33 @@ def grid_table(run: Run) -> ExportTable:
         unit = "rad" if len(run.rotation_names) == 3 else "1"
         names = [f"recorded_{name}" for name in run.rotation_names]
         columns += columns_of(names, [unit] * len(names), run.rotation_recorded)
-    return ExportTable(tuple(columns), run.log.clock_start_ns + run.t_ns if moves else None)
+    return ExportTable(tuple(columns), run.log.clock_start_ns + run.t_ns if timed else None)
 
 
 def _grid_fields(run: Run) -> dict[str, Any]:
     """Return the fields of a run on its grid, in SI: t, q, qd, qdd, tau, p, v, a, euler_zyx, p_recorded.
 
-    What a run does not have is empty: the point without kinematics, torques without masses, times and
-    derivatives of single poses.
+    Missing ones are empty: the point without kinematics, torques without masses, times and derivatives of
+    static poses.
     """
     units = run.joint_units
     tcp = run.tcp
-    nothing = np.empty((0, 0))
-    moves = run.timed
+    empty = np.empty((0, 0))
+    timed = run.timed
     return {
         "name": encodable(run.name),
         "rows": "grid",
-        "t": run.t if moves else nothing,
-        "clock_ns": run.log.clock_start_ns + run.t_ns if moves else nothing,
+        "t": run.t if timed else empty,
+        "clock_ns": run.log.clock_start_ns + run.t_ns if timed else empty,
         "q": run.q,
-        "qd": run.qd if moves else nothing,
-        "qdd": run.qdd if moves else nothing,
-        "tau": nothing if run.tau is None else run.tau,
-        "p": nothing if tcp is None else tcp.position,
-        "v": tcp.velocity if tcp is not None and moves else nothing,
-        "a": tcp.acceleration if tcp is not None and moves else nothing,
-        "euler_zyx": nothing if tcp is None else tcp.euler_zyx,
-        "p_recorded": nothing if run.tcp_recorded is None else run.tcp_recorded,
+        "qd": run.qd if timed else empty,
+        "qdd": run.qdd if timed else empty,
+        "tau": empty if run.tau is None else run.tau,
+        "p": empty if tcp is None else tcp.position,
+        "v": tcp.velocity if tcp is not None and timed else empty,
+        "a": tcp.acceleration if tcp is not None and timed else empty,
+        "euler_zyx": empty if tcp is None else tcp.euler_zyx,
+        "p_recorded": empty if run.tcp_recorded is None else run.tcp_recorded,
         "joints": [encodable(name) for name in run.log.joints],
         "units": {
             "t": "s", "clock_ns": "ns", "q": list(units), "qd": [f"{unit}/s" for unit in units],
@@ -132,7 +132,7 @@ def _grid_fields(run: Run) -> dict[str, Any]:
 
 
 def _file_fields(run: Run, table: ExportTable) -> dict[str, Any]:
-    """Return the fields of the file's own rows: values in its own units, their names, and the exact clock."""
+    """Return the fields of the rows of the file: values in its units, their names, and the exact clock."""
     columns = [column for column in table.columns if not isinstance(column.values, Times)]
     clock = [column for column in table.columns if isinstance(column.values, Times)]
     return {
@@ -148,17 +148,22 @@ def _file_fields(run: Run, table: ExportTable) -> dict[str, Any]:
     }
 
 
-def poses_by_kinematics(name: str, robot: Chain, clock_ns: IntArray, q: FloatArray, where: str) -> Poses:
-    """Return the trajectory of an arm's tip by forward kinematics, without the rows that lack a joint.
+def poses_by_kinematics(name: str, robot: Chain, clock_ns: IntArray, q: FloatArray, about: str) -> Poses:
+    """Return the poses of the tip of an arm by forward kinematics, without the rows that miss a joint.
 
-    Joint values are in [rad] or [m], shape (n, joints), at integer times in [ns], shape (n,).
+    Args:
+        name: Name of the trajectory.
+        robot: The arm.
+        clock_ns: Times in integer [ns], shape (n,).
+        q: Joint values in [rad] or [m], shape (n, joints).
+        about: The recording or result that an error names.
 
     Raises:
-        RecordingError: If no row has a pose, naming where.
+        RecordingError: If no row has a pose.
     """
     there = np.flatnonzero(np.isfinite(q).all(axis=1))
     if not len(there):
-        raise RecordingError(Finding("no row with a pose", where))
+        raise RecordingError(Finding("no row with a pose", about))
     from scipy.spatial.transform import Rotation
 
     position, rotation = poses_over_log(robot, q[there])
@@ -173,42 +178,41 @@ def run_poses(run: Run, rows: str) -> list[Poses]:
         RecordingError: If it has no robot, no joints, or no row with a pose.
     """
     if run.robot is None or not run.log.joints:
-        lacks = "robot" if run.log.joints else "joints"
+        missing = "robot" if run.log.joints else "joints"
         at_ingest = Hint("robot", does="gives it", call="ingest")
         recorded = Hint("tcp", "recorded", "takes what the log recorded")
-        raise _lacking(run, f"no {lacks}, so no pose", at_ingest, recorded)
+        raise _pose_error(run, f"no {missing}, so no pose", at_ingest, recorded)
     t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)
-    return [poses_by_kinematics("", run.robot, clock_stamps(run, t_ns), q, _where(run))]
+    return [poses_by_kinematics("", run.robot, clock_stamps(run, t_ns), q, _recording_or_name(run))]
 
 
 def clock_stamps(run: Run, t_ns: IntArray) -> IntArray:
-    """Return the clock of a run at times in [ns], shape (n,); of still poses the rows' numbers as seconds."""
+    """Return the clock of a run at times in [ns], shape (n,); of static poses the row numbers as seconds."""
     return t_ns + (run.log.clock_start_ns if run.timed else ROW_NS)
 
 
 def recorded_poses(run: Run) -> Poses:
-    """Return the poses that a log recorded itself.
+    """Return the poses that a log recorded.
 
     Raises:
         RecordingError: If it recorded none.
     """
     position, quat = run.log.tcp_position, run.log.tcp_quat_xyzw
     if position is None or quat is None:
-        lacks = "position" if position is None else "orientation"
+        missing = "position" if position is None else "orientation"
         hint = Hint("tcp", "fk", "takes the poses of a robot")
-        raise _lacking(run, f"no recorded {lacks}, so no recorded pose", hint)
+        raise _pose_error(run, f"no recorded {missing}, so no recorded pose", hint)
     there = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(quat).all(axis=1))
     if not len(there):
-        raise _lacking(run, "no row with a pose")
+        raise _pose_error(run, "no row with a pose")
     return Poses(
         "", clock_stamps(run, run.log.t_ns[there]), position[there], quat[there], len(position) - len(there)
     )
 
 
-def _lacking(run: Run, message: str, *hints: Hint) -> RecordingError:
-    return RecordingError(Finding(message, _where(run), hints=hints))
+def _pose_error(run: Run, message: str, *hints: Hint) -> RecordingError:
+    return RecordingError(Finding(message, _recording_or_name(run), hints=hints))
 
 
-def _where(run: Run) -> str:
-    """Return what an error names: the recording, or the run where it has none."""
+def _recording_or_name(run: Run) -> str:
     return str(run.recording) if run.recording else run.name

@@ -9,14 +9,14 @@ import numpy as np
 
 from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_pipeline.presentation.exports import ExportColumn, Exports, ExportTable, Poses, Rows, Times
-from urmpipe_pipeline.runs.exports import poses_by_kinematics, provenance_of
+from urmpipe_pipeline.runs.exports import export_metadata, poses_by_kinematics
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.text import encodable
 
 
 def exports(simulation: Simulation) -> Exports:
     """Return what can leave of a simulation."""
-    about = provenance_of(simulation.name, simulation.provenance) | {
+    about = export_metadata(simulation.name, simulation.provenance) | {
         "description": simulation.description,
         "step": simulation.step,
         "failed": simulation.failed,

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_pipeline.presentation.exports import DAY, Times
-from urmpipe_pipeline.runs.file_columns import shares
+from urmpipe_pipeline.runs.file_columns import split_clock
 from urmpipe_pipeline.tables.times import EXPONENTS, text_of, typed
 
 NS = st.integers(-(2**62) + 1, 2**62 - 1)
@@ -56,7 +56,7 @@ def test_times_of_day_count_on_past_a_day_and_below_midnight() -> None:
 
 @given(st.lists(NS, min_size=1))
 def test_seconds_and_nanoseconds_share_a_time(ns: list[int]) -> None:
-    seconds, nanoseconds = shares(np.array(ns, dtype=np.int64), ["s", "ns"])
+    seconds, nanoseconds = split_clock(np.array(ns, dtype=np.int64), ["s", "ns"])
     for t, high, low in zip(ns, text_of(seconds).to_pylist(), text_of(nanoseconds).to_pylist(), strict=True):
         assert int(high) * 10**9 + int(low) == t
         assert 0 <= int(low) < 10**9
@@ -64,7 +64,7 @@ def test_seconds_and_nanoseconds_share_a_time(ns: list[int]) -> None:
 
 def test_date_and_time_of_day_share_a_time() -> None:
     ns = np.array([1_618_180_041_573_641_000])
-    date, time = shares(ns, ["date", "time of day"])
+    date, time = split_clock(ns, ["date", "time of day"])
     assert text_of(date).to_pylist() == ["2021-04-11"]
     assert text_of(time).to_pylist() == ["22:27:21.573641"]
 
