@@ -1,7 +1,10 @@
-"""What may be wrong with a log as it was read, and is there or not.
+"""Errors that the reading of a log can have, each as an edit of the log that undoes it.
 
-Of joints: signs, exchanges, half and whole turns, deg for rad, a joint that counts from another. Of a path:
-its unit and the axes of its base. Or the log is of another robot.
+- Joints: reversed signs, exchanged joints, half and whole turns, deg for rad, a joint that includes another.
+- Paths: the unit, and the axes of the base.
+- Another robot.
+
+`Edit.of_joints` applies an edit; the generators yield the candidates of each kind.
 """
 
 from __future__ import annotations
@@ -19,11 +22,10 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot
 from urmpipe_models.wraps import FULL_TURN
 
-MOST_SIGNS = 7
-"""Of so many joints all patterns of signs are looked at: 127; of more, two at once at most."""
-
-UNITS = {"mm": 1e-3, "cm": 1e-2, "inch": 0.0254}
-"""Units that a path may have been written in, and how many metres one is."""
+MAX_SIGN_JOINTS = (
+    7  # joints of which all patterns of signs are tried: 127; of more joints at most two at once
+)
+UNITS = {"mm": 1e-3, "cm": 1e-2, "inch": 0.0254}  # units that a path may have, in metres
 
 EditKind: TypeAlias = Literal[
     "joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored", "turns",
@@ -32,27 +34,26 @@ EditKind: TypeAlias = Literal[
 
 Row: TypeAlias = tuple[float, float, float]
 
-Matrix: TypeAlias = tuple[Row, Row, Row]
-"""The rows of a 3x3 matrix [-]."""
+Matrix: TypeAlias = tuple[Row, Row, Row]  # rows of a 3x3 matrix [-]
 
 X, Y, Z = IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class Edit:
-    """A cause that is there or not: a change of the columns of the joints, of the path, or of the robot.
+    """A change of the columns of the joints, of the path, or of the robot.
 
     Attributes:
-        kind: What it is.
-        joints: Indices of its joints; of a coupling the joint that includes another, then that other.
-        value: The factor of a path or of a joint, how many turns, half or whole, or how much of the second
-            joint is added to the first.
-        first: Row of the log from which on it holds.
-        name: What the other robot is called, which side is in which unit, or how the axes x, y and z of a
-            mirrored base read in those of the path.
+        kind: The kind.
+        joints: Indices of its joints; of a coupling the joint that includes another one, then that one.
+        value: Factor of a path or a joint, number of half or whole turns, or factor of the second joint
+            that is added to the first.
+        first: First row of the log to which it applies.
+        name: Name of the other robot, side and unit, or the axes x, y and z of a mirrored base in those of
+            the path.
         robot: The other robot.
-        matrix: M, how the base is turned or mirrored: x_path = M x_base; None of other causes. A mirrored
-            base turns the orientations R to M R M^T, as a left-handed frame describes them.
+        matrix: M of a rotated or mirrored base: x_path = M x_base; else None. A mirrored base changes the
+            orientations R to M R M^T, as a left-handed frame describes them.
     """
 
     kind: EditKind
@@ -65,9 +66,9 @@ class Edit:
 
     @property
     def axis_angle(self) -> tuple[Row, float]:
-        """Unit vector [-] and angle in [rad], 0 < angle <= pi, of how the base is turned.
+        """Unit vector [-] and angle in [rad], 0 < angle <= pi, of the rotation of the base.
 
-        Of half a turn the first coordinate of the vector that is not 0 is above 0.
+        For half a turn, the first coordinate of the vector that is not 0 is positive.
         """
         m = np.array(self.matrix)
         angle = math.acos((np.trace(m) - 1.0) / 2.0)
@@ -78,15 +79,15 @@ class Edit:
         return (x, y, z), angle
 
     def of_joints(self, rows: IntArray, q: FloatArray, *rates: FloatArray) -> list[FloatArray]:
-        """Return joints, and their rates if given, with the change; the columns of time are rows.
+        """Return the joint values, and their derivatives if given, with this change.
 
         Args:
-            rows: Rows of the log that they stand in, shape (n,).
+            rows: Their rows in the log, shape (n,).
             q: Joint values in [rad] or [m], shape (joints, n).
-            rates: Their first derivatives, then their second, per [s] and [s^2], each of shape (joints, n).
+            rates: First and second derivatives, per [s] and [s^2], each of shape (joints, n).
 
         Returns:
-            As many as given, in [rad] or [m] and these per [s] and [s^2], each of shape (joints, n).
+            The same arrays, changed, in [rad] or [m] and these per [s] and [s^2], each of shape (joints, n).
         """
         if not self.joints:
             return [q, *rates]
@@ -115,8 +116,8 @@ Edits: TypeAlias = tuple[Edit, ...]
 
 
 def sign_edits(joints: int, *, most: int) -> Iterator[Edits]:
-    """Yield the patterns of joints that count the other way, of so many at once at most."""
-    for count in range(1, 1 + (most if joints <= MOST_SIGNS else min(most, 2))):
+    """Yield the patterns of reversed joints, at most `most` at once."""
+    for count in range(1, 1 + (most if joints <= MAX_SIGN_JOINTS else min(most, 2))):
         for chosen in combinations(range(joints), count):
             yield tuple(Edit("joint_sign", (j,)) for j in chosen)
 
@@ -126,24 +127,28 @@ def swap_edits(joints: int) -> Iterator[Edits]:
     yield from ((Edit("joints_swapped", pair),) for pair in combinations(range(joints), 2))
 
 
-def joint_unit_edits(turning: Sequence[bool]) -> Iterator[Edits]:
-    """Yield that a joint that turns, all but one or all are in deg, read as rad, or in rad, read as deg."""
-    joints = np.flatnonzero(turning).tolist()
-    others = [tuple(j for j in joints if j != one) for one in joints] if len(joints) > 2 else []
-    for some in [*((j,) for j in joints), *others, *([tuple(joints)] if len(joints) > 1 else [])]:
-        yield from ((Edit("joint_unit", some, factor),) for factor in (math.pi / 180.0, 180.0 / math.pi))
+def joint_unit_edits(revolute: Sequence[bool]) -> Iterator[Edits]:
+    """Yield revolute joints, one, all except one, or all, in deg that are read as rad, or the reverse."""
+    joints = np.flatnonzero(revolute).tolist()
+    groups = [(j,) for j in joints]
+    if len(joints) > 2:
+        groups += [tuple(j for j in joints if j != excluded) for excluded in joints]
+    if len(joints) > 1:
+        groups.append(tuple(joints))
+    for group in groups:
+        yield from ((Edit("joint_unit", group, factor),) for factor in (math.pi / 180.0, 180.0 / math.pi))
 
 
-def coupling_edits(turning: Sequence[bool]) -> Iterator[Edits]:
-    """Yield that a joint includes another one, or its negative: q_k - q_j or q_k + q_j is its true value."""
-    for pair in permutations(np.flatnonzero(turning).tolist(), 2):
+def coupling_edits(revolute: Sequence[bool]) -> Iterator[Edits]:
+    """Yield joints that include another one, or its negative: their true value is q_k - q_j or q_k + q_j."""
+    for pair in permutations(np.flatnonzero(revolute).tolist(), 2):
         yield from ((Edit("joint_coupled", pair, sign),) for sign in (-1.0, 1.0))
 
 
 def axis_edits(*, base_known: bool) -> Iterator[Edits]:
-    """Yield the bases whose axes lie along others: 23 that are turned and 24 that are mirrored.
+    """Yield the bases whose axes are parallel to those of the path: 23 rotated and 24 mirrored ones.
 
-    Of a base at an unknown pose there is one, mirrored: all others are this one, turned.
+    For a base at an unknown pose there is one, mirrored: all others are rotations of it.
     """
     if not base_known:
         yield (_of_axes((X, Y, (0.0, 0.0, -1.0))),)
@@ -172,7 +177,7 @@ def _of_axes(matrix: Matrix) -> Edit:
 
 
 def unit_edits(*sides: str) -> Iterator[Edits]:
-    """Yield the units that positions of a side may be in, where they are read in m."""
+    """Yield the units that the positions of a side may have, where they are read in m."""
     for side in sides:
         for unit, metres in UNITS.items():
             yield (Edit("path_unit", value=metres, name=f"{side} in {unit}"),)
