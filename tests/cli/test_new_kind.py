@@ -40,8 +40,8 @@ from urmpipe_pipeline.presentation.section import (
     Value,
 )
 from urmpipe_pipeline.results import Kind, present
+from urmpipe_pipeline.tables.csv_files import write_table
 from urmpipe_pipeline.tables.junit import write_junit
-from urmpipe_pipeline.tables.table_csv import write_table
 from urmpipe_pipeline.text import number
 
 LIMIT = 0.25

@@ -46,8 +46,8 @@ from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.given_targets import TargetsLike
 from urmpipe_pipeline.sources import Held, TableLike, held_of, is_table
+from urmpipe_pipeline.tables.csv_files import write_table
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
-from urmpipe_pipeline.tables.table_csv import write_table
 from urmpipe_pipeline.trajectories import AlignMode
 
 Operand = PathLike | TableLike | RunLike | Simulation

@@ -26,7 +26,7 @@ from urmpipe_pipeline.solved_targets.request import JointValues, Request, refuse
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
-from urmpipe_pipeline.tables.joint_file import write_joint_log
+from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 SOLVING = 0.7
 """Share of the work that solving is where something is written, too."""

@@ -30,7 +30,7 @@ from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.presenter import audit_rows
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import Held, TableLike, held_of, held_of_arrays, is_table
-from urmpipe_pipeline.tables.table_csv import write_table
+from urmpipe_pipeline.tables.csv_files import write_table
 
 LOG_ALLOWED = "a file, several of one log, a folder of them, a DataFrame or Arrow table, or arrays by t=, q="
 

@@ -31,7 +31,7 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import TableLike, held_of
 from urmpipe_pipeline.sources.tables.text import fingerprint
-from urmpipe_pipeline.tables.joint_file import write_joint_log
+from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 NetworkLike: TypeAlias = PathLike | Mapping[str, Any] | Network
 """A name, a file, the tables of one, or a network."""

@@ -34,7 +34,7 @@ from urmpipe_pipeline.planned_paths.request import (
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.request import JointValues, start_of
-from urmpipe_pipeline.tables.joint_file import write_joint_log
+from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 PLANNING = 0.8
 """Share of the work that planning is where something is written, too."""

@@ -1,18 +1,18 @@
-"""What was judged as JUnit XML, which GitLab, Jenkins and GitHub's actions show as tests.
+"""Checks of a presentation as JUnit XML, which GitLab, Jenkins and GitHub's actions show as tests.
 
-There is no one schema. What the consumers take, and what is written here:
+There is no single schema. What these programs read, and what is written here:
 
     testsuites   name, tests, failures, errors, time
-    testsuite    name, tests, failures, errors, skipped, time, timestamp (ISO 8601, UTC); one a section
+    testsuite    name, tests, failures, errors, skipped, time, timestamp (ISO 8601, UTC); one per section
     properties   before the test cases, at least one property; property: name, value
-    testcase     classname, name, time: both names are needed, and each pair stands once
-    failure      message, type, and the same as text: one a test case, as Jenkins keeps one
+    testcase     classname, name, time: both names are needed, and each pair is unique
+    failure      message, type, and the same as text: one per test case, since Jenkins keeps one
     error        the same, of a test case that could not be run
-    system-out   behind the test cases: the warnings of a section and of those above it
+    system-out   after the test cases: the warnings of a section and of those above it
 
-GitLab shows the class names in place of the suites, and of a failure the text alone. Times are 0: consumers
-add them up as run times, and nothing was timed. XML holds no control characters and no lone surrogates: they
-are written as they are escaped in Python.
+GitLab shows the class names in place of the suites, and of a failure only the text. Times are 0: these
+programs add them up as run times, and nothing was timed. XML has no control characters and no lone
+surrogates: they are written as they are escaped in Python.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import JUNIT_HEADER, safe_output
 from urmpipe_pipeline.presentation.section import Presentation, Section
 
-BAD_INPUT = "bad-input"
+BAD_INPUT = "bad-input"  # type of an error
 
-UNHOLDABLE = re.compile(f"[{HIDDEN}]|[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What XML may not hold, or a reader may turn into something else: line ends and tabs in attributes."""
+# Characters that XML does not allow, or that a reader may change: line ends and tabs in attributes.
+ESCAPED = re.compile(f"[{HIDDEN}]|[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def write_junit(shown: Presentation, part: Path, path: Path) -> None:
@@ -42,14 +42,14 @@ def write_junit(shown: Presentation, part: Path, path: Path) -> None:
     Raises:
         OutputError: If it did not read back as it was written.
     """
-    root = ET.Element("testsuites", name=_plain(shown.name))
-    root.extend(_suites(shown.body, shown.created[:19], ()))
+    root = ET.Element("testsuites", name=_escape(shown.name))
+    root.extend(_iter_suites(shown.body, shown.created[:19], ()))
     _write(root, part, path)
 
 
 @contextmanager
 def errors_in_junit(path: Path | None, inputs: Sequence[Path]) -> Iterator[None]:
-    """Write an error of the body to a JUnit file, too, as `write_errors` does, and raise it on."""
+    """Write an error of the body to a JUnit file, too, as `write_errors` does, and raise it again."""
     try:
         yield
     except UrmpipeError as error:
@@ -59,20 +59,20 @@ def errors_in_junit(path: Path | None, inputs: Sequence[Path]) -> Iterator[None]
 
 
 def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]) -> None:
-    """Write why there is no verdict to a JUnit file, one test case a finding: no earlier verdict stays.
+    """Write to a JUnit file why there is no verdict, one test case per finding: no earlier verdict stays.
 
-    A file that is no JUnit file of urmpipe's, or an input, is left as it is.
+    A file that is no JUnit file of urmpipe, or an input, is not replaced.
     """
     root = ET.Element("testsuites", name="urmpipe compare")
     suite = ET.SubElement(root, "testsuite", name="urmpipe compare")
     _add_errors(suite, findings)
-    _count(suite)
+    _set_counts(suite)
     with suppress(OutputError), safe_output(path, inputs, "junit") as part:
         _write(root, part, path)
 
 
 def _write(root: ET.Element, part: Path, path: Path) -> None:
-    """Sum up the suites, write the file and read it back."""
+    """Add up the counts of the suites, write the file and read it back."""
     for name in ("tests", "failures", "errors"):
         root.set(name, str(sum(int(suite.get(name, "0")) for suite in root)))
     root.set("time", "0")
@@ -83,60 +83,57 @@ def _write(root: ET.Element, part: Path, path: Path) -> None:
         raise OutputError(Finding("differs when read back", str(path)))
 
 
-def _suites(section: Section, timestamp: str, above: tuple[LogWarning, ...]) -> Iterator[ET.Element]:
-    """Yield the test suite of a section that judges something, and those of the sections below it."""
+def _iter_suites(section: Section, timestamp: str, above: tuple[LogWarning, ...]) -> Iterator[ET.Element]:
+    """Yield the suite of a section with checks, properties or errors, and those of the sections in it."""
     warnings = (*section.warnings, *above)
     if section.checks or section.properties or section.errors:
-        yield _suite(section, timestamp, warnings)
-    for one in section.sections:
-        yield from _suites(one, timestamp, warnings)
+        yield _build_suite(section, timestamp, warnings)
+    for part in section.sections:
+        yield from _iter_suites(part, timestamp, warnings)
 
 
-def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning]) -> ET.Element:
-    suite = ET.Element("testsuite", name=_plain(section.title))
+def _build_suite(section: Section, timestamp: str, warnings: Sequence[LogWarning]) -> ET.Element:
+    suite = ET.Element("testsuite", name=_escape(section.title))
     if section.properties:
         properties = ET.SubElement(suite, "properties")
         for name, value in section.properties.items():
-            ET.SubElement(properties, "property", name=_plain(name), value=_plain(text.exact(value)))
+            ET.SubElement(properties, "property", name=_escape(name), value=_escape(text.exact(value)))
     for check in section.checks:
-        case = _case(suite, check.about or section.title, check.name)
+        case = _add_case(suite, check.about or section.title, check.name)
         if check.verdict == "fail":
-            _reason(case, "failure", check.kind, check.words)
+            _add_reason(case, "failure", check.kind, check.words)
     _add_errors(suite, section.errors, section.title)
     if warnings:
-        told = (f"{one.kind}: {one}" for one in warnings)
-        ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, told))
-    _count(suite)
+        lines = (f"{warning.kind}: {warning}" for warning in warnings)
+        ET.SubElement(suite, "system-out").text = "\n".join(map(_escape, lines))
+    _set_counts(suite)
     if timestamp:
         suite.set("timestamp", timestamp)
     return suite
 
 
 def _add_errors(suite: ET.Element, findings: Sequence[Finding], about: str = "") -> None:
-    """Add a test case for each error, of a class for all or of its file's name."""
+    """Add a test case for each error, whose class name is stated or the name of its file."""
     for number, finding in enumerate(findings, start=1):
-        case = _case(suite, about or finding.file or "urmpipe compare", f"can be compared ({number})")
-        _reason(case, "error", BAD_INPUT, str(finding))
+        case = _add_case(suite, about or finding.file or "urmpipe compare", f"can be compared ({number})")
+        _add_reason(case, "error", BAD_INPUT, str(finding))
 
 
-def _count(suite: ET.Element) -> None:
-    """Set the attributes of a suite that count what is in it."""
-    for name, found in (("tests", ""), ("failures", "/failure"), ("errors", "/error")):
-        suite.set(name, str(len(suite.findall(f"testcase{found}"))))
+def _set_counts(suite: ET.Element) -> None:
+    for name, element in (("tests", ""), ("failures", "/failure"), ("errors", "/error")):
+        suite.set(name, str(len(suite.findall(f"testcase{element}"))))
     suite.set("skipped", "0")
     suite.set("time", "0")
 
 
-def _case(suite: ET.Element, classname: str, name: str) -> ET.Element:
-    """Return a new test case; nothing was timed."""
-    return ET.SubElement(suite, "testcase", classname=_plain(classname), name=_plain(name), time="0")
+def _add_case(suite: ET.Element, classname: str, name: str) -> ET.Element:
+    return ET.SubElement(suite, "testcase", classname=_escape(classname), name=_escape(name), time="0")
 
 
-def _reason(case: ET.Element, tag: Literal["failure", "error"], kind: str, message: str) -> None:
-    """Say why a test case failed, or could not be run."""
-    ET.SubElement(case, tag, message=_plain(message), type=kind).text = _plain(message)
+def _add_reason(case: ET.Element, tag: Literal["failure", "error"], kind: str, message: str) -> None:
+    """Add why a test case failed, or could not be run."""
+    ET.SubElement(case, tag, message=_escape(message), type=kind).text = _escape(message)
 
 
-def _plain(value: str) -> str:
-    """Return a text with what XML cannot hold escaped."""
-    return UNHOLDABLE.sub(lambda found: ascii(found[0])[1:-1], value)
+def _escape(value: str) -> str:
+    return ESCAPED.sub(lambda match: ascii(match[0])[1:-1], value)

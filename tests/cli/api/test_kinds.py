@@ -21,8 +21,8 @@ from urmpipe_pipeline.accuracy.result import DECIDES
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.planned_paths.request import LAWS
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.tables.options import Format
-from urmpipe_pipeline.tables.options import RowNames as Rows
+from urmpipe_pipeline.tables.export import Format
+from urmpipe_pipeline.tables.export import RowNames as Rows
 from urmpipe_pipeline.trajectories import AlignMode
 
 FUNCTIONS = {name: getattr(urmpipe, name) for name in urmpipe.__all__ if isfunction(getattr(urmpipe, name))}

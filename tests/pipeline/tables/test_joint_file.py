@@ -19,7 +19,7 @@ from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions, read_log
-from urmpipe_pipeline.tables.joint_file import write_joint_log
+from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 STEP = 5_000_000
 

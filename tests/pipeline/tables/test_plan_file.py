@@ -16,7 +16,7 @@ from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.outputs import PATH_ROW, TARGET_ROW, safe_output
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.tables.joint_file import write_joint_log
+from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 INFERRED = {"ur5e", "urm6"}
 """Arms of the catalogue among the plans."""

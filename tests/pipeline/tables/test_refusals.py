@@ -18,9 +18,9 @@ from urmpipe_models.errors import OptionError, OutputError, RecordingError, Urmp
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.exports import Times
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.tables import FORMATS, ExportOptions, Format, format_of, lines, mat_file, parquet_file
-from urmpipe_pipeline.tables.lines import differences, texts, write_lines
-from urmpipe_pipeline.tables.write import is_export, write_all
+from urmpipe_pipeline.tables import FORMATS, ExportOptions, Format, csv_files, format_of, typed_files
+from urmpipe_pipeline.tables.csv_files import find_line_differences, to_text_columns, write_lines
+from urmpipe_pipeline.tables.export import is_export, write_all
 
 
 def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
@@ -50,7 +50,7 @@ def test_options_that_make_no_sense() -> None:
 def test_recorded_poses_stand_at_the_rows_of_the_file(run: Run, tmp_path: Path) -> None:
     work = lambda: export_result(run, tmp_path / "a.tum", ExportOptions("tum", "grid", "recorded"))  # noqa: E731
     assert said(OptionError, work) == (
-        "rows (--rows): found grid with recorded poses, which stand at other rows, allowed: file"
+        "rows (--rows): found grid with recorded poses, which are at other rows, allowed: file"
     )
 
 
@@ -126,7 +126,7 @@ def test_a_csv_is_never_replaced_even_if_it_is_ours(run: Run, tmp_path: Path) ->
 def test_what_a_mat_file_cannot_hold_is_said_before_it_is_written(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mat_file, "LARGEST", 1000)
+    monkeypatch.setattr(typed_files, "MAX_SIZE", 1000)
     message = said(OutputError, lambda: export_result(run, tmp_path / "a.mat", ExportOptions("mat")))
     size = 40 * 8 * (2 + 3 * 6 + 5 * 3)
     assert message == (
@@ -159,7 +159,7 @@ def test_other_numbers_at_the_ends_of_a_parquet_file_are_seen(tmp_path: Path) ->
 
     pq.write_table(table(1.0, 2.0, 3.0), tmp_path / "a.parquet")
     found = [
-        parquet_file.differences(one, tmp_path / "a.parquet")
+        typed_files.find_parquet_differences(one, tmp_path / "a.parquet")
         for one in (
             table(1, 9, 3),
             table(0, 2, 3),
@@ -173,7 +173,7 @@ def test_other_numbers_at_the_ends_of_a_parquet_file_are_seen(tmp_path: Path) ->
 
 def test_other_numbers_at_the_ends_of_a_mat_file_are_seen(tmp_path: Path) -> None:
     def fields(*values: float, name: str = "a", units: tuple[str, ...] = ("rad",)) -> dict[str, Any]:
-        return {"name": name, "q": np.array(values), "units": {"q": mat_file.cells(units)}}
+        return {"name": name, "q": np.array(values), "units": {"q": typed_files.matlab_cells(units)}}
 
     savemat(tmp_path / "a.mat", {"run": fields(1, 2, np.nan)}, oned_as="column")
     others = [
@@ -185,7 +185,7 @@ def test_other_numbers_at_the_ends_of_a_mat_file_are_seen(tmp_path: Path) -> Non
         fields(1, 2, np.nan, units=("deg",)),
         fields(1, 2, np.nan, units=("rad", "rad")),
     ]
-    found = [mat_file.differences("run", one, tmp_path / "a.mat") for one in others]
+    found = [typed_files.find_mat_differences("run", one, tmp_path / "a.mat") for one in others]
     expected = [[], ["run.q"], ["run.q"], ["run.q"], ["run.name"], ["run.units.q{1}"], ["run.units.q"]]
     assert found == expected
 
@@ -207,20 +207,20 @@ def test_other_numbers_at_the_ends_of_a_mat_file_are_seen(tmp_path: Path) -> Non
 def test_damage_at_head_count_or_ends_is_seen(
     tmp_path: Path, damage: Callable[[str], str], found: list[str]
 ) -> None:
-    columns = texts([Times(np.array([0, 1_000_000, 2_000_000]), "s"), np.array([1.0, 2.5, np.nan])])
+    columns = to_text_columns([Times(np.array([0, 1_000_000, 2_000_000]), "s"), np.array([1.0, 2.5, np.nan])])
     path = tmp_path / "a.csv"
     write_lines(path, "a,b\n", columns, ",")
     assert path.read_text() == "a,b\n0.000,1\n0.001,2.5\n0.002,\n"
     path.write_text(damage(path.read_text()))
-    assert differences(path, "a,b\n", columns, ",") == found
+    assert find_line_differences(path, "a,b\n", columns, ",") == found
 
 
 def test_slices_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    columns = texts(
+    columns = to_text_columns(
         [Times(np.arange(10) * 10**6, "ms"), np.arange(10) / 4, np.array([f"r{k}" for k in range(10)])]
     )
     write_lines(tmp_path / "whole", "", columns, " ")
-    monkeypatch.setattr(lines, "SLICE", 3)
+    monkeypatch.setattr(csv_files, "SLICE", 3)
     write_lines(tmp_path / "sliced", "", columns, " ")
     assert (tmp_path / "sliced").read_bytes() == (tmp_path / "whole").read_bytes()
     assert (tmp_path / "whole").read_text().splitlines()[7] == "7 1.75 r7"

@@ -18,7 +18,7 @@ from scipy.io import loadmat
 
 import urmpipe
 from urmpipe_pipeline.tables import FORMATS, Format
-from urmpipe_pipeline.tables.times import EXPONENTS
+from urmpipe_pipeline.tables.csv_files import EXPONENTS
 
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "latin-1")
 STYLES = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 
 from urmpipe_pipeline.presentation.exports import DAY, Times
 from urmpipe_pipeline.runs.file_columns import split_clock
-from urmpipe_pipeline.tables.times import EXPONENTS, text_of, typed
+from urmpipe_pipeline.tables.csv_files import EXPONENTS, format_times
+from urmpipe_pipeline.tables.typed_files import to_arrow_times
 
 NS = st.integers(-(2**62) + 1, 2**62 - 1)
 
 
 def text(ns: list[int], unit: str) -> list[str]:
-    return list(text_of(Times(np.array(ns, dtype=np.int64), unit)).to_pylist())
+    return list(format_times(Times(np.array(ns, dtype=np.int64), unit)).to_pylist())
 
 
 @given(st.lists(NS, min_size=1), st.sampled_from(sorted(EXPONENTS)))
@@ -57,7 +58,9 @@ def test_times_of_day_count_on_past_a_day_and_below_midnight() -> None:
 @given(st.lists(NS, min_size=1))
 def test_seconds_and_nanoseconds_share_a_time(ns: list[int]) -> None:
     seconds, nanoseconds = split_clock(np.array(ns, dtype=np.int64), ["s", "ns"])
-    for t, high, low in zip(ns, text_of(seconds).to_pylist(), text_of(nanoseconds).to_pylist(), strict=True):
+    for t, high, low in zip(
+        ns, format_times(seconds).to_pylist(), format_times(nanoseconds).to_pylist(), strict=True
+    ):
         assert int(high) * 10**9 + int(low) == t
         assert 0 <= int(low) < 10**9
 
@@ -65,8 +68,8 @@ def test_seconds_and_nanoseconds_share_a_time(ns: list[int]) -> None:
 def test_date_and_time_of_day_share_a_time() -> None:
     ns = np.array([1_618_180_041_573_641_000])
     date, time = split_clock(ns, ["date", "time of day"])
-    assert text_of(date).to_pylist() == ["2021-04-11"]
-    assert text_of(time).to_pylist() == ["22:27:21.573641"]
+    assert format_times(date).to_pylist() == ["2021-04-11"]
+    assert format_times(time).to_pylist() == ["22:27:21.573641"]
 
 
 @pytest.mark.parametrize(
@@ -75,7 +78,7 @@ def test_date_and_time_of_day_share_a_time() -> None:
      ("time of day", "time64[ns]")],
 )  # fmt: skip
 def test_the_type_of_a_time_is_that_of_its_unit(unit: str, kind: str) -> None:
-    array = typed(Times(np.array([5_000_000]), unit))
+    array = to_arrow_times(Times(np.array([5_000_000]), unit))
     assert str(array.type) == kind
     if kind == "double":
         assert array[0].as_py() == 5e6 / 10 ** EXPONENTS[unit]
