@@ -12,10 +12,11 @@ of their unit divides the model, so that it does not scale the noise of the data
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -60,6 +61,7 @@ class PositionModel:
             `position`.
     """
 
+    data_side: ClassVar[str] = ""  # side of the data, in names of units; any by default
     sample: IntArray
     position: FloatArray
     rotation: FloatArray | None
@@ -88,6 +90,54 @@ class PositionModel:
     def target(self, rows: IntArray) -> FloatArray:
         """Return the positions as they are judged in [m], shape (3, n)."""
         return (self.position if self.judged is None else self.judged)[:, rows]
+
+    def deviation(self, state: State, rows: IntArray) -> FloatArray:
+        """Return the deviation that is left, as it is judged: positions in true [m], shape (3, n)."""
+        left = self.residual(state, rows)[:3]
+        if self.judged is not None:
+            left = left + (self.judged - self.position)[:, rows]
+        return unit_of(state.edits, self.data_side) * left
+
+    def residual(self, state: State, rows: IntArray) -> FloatArray:
+        """Return data - model in [m] as the data were read and [rad], shape (c, n)."""
+        return self.linear(state, rows, ())[0]
+
+    @abstractmethod
+    def linear(
+        self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the residual and the Jacobian of the model (`Model.linear`)."""
+
+    def _residual(self, pose: Transform, edits: Edits, rows: IntArray, inside: BoolArray) -> FloatArray:
+        """Return data - model of poses on a base that is not mirrored; NaN outside the time of the model."""
+        if (mirror := axes_of(edits, "base_mirrored")) is not None:
+            axes = Transform(mirror)
+            mirrored = axes @ pose
+            pose = Transform((mirrored @ Transform(axes.columns)).rotation, mirrored.translation)
+        left = np.empty((len(self.blocks), len(rows)))
+        factor = unit_of(edits, self.data_side)
+        for k, value in enumerate(pose.translation):
+            left[k] = self.position[k, rows] - value / factor
+        if self.rotation is not None:
+            left[3:] = rotation_error(pose, self.rotation[:, :, rows])
+        left[:, ~inside] = np.nan
+        return left
+
+    def _to_data_axes(self, columns: FloatArray, edits: Edits) -> FloatArray:
+        """Return a Jacobian in [m] and [rad], shape (p, c, n), in the axes and the unit of the data as read.
+
+        Args:
+            columns: Velocities and turns per unit of each parameter, of a base that is not mirrored; changed.
+            edits: The edits of the explanation.
+        """
+        if (mirror := axes_of(edits, "base_mirrored")) is not None:
+            moved, turned = columns[:, :3].copy(), columns[:, 3:].copy()
+            columns[:, :3] = np.einsum("ij,pjn->pin", mirror, moved)
+            if turned.size:  # a mirror reverses the sense of turns
+                columns[:, 3:] = -np.einsum("ij,pjn->pin", mirror, turned)
+        if (factor := unit_of(edits, self.data_side)) != 1.0:
+            columns[:, :3] /= factor
+        return columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,17 +272,6 @@ class ArmModel(PositionModel):
     def _joints(self, state: State, rows: IntArray) -> Joints:
         return self.motion.joints(state, self.groups, self.clock, self.sample, rows, self.chain)
 
-    def deviation(self, state: State, rows: IntArray) -> FloatArray:
-        """Return the deviation that is left, as it is judged: positions in true [m], shape (3, n)."""
-        left = self.residual(state, rows)[:3]
-        if self.judged is not None:
-            left = left + (self.judged - self.position)[:, rows]
-        return unit_of(state.edits) * left
-
-    def _residual(self, pose: Transform, edits: Edits, rows: IntArray, inside: BoolArray) -> FloatArray:
-        rotation = None if self.rotation is None else self.rotation[:, :, rows]
-        return pose_residual(pose, edits, self.position[:, rows], rotation, inside)
-
     @cached_property
     def reach(self) -> float:
         """The sum of the arm's lengths in [m]."""
@@ -278,7 +317,7 @@ class ArmModel(PositionModel):
             columns, groups, moved,
             lambda group: [(by_joint[j], by) for j, by in joints.factors(group, self.clock, rows)],
         )  # fmt: skip
-        return left, to_data_axes(columns, state.edits)
+        return left, self._to_data_axes(columns, state.edits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,6 +336,7 @@ class TcpModel(PositionModel):
             `position`.
     """
 
+    data_side = "reference"
     groups: tuple[Group, ...]
     motion: Motion
     turns: FloatArray | None
@@ -315,22 +355,11 @@ class TcpModel(PositionModel):
         turned = rotation_error(_transform(before), after) / (self.motion.t[2:] - self.motion.t[:-2])
         return np.nan_to_num(np.pad(turned, ((0, 0), (1, 1)), mode="edge"))
 
-    def residual(self, state: State, rows: IntArray) -> FloatArray:
-        """Return data - model in [m] as the data were read and [rad], shape (c, n)."""
-        return self.linear(state, rows, ())[0]
-
     def residuals(self, edits: Sequence[Edits], rows: IntArray) -> FloatArray:
         """Return `residual` of each explanation without parameters, shape (len(edits), c, n)."""
         null = null_state(self.groups)
         residuals = [self.residual(null._replace(edits=each), rows) for each in edits]
         return np.array(residuals).reshape(-1, len(self.blocks), len(rows))
-
-    def deviation(self, state: State, rows: IntArray) -> FloatArray:
-        """Return the deviation that is left, as it is judged: positions in true [m], shape (3, n)."""
-        left = self.residual(state, rows)[:3]
-        if self.judged is not None:
-            left = left + (self.judged - self.position)[:, rows]
-        return unit_of(state.edits, "reference") * left
 
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
@@ -344,8 +373,7 @@ class TcpModel(PositionModel):
         (base, tool), located = apply_twists_to_frames((turned, Transform()), changes)
         before = base @ pose
         moved_pose = before @ tool
-        rotation = None if self.rotation is None else self.rotation[:, :, rows]
-        left = pose_residual(moved_pose, state.edits, self.position[:, rows], rotation, inside, "reference")
+        left = self._residual(moved_pose, state.edits, rows, inside)
         needed = {c for group in groups for c in group.columns}
         twists = [(twist, c) for twist, (_, c) in zip(located, ordered, strict=True) if c in needed]
         sensitivity = sensitivity_columns(
@@ -357,7 +385,7 @@ class TcpModel(PositionModel):
         moving = add(base.rotate(velocity), cross(turning, before.rotate(tool.translation)))
         flow = (*moving, *turning)
         fill_columns(columns, groups, moved, lambda group: [(flow, self.clock.flow(group, rows))])
-        return left, to_data_axes(columns, state.edits, "reference")
+        return left, self._to_data_axes(columns, state.edits)
 
     def _look_up(self, state: State, rows: IntArray) -> tuple[Transform, Vector, Vector, BoolArray]:
         """Return poses, velocities and angular velocities of the log at the times of rows, and `inside`."""
@@ -516,56 +544,6 @@ def edit_joints(edits: Edits, log_rows: IntArray, q: FloatArray) -> FloatArray:
     for edit in edits:
         (q,) = edit.of_joints(log_rows, q)
     return q
-
-
-def pose_residual(
-    pose: Transform,
-    edits: Edits,
-    position: FloatArray,
-    rotation: FloatArray | None,
-    inside: BoolArray,
-    side: str = "",
-) -> FloatArray:
-    """Return data - model in [m] as the data were read and [rad], shape (3, n) or (6, n); NaN outside.
-
-    Args:
-        pose: The model's, on a base that is not mirrored.
-        edits: The edits of the explanation; a mirrored base and the unit of the data count here.
-        position: Of the data in [m] as they were read, shape (3, n).
-        rotation: Matrices [-], shape (3, 3, n); None without any.
-        inside: Which rows lie within the time of the model, shape (n,).
-        side: Side of the data, in names of units; any by default.
-    """
-    if (mirror := axes_of(edits, "base_mirrored")) is not None:
-        axes = Transform(mirror)
-        mirrored = axes @ pose
-        pose = Transform((mirrored @ Transform(axes.columns)).rotation, mirrored.translation)
-    left = np.empty((3 if rotation is None else 6, position.shape[1]))
-    factor = unit_of(edits, side)
-    for k, value in enumerate(pose.translation):
-        left[k] = position[k] - value / factor
-    if rotation is not None:
-        left[3:] = rotation_error(pose, rotation)
-    left[:, ~inside] = np.nan
-    return left
-
-
-def to_data_axes(columns: FloatArray, edits: Edits, side: str = "") -> FloatArray:
-    """Return a Jacobian in [m] and [rad], shape (p, c, n), in the axes and the unit of the data as read.
-
-    Args:
-        columns: Velocities and turns per unit of each parameter, of a base that is not mirrored; changed.
-        edits: The edits of the explanation.
-        side: Side of the data, in names of units; any by default.
-    """
-    if (mirror := axes_of(edits, "base_mirrored")) is not None:
-        moved, turned = columns[:, :3].copy(), columns[:, 3:].copy()
-        columns[:, :3] = np.einsum("ij,pjn->pin", mirror, moved)
-        if turned.size:
-            columns[:, 3:] = -np.einsum("ij,pjn->pin", mirror, turned)  # a mirror reverses the sense of turns
-    if (factor := unit_of(edits, side)) != 1.0:
-        columns[:, :3] /= factor
-    return columns
 
 
 def rotation_error(pose: Transform, rotation: FloatArray) -> FloatArray:
