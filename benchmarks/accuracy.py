@@ -18,7 +18,7 @@ from urmpipe.api.accuracy import accuracy
 from urmpipe.systems.units import Backend
 from urmpipe_models.drives import DrivenJoint
 from urmpipe_pipeline.accuracy.published import FIG7, fig7_rows
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 
 LIMIT = 0.4e-3
 """What the paper's manufacturer states, in [m]."""
@@ -26,12 +26,12 @@ LIMIT = 0.4e-3
 ROBOTS = ("irb60", "irb60-spring")
 
 
-def sweep(robot: str, backend: Backend, limit: float | None = LIMIT) -> Accuracy:
+def sweep(robot: str, backend: Backend, limit: float | None = LIMIT) -> AccuracyResult:
     """Return the accuracy at the ten velocities of Fig. 7."""
     return accuracy(fig7_rows(), robot, limit=limit, backend=backend)
 
 
-def paper_part(found: Accuracy) -> tuple[list[str], list[Bound]]:
+def paper_part(found: AccuracyResult) -> tuple[list[str], list[Bound]]:
     """Return Fig. 7 beside what is simulated."""
     by_velocity = {one.velocity: one for one in found.errors}
     lines = [
@@ -46,7 +46,7 @@ def paper_part(found: Accuracy) -> tuple[list[str], list[Bound]]:
         more = "> " if point.least else ""
         lines.append(
             f"| {point.velocity:g} | {more}{1e3 * point.error:g} | {1e3 * one.error:.3g} | {ratio:.2f}"
-            f" | {1e3 * one.path_error:.3g} | {one.saturated:.1%} |"
+            f" | {1e3 * one.path_error:.3g} | {one.saturated_share:.1%} |"
         )
         low = 1.0 if point.least else 1.0 / 1.5
         bounds.append(Bound(f"simulated over paper at {point.velocity:g} m/s", ratio, least=low, most=1.5))
@@ -57,7 +57,7 @@ def paper_part(found: Accuracy) -> tuple[list[str], list[Bound]]:
     return lines, bounds
 
 
-def variants_part(found: dict[str, Accuracy]) -> Iterator[str]:
+def variants_part(found: dict[str, AccuracyResult]) -> Iterator[str]:
     """Yield the counterweight beside the spring."""
     yield "| velocity, m/s | " + " | ".join(f"{name}, mm" for name in found) + " |"
     yield "|---" * (1 + len(found)) + "|"
@@ -92,7 +92,7 @@ def time_part(rounds: int, numpy: bool) -> tuple[list[str], list[Bound]]:
     ]
     bounds = [Bound("compiled sweep, s", middle, under=60.0)]
     if numpy:
-        results: list[Accuracy] = []
+        results: list[AccuracyResult] = []
         alone = timed(lambda: results.append(sweep("irb60", "python", None)))
         theirs, ours = sweep("irb60", "native", None).errors, results[0].errors
         apart = max(

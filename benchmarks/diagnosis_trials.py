@@ -169,7 +169,9 @@ def graded(named: Sequence[Cause], trial: Trial) -> str:
         return "partial" if rest else "right"
     if not rest:
         return "more"
-    twins = [fault for fault in rest if any(is_among(cause.twins, fault, trial) for cause in open_causes)]
+    twins = [
+        fault for fault in rest if any(is_among(cause.equivalents, fault, trial) for cause in open_causes)
+    ]
     if len(open_causes) <= len(twins):
         return "twin" if len(twins) == len(rest) else "partial"
     return "same effect" if len(named) <= len(trial.truth) and does_the_same(named, trial) else "wrong"
@@ -181,7 +183,7 @@ def outcome(diagnosis: Diagnosis, trial: Trial) -> str:
     if not trial.truth:
         return "wrong" if sure else "undecided" if diagnosis.undecided else "right"
     if not diagnosis.undecided:
-        return graded(sure, trial) if sure else "refused" if diagnosis.refused else "nothing"
+        return graded(sure, trial) if sure else "refused" if diagnosis.unidentifiable else "nothing"
     grades = {graded([*sure, *cause.causes], trial) for cause in diagnosis.undecided if sure or cause.causes}
     if grades & {"right", "twin", "same effect"}:
         return "twin"
@@ -217,7 +219,7 @@ def run(number: int) -> dict[str, Any]:
         except Exception as error:  # whatever stops the command is a bad answer
             answer, sentence = "error", f"{type(error).__name__}: {error}"
     if diagnosis is not None:
-        answer, sentence = outcome(diagnosis, trial), diagnosis.sentence
+        answer, sentence = outcome(diagnosis, trial), diagnosis.summary
     single = (
         trial.group == "single" and answer == "right" and diagnosis is not None and len(diagnosis.causes) == 1
     )

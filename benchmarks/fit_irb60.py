@@ -172,7 +172,7 @@ def error_at(arm: ArmUnit, velocity: float) -> tuple[float, float]:
         values[k] = row_out
     instance.close()
     found = arm.motion(path, velocity, values, failed=False).errors
-    return (math.inf, 1.0) if failed or found.error is None else (found.error, found.saturated)
+    return (math.inf, 1.0) if failed or found.error is None else (found.error, found.saturated_share)
 
 
 def figures(values: FloatArray) -> tuple[float, list[tuple[float, float]]] | None:

@@ -160,7 +160,7 @@ def searched(mechanism: Mechanism, seed: int) -> Searched:
     """Return what urmpipe finds of a platform."""
     start = time.perf_counter()
     found = assemble(mechanism, find_all=True, seed=seed)
-    return Searched(len(found.assemblies), found.tried, time.perf_counter() - start)
+    return Searched(len(found.assemblies), found.start_count, time.perf_counter() - start)
 
 
 def by_script(mechanism: Mechanism, seed: int, starts: int, box: float) -> Searched:
@@ -295,7 +295,7 @@ def counts(count: int) -> list[str]:
         taken = [timed(lambda at=x, one=mechanism: analyse_mobility(one, at)) for _ in range(count)]  # type: ignore[misc]
         lines.append(
             f"| {name} | {moves.variables} | {moves.rank} | {moves.mobility} | {moves.kutzbach}"
-            f" | {len(moves.redundant)} | {', '.join(moves.idle)} | {milliseconds(taken)} |"
+            f" | {len(moves.redundant)} | {', '.join(moves.passive)} | {milliseconds(taken)} |"
         )
     return lines
 

@@ -231,7 +231,7 @@ def _beside(command: FloatArray, shift: float) -> FloatArray:
 def corners() -> list[str]:
     """Return a corner: how the mean path rounds it, and how far it goes beyond the second leg."""
     found, here = _corner(), Panel(0.0, (230.0, 240.0), (3.5, 3.5))
-    assert found.beyond is not None and found.foot is not None
+    assert found.overshoot_point is not None and found.nearest_on_leg is not None
     return [
         here.title("A corner, from the mean path: CR, CO"),
         here.line(found.command, COMMAND, BOLD),
@@ -239,8 +239,8 @@ def corners() -> list[str]:
         here.dot(found.point, COMMAND),
         here.value(found.point, found.nearest),
         here.text(np.add(found.nearest[:2], [-2.0, 2.0]), "CR", VALUE, "end"),
-        here.value(found.foot, found.beyond),
-        here.text(np.add(found.beyond[:2], [2.0, 0.0]), "CO", VALUE),
+        here.value(found.nearest_on_leg, found.overshoot_point),
+        here.text(np.add(found.overshoot_point[:2], [2.0, 0.0]), "CO", VALUE),
         here.text((2.0, -4.0), "corner"),
         here.text((-59.0, -5.0), "first leg of the command"),
         here.text((-2.0, 52.0), "second leg", COMMAND, "end"),

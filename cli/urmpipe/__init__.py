@@ -3,7 +3,7 @@
     import urmpipe
     run = urmpipe.ingest("log.csv", robot="urm6")
     comparison = urmpipe.compare("path.csv", "log.csv", robot="urm6")
-    urmpipe.diagnose("path.csv", "log.csv", robot="urm6").sentence
+    urmpipe.diagnose("path.csv", "log.csv", robot="urm6").summary
     urmpipe.report(comparison, "report.html")
     urmpipe.export(run, "log.parquet")
     simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv", "reference": "path.csv"})
@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from urmpipe_models.networks.file import network_names as network_names
     from urmpipe_models.planning.path import PathRows as PathRows
     from urmpipe_models.robots.catalogue import robot_names as robot_names
-    from urmpipe_pipeline.accuracy.result import Accuracy as Accuracy
+    from urmpipe_pipeline.accuracy.result import AccuracyResult as AccuracyResult
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.diagnosis.result import Diagnosis as Diagnosis
@@ -82,7 +82,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.planned_paths.result import PlannedPath as PlannedPath
     from urmpipe_pipeline.runs.run import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
-    from urmpipe_pipeline.solved_targets.result import SolvedTargets as SolvedTargets
+    from urmpipe_pipeline.solved_targets.result import IkResult as IkResult
     from urmpipe_pipeline.sources import LogMap as LogMap
     from urmpipe_pipeline.sources import ReadOptions as ReadOptions
     from urmpipe_pipeline.tables import Exported as Exported
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
-    "Accuracy": "urmpipe_pipeline.accuracy.result",
+    "AccuracyResult": "urmpipe_pipeline.accuracy.result",
     "BuiltFmu": "urmpipe_fmus.build.fmu",
     "Chain": "urmpipe_models.arm.chain",
     "Comparison": "urmpipe_pipeline.comparison.comparison",
@@ -100,7 +100,7 @@ _HOME = {
     "Equations": "urmpipe.api.equations",
     "Exported": "urmpipe_pipeline.tables",
     "FmuError": "urmpipe_models.errors",
-    "SolvedTargets": "urmpipe_pipeline.solved_targets.result",
+    "IkResult": "urmpipe_pipeline.solved_targets.result",
     "JointLog": "urmpipe_pipeline.joint_log",
     "LogError": "urmpipe_models.errors",
     "LogReading": "urmpipe.reading",

@@ -32,7 +32,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.errors import CosimulationError, UnitError
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.wraps import FULL_TURN
-from urmpipe_pipeline.accuracy.driven_motion import Diverged, DrivenMotion
+from urmpipe_pipeline.accuracy.driven_motion import Divergence, DrivenMotion
 from urmpipe_pipeline.accuracy.result import FASTEST, FINE, SLOWEST
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
@@ -128,7 +128,7 @@ class ArmUnit:
         if failed or len(exceeding):
             last = int(exceeding[0]) if len(exceeding) else rows - 1
             joint = self.robot.coordinates[int(np.argmax(deviation[last]))]
-            diverged, rows = Diverged(float(plan.t[last]), joint), last + 1
+            diverged, rows = Divergence(float(plan.t[last]), joint), last + 1
         q, qd, voltage, current = np.split(values[:rows], np.cumsum([count, count, len(self.driven)]), axis=1)
         arcs = plan.path.arcs
         middles = (plan.segment_times[arcs] + plan.segment_times[arcs + 1]) / 2.0
@@ -147,7 +147,7 @@ class ArmUnit:
             voltage=voltage,
             current=current,
             limits=np.array(limits),
-            corner_ns=np.round(middles * 1e9).astype(np.int64),
+            corner_times_ns=np.round(middles * 1e9).astype(np.int64),
             diverged=diverged,
         )
 

@@ -203,19 +203,19 @@ class Hint:
     Attributes:
         parameter: Its keyword, such as "skip_bad"; empty for advice without a parameter.
         value: Its value; None where the user fills it in.
-        does: Its effect, as the end of a sentence that the parameter begins: "applies this".
+        effect: Its effect, as the end of a sentence that the parameter begins: "applies this".
         call: The command and public function with this parameter, if it is not the one that ran.
         robot: The robot that the parameter needs, if its name states which.
     """
 
     parameter: str
     value: Value = None
-    does: str = ""
+    effect: str = ""
     call: str = ""
     robot: str = ""
 
     def __hash__(self) -> int:
-        return hash((self.parameter, self.does))  # a mapping has no hash
+        return hash((self.parameter, self.effect))  # a mapping has no hash
 
     def __str__(self) -> str:
         if not self.parameter:
@@ -309,7 +309,7 @@ class Finding(Message):
 
 def format_hints(hints: Sequence[Hint]) -> Iterator[str]:
     """Yield one clause per effect: "--repair or --skip-bad leaves them out"."""
-    for effect, group in groupby(hints, key=lambda hint: hint.does):
+    for effect, group in groupby(hints, key=lambda hint: hint.effect):
         text = " or ".join(filter(None, map(str, group)))
         yield f"{text} {effect}".strip() if effect else f"use {text}"
 

@@ -76,13 +76,13 @@ class UnobservableDirection:
             turn (about the mean of the positions).
         axis: Unit vector of the offset or rotation [-]: of the tool in its frame, of the base in
             the device's.
-        seen: Sensitivity: how much one metre or radian of it moves positions in [m] or rotates orientations
-            in [rad], root mean square. Below `MIN_SENSITIVITY` the frames have the minimum of it.
+        sensitivity: How much one metre or radian of it moves positions in [m] or rotates orientations in
+            [rad], root mean square. Below `MIN_SENSITIVITY` the frames have the minimum of it.
     """
 
     part: Part
     axis: tuple[float, float, float]
-    seen: float
+    sensitivity: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

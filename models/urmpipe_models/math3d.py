@@ -45,7 +45,7 @@ class Transform:
     Attributes:
         rotation: The rows of R, each three elements [-].
         translation: p, three elements in [m].
-        made_of: The constants and elementary motions whose product it is, or None if only the numbers are
+        steps: The constants and elementary motions whose product it is, or None if only the numbers are
             known. Comparisons ignore it, and a product of frames has none.
     """
 
@@ -54,7 +54,7 @@ class Transform:
         metadata={"stored": tuple[_Numbers, _Numbers, _Numbers]},
     )
     translation: Vector = field(default=ZERO, metadata={"stored": _Numbers})
-    made_of: tuple[Transform | Step, ...] | None = field(default=None, compare=False, repr=False)
+    steps: tuple[Transform | Step, ...] | None = field(default=None, compare=False, repr=False)
 
     def __matmul__(self, other: Transform) -> Transform:
         """Return the frame C in A from B in A (self) and C in B (other)."""

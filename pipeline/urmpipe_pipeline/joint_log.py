@@ -89,14 +89,14 @@ class Inference:
             object.__setattr__(self, "kind", self.what)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return its fields for JSON, and `otherwise`."""
+        """Return its fields for JSON, and `alternatives`."""
         values = asdict(self)
         lists = {name: list(values[name]) for name in ("columns", "hints")}
-        return values | lists | {"otherwise": self.otherwise()}
+        return values | lists | {"alternatives": self.alternatives()}
 
-    def otherwise(self) -> str:
+    def alternatives(self) -> str:
         """Return how to change it as text; empty if that is not possible."""
-        return ", or ".join(f"{hint} {hint.does}".strip() for hint in self.hints)
+        return ", or ".join(f"{hint} {hint.effect}".strip() for hint in self.hints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class LogWarning(Message):
         assumption: The assumption of a verdict that depends on it, as the end of "assuming ...": "the joints
             are in deg"; empty without one.
         role: Role of its columns; a verdict may depend on other columns.
-        asks: Whether there is no verdict before the question is answered.
+        blocks_verdict: Whether there is no verdict before the question is answered.
     """
 
     kind: str
@@ -130,7 +130,7 @@ class LogWarning(Message):
     hints: tuple[Hint, ...] = ()
     assumption: str = ""
     role: Role | None = None
-    asks: bool = False
+    blocks_verdict: bool = False
 
     def of(self, name: str) -> LogWarning:
         """Return this warning with the name of a log or block."""
@@ -138,7 +138,7 @@ class LogWarning(Message):
 
     def as_finding(self) -> Finding:
         """Return it as an error, for `--strict`."""
-        omitted = ("assumption", "role", "asks")
+        omitted = ("assumption", "role", "blocks_verdict")
         return Finding(**{f.name: getattr(self, f.name) for f in fields(self) if f.name not in omitted})
 
     def place(self) -> str:
@@ -163,7 +163,7 @@ class LogColumn:
         sign: 1, or -1 for a reversed column.
         offset: Added before the factor, in the unit of the file.
         number: Number among the columns of all tables of the log, from 1.
-        doubt: Reason why its unit is assumed; empty if it is stated or verified.
+        uncertainty: Reason why its unit is assumed; empty if it is stated or verified.
     """
 
     name: str
@@ -175,7 +175,7 @@ class LogColumn:
     sign: int = 1
     offset: float = 0.0
     number: int = 0
-    doubt: str = ""
+    uncertainty: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -27,7 +27,7 @@ from urmpipe_models.errors import (
     format_value,
     map_collecting_errors,
 )
-from urmpipe_pipeline.comparison.comparison import Comparison, Unjudged
+from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.networks.network_motion import NetworkMotion
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
@@ -39,7 +39,7 @@ from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.motion import run_of_block
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
 from urmpipe_pipeline.text import counted
@@ -49,8 +49,8 @@ BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
 BASELINE_HINT = Hint("baseline", None, "compares it, alone, with an earlier one")
 
 # Results that are a run, or contain one.
-RunLike: TypeAlias = Run | SolvedTargets | PlannedPath | NetworkMotion
-RUN_LIKE: tuple[type[RunLike], ...] = (Run, SolvedTargets, PlannedPath, NetworkMotion)
+RunLike: TypeAlias = Run | IkResult | PlannedPath | NetworkMotion
+RUN_LIKE: tuple[type[RunLike], ...] = (Run, IkResult, PlannedPath, NetworkMotion)
 
 Operand: TypeAlias = Path | Held | RunLike | Simulation
 
@@ -69,7 +69,7 @@ def load_runs(
     derivative: Method | None = None,
     block: str | Sequence[str] | None = None,
     comparison_hints: Sequence[Hint] = (BASELINE_HINT,),
-    failed: list[Unjudged] | None = None,
+    failed: list[FailedLog] | None = None,
 ) -> list[Run]:
     """Return the runs of several operands, or both sides of one log; the reading options apply to all logs.
 
@@ -128,7 +128,9 @@ def load_runs(
         _check_intervals(read, runs)
     named = list(zip(_unique_names(operands, results), results, strict=True))
     if failed is not None:
-        failed += [Unjudged(name, error.findings) for name, error in named if isinstance(error, UrmpipeError)]
+        failed += [
+            FailedLog(name, error.findings) for name, error in named if isinstance(error, UrmpipeError)
+        ]
     return [replace(run, name=name) for name, run in named if isinstance(run, Run)]
 
 

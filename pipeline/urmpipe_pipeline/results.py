@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeGuard
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.accuracy import exports as accuracy_exports
 from urmpipe_pipeline.accuracy import presenter as accuracy
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.comparison import exports as comparison_exports
 from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -36,7 +36,7 @@ from urmpipe_pipeline.simulations import exports as simulation_exports
 from urmpipe_pipeline.simulations import presenter as simulations
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets import presenter as solved_targets
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 
 
 class Kind(NamedTuple):
@@ -65,9 +65,9 @@ KINDS: tuple[Kind, ...] = (
     Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
     Kind("diagnosis", Diagnosis, comparison.present_diagnosis),
     Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
-    Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
+    Kind("solved targets", IkResult, solved_targets.present, solved_targets.exports),
     Kind("plan", PlannedPath, planned_paths.present, planned_paths.exports),
-    Kind("accuracy", Accuracy, accuracy.present, accuracy_exports.exports),
+    Kind("accuracy", AccuracyResult, accuracy.present, accuracy_exports.exports),
     Kind("network", NetworkResult, networks.present),
     Kind("network motion", NetworkMotion, network_motion.present, network_motion.exports),
 )

@@ -58,8 +58,8 @@ class Trajectory:
         joints: Names of the joints; empty for a path.
         joint_units: rad or m, one per joint.
         q: Repolarized joint values in [rad] or [m], shape (m, joints); None without joints.
-        broken: Samples after which a joint steps to the next one as no motion does, so that nothing in
-            between is defined, shape (k,).
+        discontinuities: Samples after which a joint steps to the next one as no motion does, so that nothing
+            in between is defined, shape (k,).
     """
 
     name: str
@@ -70,7 +70,7 @@ class Trajectory:
     joints: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
     q: FloatArray | None = None
-    broken: IntArray | None = None
+    discontinuities: IntArray | None = None
 
     @property
     def t(self) -> FloatArray:
@@ -91,8 +91,8 @@ class Trajectory:
         if valued.all() or not valued.any():
             return self
         kept, broken = np.flatnonzero(valued), None
-        if self.broken is not None:  # by the numbers that the kept rows have now
-            broken = np.unique(np.searchsorted(kept, self.broken, side="right") - 1)
+        if self.discontinuities is not None:  # by the numbers that the kept rows have now
+            broken = np.unique(np.searchsorted(kept, self.discontinuities, side="right") - 1)
             broken = broken[broken >= 0]
         return replace(
             self,
@@ -100,7 +100,7 @@ class Trajectory:
             position=self.position[kept],
             quat_xyzw=None if self.quat_xyzw is None else self.quat_xyzw[kept],
             q=None if self.q is None else self.q[kept],
-            broken=broken,
+            discontinuities=broken,
         )
 
 
@@ -279,7 +279,7 @@ def joint_trajectory(run: Run) -> Trajectory:
 
 def _with_broken(run: Run, position: FloatArray, quat: FloatArray | None) -> Trajectory:
     steps = [entry.sample - 1 for entry in run.audit if entry.kind in ("unexplained", "ambiguous")]
-    return replace(_build_trajectory(run, position, quat), broken=np.unique(steps).astype(np.int64))
+    return replace(_build_trajectory(run, position, quat), discontinuities=np.unique(steps).astype(np.int64))
 
 
 def _build_trajectory(run: Run, position: FloatArray, quat: FloatArray | None) -> Trajectory:
@@ -356,11 +356,11 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync, *, block_rows: int
 
 def _inside_broken(at_ns: IntArray, reference: Trajectory) -> BoolArray:
     """Return which times lie strictly inside a broken step of the reference, shape (m,)."""
-    if reference.broken is None or not len(reference.broken):
+    if reference.discontinuities is None or not len(reference.discontinuities):
         return np.zeros(len(at_ns), np.bool_)
     after = np.searchsorted(reference.t_ns, at_ns, side="left")
     at_sample = reference.t_ns[np.minimum(after, len(reference.t_ns) - 1)] == at_ns
-    return np.asarray(np.isin(after - 1, reference.broken) & ~at_sample)
+    return np.asarray(np.isin(after - 1, reference.discontinuities) & ~at_sample)
 
 
 def _interpolate_orientations(at_ns: IntArray, known_ns: IntArray, quat: FloatArray) -> FloatArray:

@@ -128,11 +128,11 @@ def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Capture
         assert run([*given, "--limit", between, "--error", which, "--velocities", "0.27,0.3"]) == code
         verdicts.append(json.loads(capsys.readouterr().out))
     assert [one["verdict"] for one in verdicts] == ["fail", "pass"]
-    assert [one["decides"] for one in verdicts] == ["time", "path"]
+    assert [one["limited_error"] for one in verdicts] == ["time", "path"]
     by_path = verdicts[1]
     error, path_error = by_path["errors"][1], by_path["path_errors"][1]
     assert path_error < float(between) < error
-    speed, tried = by_path["running_speed"], by_path["tried"]
+    speed, tried = by_path["running_speed"], by_path["probed"]
     held = {one["velocity"]: one["path_error"] <= float(between) for one in tried}
     assert held[speed]
     assert min(v for v, within in held.items() if not within and v > speed) <= 1.01 * speed * (1 + 1e-12)

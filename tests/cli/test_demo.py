@@ -92,7 +92,7 @@ def test_a_module_that_turns_the_other_way(demo: Demo) -> None:
     assert (cause.kind, cause.name, cause.joints) == ("joint_sign", "phi3", ("q3",))
     assert found.undecided == ()
     assert (found.verdict, round(1e3 * found.rms, 2)) == ("fail", 416.57)
-    assert found.remainder.rms < 1e-6
+    assert found.unexplained.rms < 1e-6
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_a_log_that_starts_4_ms_late(demo: Demo) -> None:
     assert cause.value[0] == pytest.approx(-4e-3, abs=2e-5)
     assert cause.low[0] < -4e-3 < cause.high[0]
     assert (found.verdict, round(1e3 * found.rms, 2)) == ("pass", 1.61)
-    assert found.remainder.rms < 2e-5
+    assert found.unexplained.rms < 2e-5
 
 
 @pytest.mark.slow
@@ -112,8 +112,8 @@ def test_a_base_that_stands_elsewhere_and_its_twin(demo: Demo) -> None:
     (cause,) = found.causes
     assert (cause.kind, found.undecided) == ("base_shift", ())
     np.testing.assert_allclose(cause.value, (1.5e-3, -1.2e-3, 1.6e-3), rtol=0, atol=1e-6)
-    assert cause.twins == ("r1 (z)",)  # the first module stands on the base: its height is the base's
-    assert found.remainder.rms < 1e-6
+    assert cause.equivalents == ("r1 (z)",)  # the first module stands on the base: its height is the base's
+    assert found.unexplained.rms < 1e-6
 
 
 @pytest.mark.slow
@@ -121,4 +121,4 @@ def test_what_a_damped_inverse_leaves_has_no_cause_that_explains_much(demo: Demo
     found = demo.diagnosis("coppeliasim")
     told = [*found.causes, *(cause for one in found.undecided for cause in one.causes)]
     assert all(cause.rms_after > 0.8 * cause.rms_before for cause in told)
-    assert found.remainder.rms > 0.9 * found.rms
+    assert found.unexplained.rms > 0.9 * found.rms

@@ -25,7 +25,7 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.facts import remedy_hints
-from urmpipe_pipeline.diagnosis.causes import Cause, Remainder
+from urmpipe_pipeline.diagnosis.causes import Cause, Unexplained
 from urmpipe_pipeline.presentation.section import Advice
 from urmpipe_pipeline.results import present
 
@@ -39,11 +39,11 @@ ARM = ("--robot", "urm6")
 ANSWER = "module 3 (phi3) counter-rotates: rms 415.78 mm -> 0.0002 mm"
 KEYS = [
     "schema", "name", "verdict", "samples", "coverage", "judged", "unit", "rms", "causes", "undecided",
-    "refused", "own_tcp", "origin", "not_looked_for", "remainder", "warnings", "recording",
+    "unidentifiable", "recorded_tcp", "origin", "untested", "unexplained", "warnings", "recording",
 ]  # fmt: skip
 CAUSE_KEYS = [
     "kind", "name", "joint", "segment", "axis", "value", "unit", "interval", "from_sample", "rows",
-    "twins", "rms_before", "rms_after", "rms_alone", "effect", "breaks_tolerance",
+    "equivalents", "rms_before", "rms_after", "rms_alone", "effect", "exceeds_tolerance",
 ]  # fmt: skip
 
 
@@ -109,7 +109,7 @@ def test_what_is_written_is_the_comparison_with_its_diagnosis(both: Both) -> Non
     names = ("counter_rotating-diagnosed.rrd", "compared.rrd")
     found, compared = (urmpipe.read_recording(both.folder / name) for name in names)
     assert isinstance(found, Comparison) and isinstance(compared, Comparison)
-    assert there(found.runs[0].diagnosis).sentence == ANSWER
+    assert there(found.runs[0].diagnosis).summary == ANSWER
     assert_same(found.runs[0].diagnosis, compared.runs[0].diagnosis)
     assert run(["report", str(both.folder / names[0]), "-o", "page.html", "-q"]) == 0
     assert "module 3 (phi3) counter-rotates" in Path("page.html").read_text("utf-8")
@@ -211,7 +211,7 @@ def test_in_python_it_stands_in_its_comparison() -> None:
     with pytest.warns(urmpipe.UrmpipeWarning) as shown:
         found = urmpipe.diagnose(PATH, WRONG, robot="urm6")
     assert [one.filename for one in shown] == [__file__]
-    assert found.sentence == ANSWER
+    assert found.summary == ANSWER
     assert repr(found) == f"<Diagnosis counter_rotating: {ANSWER}, 1 warning>"
     made = found.comparison
     assert isinstance(made, Comparison)
@@ -266,7 +266,7 @@ def test_what_to_do_removes_the_causes(setup: dict[str, Any], parameters: list[s
     assert [hint.parameter for hint in meaning.hints] == parameters
     (run,) = urmpipe.compare(PATH, RIGHT, "urm6", unit="rad", **given).runs
     # 4 ms from rows 0.2 s apart lines leave 0.26 mm (4 ms x 196 ms / 2 of 0.65 m/s2), the diagnosis cubics
-    assert there(run.statistics["norm"]).rms == pytest.approx(diagnosis.remainder.rms, abs=2.6e-4)
+    assert there(run.statistics["norm"]).rms == pytest.approx(diagnosis.unexplained.rms, abs=2.6e-4)
 
 
 @pytest.mark.slow
@@ -275,7 +275,7 @@ def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:
     table.assign(q3=np.degrees(table.q3)).to_csv("mixed.csv", index=False)
     (run,) = urmpipe.compare(PATH, "mixed.csv", "urm6", unit="rad", diagnose=True).runs
     cause = Cause("joint_unit", "phi3", ("q3",), value=(np.pi / 180.0,))
-    diagnosis = replace(there(run.diagnosis), causes=(cause,), remainder=Remainder(0.0))
+    diagnosis = replace(there(run.diagnosis), causes=(cause,), unexplained=Unexplained(0.0))
     (hint,) = remedy_hints(replace(run, diagnosis=diagnosis))
     assert str(hint) == "--unit q3=deg"
     assert isinstance(hint.value, dict)

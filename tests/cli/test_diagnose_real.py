@@ -48,7 +48,7 @@ def test_the_poses_of_a_library_that_rounds_a_ur10() -> None:
     causes = by_name(found)
     assert set(causes) == {"base", "a_2", "a_3"}
     assert causes["base"].axis == (0.0, 0.0, 1.0)
-    assert "d_1" in causes["base"].twins
+    assert "d_1" in causes["base"].equivalents
     for name, rounded in (("base", -9.3e-3), ("a_2", -0.7e-3), ("a_3", 0.7e-3)):
         assert causes[name].value[0] == pytest.approx(rounded, abs=2e-5)
         assert causes[name].low[0] < rounded < causes[name].high[0]
@@ -59,4 +59,4 @@ def test_the_poses_of_a_library_that_rounds_a_ur10() -> None:
 def test_poses_that_a_laser_tracker_measured_have_the_arms_own_geometry_and_no_cause() -> None:
     found = urmpipe.diagnose(LOGS / "ur10-laser-tracker" / "measurements_grid.csv", robot="ur10")
     assert (found.verdict, found.causes, found.undecided) == ("pass", (), ())
-    assert found.remainder.words == "the arm's own geometry, as a calibration finds it"
+    assert found.unexplained.interpretation == "the arm's own geometry, as a calibration finds it"

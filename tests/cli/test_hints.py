@@ -196,7 +196,7 @@ def test_the_tool_of_a_recorded_run_is_advised_with_its_robot(tmp_path: Path) ->
 def test_a_robot_that_was_singled_out_is_named_with_its_tool(tmp_path: Path) -> None:
     log = recorded_beside(tmp_path / "log.csv", TRUTH, UR5E.placed(tool=from_offset((0.02, 0.0, 0.15))))
     (found,) = [one for one in urmpipe.ingest(log).log.inferences if one.kind == "robot"]
-    assert found.otherwise() == ("--robot NAME|FILE, or --robot ur5e --tool 0.02,0,0.15 applies it")
+    assert found.alternatives() == ("--robot NAME|FILE, or --robot ur5e --tool 0.02,0,0.15 applies it")
 
 
 def test_the_same_call_gives_the_same_message_on_any_thread_and_within_a_command(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import ghosts
 
 Captured = pytest.CaptureFixture[str]
@@ -66,7 +66,7 @@ def test_json_lists_all_eight_solutions_of_the_papers_default_position(
     solutions = np.array([one["q"] for one in target["solutions"]])
     assert len(solutions) == 8
     assert len({one["branch"] for one in target["solutions"]}) == 8
-    assert max(one["miss"] for one in target["solutions"]) < 1e-12
+    assert max(one["position_error"] for one in target["solutions"]) < 1e-12
     assert max(one["angle"] for one in target["solutions"]) < 1e-12
     printed = np.array([line.split() for line in PRINTED.split("\n") if line], dtype=float)
     away = np.abs(turned(solutions[None] - printed[:, None])).max(axis=2)
@@ -157,7 +157,7 @@ def test_a_target_just_out_of_reach_takes_the_nearest_point_within_the_tolerance
     capsys.readouterr()
     found = answer(capsys, 0, "high.csv", "--robot", "arm6", "--tolerance", "3.5mm")
     (solution,) = found["targets"][0]["solutions"]
-    assert 1e-3 < solution["miss"] < 3.5e-3
+    assert 1e-3 < solution["position_error"] < 3.5e-3
     (warning,) = [one for one in found["warnings"] if one["kind"] == "nearest-point"]
     assert warning["message"].startswith(
         "row 1: out of reach, the nearest point within the tolerance is taken: up to "
@@ -237,7 +237,7 @@ def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
     assert run(["ik", "targets.csv", "--robot", "arm6", "--all", "-o", "targets.rrd"]) == 1
     assert "Recording: targets.rrd" in capsys.readouterr().out
     made = read_recording(folder / "targets.rrd")
-    assert isinstance(made, SolvedTargets)
+    assert isinstance(made, IkResult)
     assert np.isfinite(made.q).all(axis=1).tolist() == [True, False, False, True]
     assert len(ghosts(made)) == 8
     found = answer(capsys, 1, "targets.csv", "--robot", "arm6")
@@ -252,11 +252,11 @@ def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
     )  # stretched: left arm only
     assert run(["ik", "some.csv", "--robot", "arm6", "--all", "-o", "some.rrd", "-q"]) == 0
     some = read_recording(folder / "some.rrd")
-    assert isinstance(some, SolvedTargets)
+    assert isinstance(some, IkResult)
     assert sum(bool(np.isfinite(one.q[1]).all()) for one in ghosts(some)) == 3
     assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "targets.rrd", "-q"]) == 1
     alone = read_recording(folder / "targets.rrd")
-    assert isinstance(alone, SolvedTargets)
+    assert isinstance(alone, IkResult)
     assert not ghosts(alone)
 
 
@@ -268,7 +268,7 @@ def test_all_of_a_path_records_the_branches_that_run_beside_it(capsys: Captured,
     start = ",".join(map(str, q[0]))
     assert run(["ik", "path.csv", "--robot", "arm6", "--start", start, "--all", "-o", "path.rrd"]) == 0
     made = read_recording(folder / "path.rrd")
-    assert isinstance(made, SolvedTargets)
+    assert isinstance(made, IkResult)
     assert np.abs(made.q - q).max() < 1e-9
     assert {np.isfinite(one.q).all() for one in ghosts(made)} == {np.True_}
     arm, targets = load_robot("arm6"), forward_targets(load_robot("arm6"), q)

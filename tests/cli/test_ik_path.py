@@ -42,7 +42,7 @@ def test_a_path_has_a_summary_and_one_solution_a_row_in_json(capsys: Captured, f
     assert lines[2].startswith("      Nearest to a singularity: at t = 0.")
     assert lines[3].startswith("      Off by: ")
     found = answer(capsys, 0, "path.csv", "--robot", "arm6", "--start", start)
-    assert (found["jumps"], found["too_fast"]) == ([], [])
+    assert (found["jumps"], found["speed_violations"]) == ([], [])
     solved = np.array([one["solutions"][0]["q"] for one in found["targets"]])
     assert np.abs(solved - q).max() < 1e-9
     assert [one["t"] for one in found["targets"]] == pytest.approx(0.01 * np.arange(40), abs=1e-12)
@@ -70,7 +70,7 @@ def test_a_joint_that_is_too_fast_fails_the_path(capsys: Captured, folder: Path)
     start = ",".join(map(str, q[0]))
     found = answer(capsys, 1, "path.csv", "--robot", "ur5e", "--start", start)
     assert found["reached"] == 30
-    (fast,) = found["too_fast"]
+    (fast,) = found["speed_violations"]
     assert (fast["row"], fast["last_row"]) == (1, 30)
     assert fast["joint"] == load_robot("ur5e").coordinates[0]
     assert fast["speed"] == pytest.approx(5.0, abs=1e-6)

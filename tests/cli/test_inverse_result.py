@@ -71,7 +71,7 @@ def test_the_solution_nearest_to_the_start_is_the_start_itself(seed: int) -> Non
     distances = np.linalg.norm(found.solutions.q[0] - q, axis=1)
     assert found.chosen[0] == int(np.nanargmin(distances))
     assert np.nanmin(distances) < 1e-5  # near a singular pose rounding of 1e-16 leaves its root
-    assert found.miss[0, found.chosen[0]] < 1e-10
+    assert found.position_error[0, found.chosen[0]] < 1e-10
 
 
 def test_the_table_has_every_solution_and_why_there_is_none() -> None:
@@ -82,7 +82,15 @@ def test_the_table_has_every_solution_and_why_there_is_none() -> None:
     assert found.verdict == "fail"
     assert found.reached.tolist() == [True, True, False]
     frame = found.to_frame()
-    assert list(frame.columns) == ["row", "branch", *ARM.coordinates, "miss", "angle", "nearest", "reason"]
+    assert list(frame.columns) == [
+        "row",
+        "branch",
+        *ARM.coordinates,
+        "position_error",
+        "angle",
+        "nearest",
+        "reason",
+    ]
     for row, count in (
         (1, int(found.solutions.reached[0].sum())),
         (2, int(found.solutions.reached[1].sum())),
@@ -135,7 +143,7 @@ def test_a_notebook_shows_the_table() -> None:
 def test_positions_take_any_orientation() -> None:
     found = urmpipe.ik(TARGETS.position, "arm6")
     assert (found.method, found.angle) == ("iterative", None)
-    assert found.miss.max() < 1e-9
+    assert found.position_error.max() < 1e-9
     assert "angle" not in found.to_frame()
     assert found.to_dict()["targets"][0]["solutions"][0]["angle"] is None
 

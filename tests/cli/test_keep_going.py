@@ -48,8 +48,8 @@ def test_the_others_are_judged_and_all_outputs_name_the_log_that_is_not(capsys: 
     assert (told["verdict"], [(one["name"], one["verdict"]) for one in told["runs"]]) == (
         None, [("good", "pass")],
     )  # fmt: skip
-    assert [one["name"] for one in told["unjudged"]] == ["broken", "missing"]
-    assert told["unjudged"][0]["errors"][0]["line"] == 12
+    assert [one["name"] for one in told["failed_logs"]] == ["broken", "missing"]
+    assert told["failed_logs"][0]["errors"][0]["line"] == 12
     cases = [
         (case.get("classname"), case.get("name"), [(one.tag, one.text) for one in case])
         for case in ET.parse("v.xml").iter("testcase")
@@ -62,7 +62,7 @@ def test_the_others_are_judged_and_all_outputs_name_the_log_that_is_not(capsys: 
     with Path("v.csv").open(encoding="utf-8", newline="") as file:
         assert {row["run"] for row in csv.DictReader(file)} == {"good"}
     made = recorded("v.rrd")
-    assert [(one.name, [str(error) for error in one.errors]) for one in made.unjudged] == [
+    assert [(one.name, [str(error) for error in one.errors]) for one in made.failed_logs] == [
         ("broken", WRONG), ("missing", [MISSING]),
     ]  # fmt: skip
     said = (
@@ -87,12 +87,15 @@ def test_a_log_that_cannot_be_held_against_the_reference_is_not_judged() -> None
     wanted, good = (urmpipe.ingest(name, robot="ur5e") for name in ("wanted.csv", "good.csv"))
     still = urmpipe.ingest("slack.csv", robot="ur5e", poses=True)
     result = urmpipe.compare(wanted, [still, good], keep_going=True)
-    assert ([one.name for one in result.runs], [one.name for one in result.unjudged]) == (["good"], ["slack"])
-    assert str(result.unjudged[0].errors[0]).startswith("slack.csv: found still poses beside a motion")
+    assert ([one.name for one in result.runs], [one.name for one in result.failed_logs]) == (
+        ["good"],
+        ["slack"],
+    )
+    assert str(result.failed_logs[0].errors[0]).startswith("slack.csv: found still poses beside a motion")
     earlier = urmpipe.compare(wanted, [good, urmpipe.ingest("slack.csv", robot="ur5e")])
     again = urmpipe.compare(wanted, [still, good], keep_going=True, baseline=earlier)
     assert again.baseline is not None
-    assert (again.verdict, again.baseline.verdict, again.baseline.gone) == (None, "pass", ())
+    assert (again.verdict, again.baseline.verdict, again.baseline.missing) == (None, "pass", ())
 
 
 def test_with_strict_a_log_with_a_warning_is_not_judged() -> None:
@@ -100,7 +103,7 @@ def test_with_strict_a_log_with_a_warning_is_not_judged() -> None:
     Path("half.csv").write_text("".join(half), encoding="utf-8")
     judge = partial(urmpipe.compare, "wanted.csv", robot="ur5e", keep_going=True, strict=True)
     result = judge(["half.csv", "good.csv"], tolerance="coverage=30%")
-    (lost,) = result.unjudged
+    (lost,) = result.failed_logs
     assert ([one.name for one in result.runs], lost.name) == (["good"], "half")
     assert [str(one) for one in lost.errors] == [
         "strict (--strict): found 1 warning, allowed: none",
@@ -124,4 +127,4 @@ def test_without_any_log_to_judge_it_is_an_error_as_ever(capsys: Captured) -> No
 def test_a_lab_may_keep_going_by_default(folder: Path) -> None:
     (folder / "urmpipe.toml").write_text("[compare]\nkeep-going = true\n", encoding="utf-8")
     assert compare("good.csv", "broken.csv", "-q", "-o", "v.rrd") == 2
-    assert [one.name for one in recorded("v.rrd").unjudged] == ["broken"]
+    assert [one.name for one in recorded("v.rrd").failed_logs] == ["broken"]

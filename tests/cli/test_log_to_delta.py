@@ -125,6 +125,6 @@ def test_every_file_is_traced_and_every_log_warns(shipped: Simulation) -> None:
     assert [one.kind for one in shipped.warnings] == ["assumed-unit"]
     assert shipped.provenance.options["arguments"]["robot"] == "urm6"
     blocks = {one.name: one for one in shipped.blocks}
-    assert [(one.variable, one.value, one.given) for one in blocks["delta"].settings] == [
+    assert [(one.variable, one.value, one.from_system) for one in blocks["delta"].settings] == [
         ("tolerance", 0.0035, False)
     ]

@@ -82,13 +82,14 @@ def test_check_tells_mobility_and_why_kutzbach_differs(urmpipe: Run) -> None:
         "name": "four-bar", "kind": "mechanism", "structure": "closed chain", "bodies": 4, "variables": 4,
         "mobility": 1,
     }  # fmt: skip
-    assert (told["kutzbach"], len(told["redundant"]), told["idle"], told["special"]) == (-2, 3, [], False)
+    assert (told["kutzbach"], len(told["redundant"]), told["passive"], told["special"]) == (-2, 3, [], False)
     assert {"theta2", "theta4", "A", "B"} == set(told["loops"][0])
     assert len(told["loops"]) == 1
     assert told["residual"] < 1e-12
     assert set(told) == {
         "schema", "name", "kind", "structure", "bodies", "variables", "mobility", "kutzbach", "loops",
-        "clusters", "redundant", "idle", "special", "residual", "assemblies", "gaps", "warnings", "output",
+        "clusters", "redundant", "passive", "special", "residual", "assemblies", "closure_errors",
+        "warnings", "output",
     }  # fmt: skip
 
 
@@ -103,7 +104,7 @@ def test_solve_finds_both_assemblies_of_a_four_bar(urmpipe: Run) -> None:
         "distances",
         "restarts",
         "reason",
-        "gaps",
+        "closure_errors",
         "warnings",
         "output",
     }
@@ -171,7 +172,7 @@ def test_what_does_not_close_fails_with_its_loop_and_gap(urmpipe: Run, tmp_path:
     assert ran.code == 1
     assert (told["mobility"], told["kind"], told["special"]) == (None, None, None)
     assert (told["variables"], told["kutzbach"]) == (4, -2)
-    (gap,) = told["gaps"]
+    (gap,) = told["closure_errors"]
     assert set(gap["loop"]) == {"t1", "t2", "t3", "t4"}
     assert gap["m"] > 1e-3
     assert told["residual"] > 1e-3
@@ -355,7 +356,7 @@ def test_python_gives_the_same_as_the_command(urmpipe: Run) -> None:
     told = json.loads(urmpipe("network", "check", "rssr", "--set", "crank=0.5", "--json").out)
     assert checked.to_dict() == told
     assert checked.mobility is not None
-    assert (checked.mobility.mobility, checked.mobility.idle) == (2, ("coupler",))
+    assert (checked.mobility.mobility, checked.mobility.passive) == (2, ("coupler",))
     frame = api.network_solve(api.load_network("rccc"), every=True, restarts=50).to_frame()
     assert list(frame["assembly"]) == [1, 2]
     assert {"crank", "r1", "c2_1", "c2_2", "residual", "mobility"} <= set(frame.columns)

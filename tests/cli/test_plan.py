@@ -87,15 +87,25 @@ def test_a_file_is_planned_without_a_robot(urmpipe: RunCommand, folder: Path) ->
 def test_json_of_the_papers_contour(urmpipe: RunCommand) -> None:
     found = answer(urmpipe, 0, CUBE, "--robot", "irb60")
     assert list(found) == [
-        "schema", "name", "robot", "length", "duration", "law", "velocity", "acceleration", "scaled",
-        "segments", "limits", "singularity", "obstacles", "verdict", "warnings", "output",
+        "schema", "name", "robot", "length", "duration", "law", "velocity", "acceleration", "speed_factor",
+        "segments", "limits", "singularity", "infeasibilities", "verdict", "warnings", "output",
     ]  # fmt: skip
     assert (found["length"], found["duration"]) == pytest.approx((LENGTH, DURATION), abs=1e-6)
-    plain = ("schema", "name", "robot", "law", "velocity", "acceleration", "scaled", "verdict", "output")
+    plain = (
+        "schema",
+        "name",
+        "robot",
+        "law",
+        "velocity",
+        "acceleration",
+        "speed_factor",
+        "verdict",
+        "output",
+    )
     assert [found[key] for key in plain] == [
         1, "cube wall xy", "irb60", "trapezoid", 0.5, 6.0, 1.0, "pass", None,
     ]  # fmt: skip
-    assert (found["obstacles"], found["warnings"]) == ([], [])
+    assert (found["infeasibilities"], found["warnings"]) == ([], [])
     assert [list(one) for one in found["segments"]] == [
         ["kind", "row", "length", "radius", "t", "duration"]
     ] * 9
@@ -138,10 +148,10 @@ def test_options_of_the_law(urmpipe: RunCommand, options: tuple[str, ...], durat
 def test_a_plan_that_fails_is_exit_1(urmpipe: RunCommand) -> None:
     found = answer(urmpipe, 1, "singular.csv", "--robot", "irb60")
     assert found["verdict"] == "fail"
-    at = [found["obstacles"][0].pop(key) for key in ("s", "t")]
+    at = [found["infeasibilities"][0].pop(key) for key in ("s", "t")]
     # Two stops, and half of the second line: 0.6 m / v + 1.5 v / a; the path is looked at on a grid.
     assert at == pytest.approx([0.6, 1.325], abs=4e-4)
-    assert found["obstacles"] == [
+    assert found["infeasibilities"] == [
         {"kind": "singular", "segment": 1, "row": 2, "joint": "theta3",
          "message": "the arm passes a singular pose"}
     ]  # fmt: skip

@@ -121,7 +121,9 @@ def test_a_unit_of_ones_own_shows_its_energies_and_its_limit(urmpipe: RunCommand
     # RK4 in steps of h = 1 ms: a corner of the force, of 30 N/s, is an impulse of 30 h^2 / 8 = 4e-6 N.s off
     # at most, at 3 m/s 1.2e-5 J; there are 19 of them
     assert abs(energy["residual"]) < 2.3e-4
-    assert energy["in"] - energy["lost"] == pytest.approx(energy["stored"] + energy["residual"], rel=1e-12)
+    assert energy["supplied"] - energy["dissipated"] == pytest.approx(
+        energy["stored"] + energy["residual"], rel=1e-12
+    )
     urmpipe("report", "swinging.rrd")
     page = (tmp_path / "swinging.html").read_text(encoding="utf-8")
     assert "Sums over swing since the first sample: " in page
@@ -301,7 +303,7 @@ def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path
     (tmp_path / "mine.toml").write_text(changed, encoding="utf-8")
     result = simulate(tmp_path / "mine.toml", duration=0.01)
     drive = next(one for one in result.blocks if one.name == "drive")
-    assert [(one.variable, one.value) for one in drive.settings if one.given] == [("C", 0.1)]
+    assert [(one.variable, one.value) for one in drive.settings if one.from_system] == [("C", 0.1)]
     ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
     assert (ran.code, ran.err) == (2, "error: mine.toml: found a file, allowed: a new name\n")
     assert (tmp_path / "mine.toml").read_text(encoding="utf-8") == changed

@@ -88,7 +88,7 @@ def test_an_fmu_that_ends_the_process_fails_the_run(
     told = json.loads(ran.out)
     assert (told["failed"], told["samples"], told["verdict"]) == (failed, samples, "fail")
     if samples == 4:
-        assert [one["doubts"] for one in told["verdicts"]] == [[ENDED_EARLY]]
+        assert [one["caveats"] for one in told["verdicts"]] == [[ENDED_EARLY]]
     assert recorded(tmp_path).failed == failed
 
 
@@ -97,7 +97,7 @@ def test_a_meter_of_a_run_that_ended_early_does_not_pass(urmpipe: RunCommand, tm
     ran = urmpipe(*write(tmp_path, {"bad": STOPS}, {ACTUAL: "bad.y"}), "--json")
     (verdict,) = json.loads(ran.out)["verdicts"]
     assert (verdict["verdict"], verdict["out_of_tolerance"]) == ("fail", 0)
-    assert verdict["doubts"] == [ENDED_EARLY]
+    assert verdict["caveats"] == [ENDED_EARLY]
     assert ran.code == 1
 
 
@@ -140,7 +140,7 @@ def test_an_fmu_that_ends_the_run_with_its_last_step_is_judged_as_a_whole(
     whole = replace(ENDS, name="whole", step=step)
     ran = urmpipe(*write(tmp_path, {"bad": whole}, {ACTUAL: "bad.y"}), "--json")
     (verdict,) = json.loads(ran.out)["verdicts"]
-    assert (verdict["verdict"], verdict["samples"], verdict["doubts"]) == ("pass", 11, [])
+    assert (verdict["verdict"], verdict["samples"], verdict["caveats"]) == ("pass", 11, [])
 
 
 TOLD = "a: y: found nan at t = 0.2 s; values that are not finite: 4"  # y[1] and y[2] at two points

@@ -85,7 +85,7 @@ def test_what_an_offset_leaves_out_of_a_log_is_no_doubt(tmp_path: Path) -> None:
     result = urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", strict=True)
     assert result.runs[0].sync.offset == pytest.approx(-0.5, abs=1e-7)  # of values to 1e-9 rad
     assert result.warnings == ()
-    assert [(one.samples, one.of) for one in result.runs[0].shares.values()] == [(297, 300), (297, 397)]
+    assert [(one.samples, one.total) for one in result.runs[0].shares.values()] == [(297, 300), (297, 397)]
     with pytest.raises(LogError) as error:
         urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", tsp=0.0051, strict=True)
     assert "resampled" in {one.kind for one in error.value.findings}

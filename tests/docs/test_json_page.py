@@ -56,7 +56,7 @@ def printed() -> list[dict[str, Any]]:
 
 def test_each_key_is_named(printed: list[dict[str, Any]]) -> None:
     assert keys(printed) - NAMED == set()
-    assert {"from", "half_period", "share_out", "sample_max"} <= keys(printed)
+    assert {"from", "half_period", "out_fraction", "sample_max"} <= keys(printed)
 
 
 def test_each_key_of_inverse_kinematics_is_named() -> None:
@@ -69,9 +69,9 @@ def test_each_key_of_inverse_kinematics_is_named() -> None:
     path = urmpipe.ik(poses, arm, tsp=0.01, start=q[0])
     found = path.to_dict()
     assert found["jumps"]
-    assert found["too_fast"]
+    assert found["speed_violations"]
     assert keys(found) - NAMED == set()
-    assert {"branch", "nearest", "singular", "last_row", "steps", "miss", "smallest"} <= keys(found)
+    assert {"branch", "nearest", "singular", "last_row", "steps", "position_error", "smallest"} <= keys(found)
     assert keys(urmpipe.ik(poses, arm).to_dict()) <= keys(found)
 
 
@@ -80,7 +80,7 @@ def test_each_key_of_a_diagnosis_is_named() -> None:
     (one,) = urmpipe.compare(LOGS / "path.csv", run).runs
     found = keys(replace(one, diagnosis=diagnosis_of(one)).to_dict())
     assert found - NAMED == set()
-    assert {"rms_before", "from_sample", "needs", "reason", "words"} <= found
+    assert {"rms_before", "from_sample", "discriminating_joint", "reason", "interpretation"} <= found
 
 
 @pytest.mark.slow

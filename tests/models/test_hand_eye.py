@@ -206,7 +206,7 @@ def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
         assert_near(fitted(found, truth).measured, truth.measured, 1e-9)
         for direction in found.unobservable:
             assert np.linalg.norm(direction.axis) == pytest.approx(1.0)
-            assert direction.seen < 1e-7  # the root of rounding
+            assert direction.sensitivity < 1e-7  # the root of rounding
             assert direction.part != "tool offset" or abs(found.tool_position @ direction.axis) <= 1e-9
         if with_turns:
             assert_near(fitted(found, truth).measured_rotation, truth.measured_rotation, 1e-9)
@@ -228,8 +228,8 @@ def test_a_tool_that_hardly_turns_is_found_with_a_low_sensitivity() -> None:
     assert [direction.part for direction in found.unobservable] == OFFSETS
     for direction in found.unobservable:
         spun = truth.rotation @ direction.axis
-        assert direction.seen == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)
-        assert direction.seen < hand_eye.WEAK_SENSITIVITY
+        assert direction.sensitivity == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)
+        assert direction.sensitivity < hand_eye.WEAK_SENSITIVITY
 
 
 @pytest.mark.slow

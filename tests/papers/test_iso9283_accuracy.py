@@ -26,9 +26,9 @@ from urmpipe_models.drives import DrivenJoint, PassiveJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.accuracy.driven_motion import Errors
+from urmpipe_pipeline.accuracy.driven_motion import TrackingErrors
 from urmpipe_pipeline.accuracy.published import FIG7
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 
 needs_native = pytest.mark.skipif(
     bool(native_unavailable_reason(())), reason=f"runs native FMUs: {native_unavailable_reason(())}"
@@ -59,13 +59,13 @@ def irb60() -> Chain:
 
 
 @cache
-def on_the_contour() -> Accuracy:
+def on_the_contour() -> AccuracyResult:
     """The arm on the contour at the paper's velocities, beside its running speed, and slowly."""
     velocities = {one.velocity for one in FIG7} | {*BESIDE, *SLOW}
     return accuracy(CONTOUR, irb60(), velocities=sorted(velocities))
 
 
-def errors_at(velocities: Iterable[float]) -> list[Errors]:
+def errors_at(velocities: Iterable[float]) -> list[TrackingErrors]:
     """Return the errors of the arm on the contour at some of these velocities in [m/s]."""
     by_velocity = {one.velocity: one for one in on_the_contour().errors}
     return [by_velocity[one] for one in velocities]
@@ -195,7 +195,7 @@ def test_at_rest_after_the_contour_the_voltages_do_not_swing(velocity: float) ->
 @pytest.mark.slow
 @needs_native
 def test_below_0_3_m_s_no_voltage_is_at_its_limit() -> None:
-    assert max(one.saturated for one in errors_at(SLOW)) <= 0.01  # but in one sample of a hundred
+    assert max(one.saturated_share for one in errors_at(SLOW)) <= 0.01  # but in one sample of a hundred
 
 
 # How it is computed
@@ -226,7 +226,7 @@ def test_machine_code_and_numpy_run_alike(tmp_path: Path) -> None:
     for one, other in zip(native.motions, numpy.motions, strict=True):
         assert one.errors.error is not None
         assert one.errors.error > 1e-3  # m: it is moved
-        for key in ("error", "path_error", "saturated"):
+        for key in ("error", "path_error", "saturated_share"):
             assert getattr(one.errors, key) == pytest.approx(getattr(other.errors, key), rel=1e-6)
         for key in ("q", "qd", "voltage", "current"):
             values = getattr(other, key)

@@ -16,7 +16,7 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.simulations.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedArm, SimulatedBlock, Simulation
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
 STEP = 0.005
@@ -71,7 +71,7 @@ def build_simulation(
                 "chain", "unit", "kinematic_chain", "b" * 32, (Setting("r[1]", 0.243215, "m"),), "An arm"
             ),
             SimulatedBlock(
-                "meter", "fmu", "meter.fmu", "{c}", (Setting("tolerance", tolerance, "m", given=True),)
+                "meter", "fmu", "meter.fmu", "{c}", (Setting("tolerance", tolerance, "m", from_system=True),)
             ),
         ),
         failed=failed,
@@ -81,7 +81,7 @@ def build_simulation(
             "2021-03-04T05:06:07+00:00",
         ),
         connections={"chain.phi": "log.q", "meter.actual": "chain.p7"},
-        arms=(Arm("chain", chain, q),),
+        arms=(SimulatedArm("chain", chain, q),),
         verdicts=(verdict,) if verdict else (),
     )  # fmt: skip
 

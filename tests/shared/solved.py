@@ -12,7 +12,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.provenance import build_provenance
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 
 FILE = SourceFile("targets.csv", "0" * 64, 123)
 
@@ -27,7 +27,7 @@ def solved(
     reasons: tuple[str, ...] = (),
     targets: Targets | None = None,
     **rest: Any,
-) -> SolvedTargets:
+) -> IkResult:
     """Return targets with the solution chosen for each.
 
     Args:
@@ -45,12 +45,13 @@ def solved(
     texts = np.full((n, k), "", dtype=np.object_)
     texts[:, 0] = reasons or ""
     start = 0 if t_ns is None or not len(t_ns) else int(t_ns[0])
-    made = SolvedTargets(
+    made = IkResult(
         name=name, robot=chain, method="iterative", row=np.arange(1, n + 1),
         t_ns=None if t_ns is None else t_ns - start, clock_start_ns=start,
         targets=forward_targets(chain, q) if targets is None else targets,
         solutions=Solutions(every, ("chosen", *(others or {})), texts), chosen=np.zeros(n, dtype=np.intp),
-        miss=np.zeros((n, k)), angle=np.zeros((n, k)), every=others is not None, branches=None, path=None,
+        position_error=np.zeros((n, k)), angle=np.zeros((n, k)), all_solutions=others is not None,
+        branches=None, path=None,
         warnings=(), provenance=build_provenance("ik", {"robot": chain.name}, [FILE]),
     )  # fmt: skip
     return replace(made, **rest)

@@ -34,7 +34,7 @@ from urmpipe_models.errors import (
 from urmpipe_models.planning.laws import Arcs
 from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
-from urmpipe_pipeline.accuracy.result import DECIDES, FASTEST, Accuracy, Decides
+from urmpipe_pipeline.accuracy.result import DECIDES, FASTEST, AccuracyResult, Decides
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import HEAD, PATH_ROW
 from urmpipe_pipeline.planned_paths.given_path import given_path
@@ -86,7 +86,7 @@ def accuracy(
     told: Callable[[str], None] | None = None,
     progress: Callable[[float], None] | None = None,
     **reading: Unpack[UntimedReading],
-) -> Accuracy:
+) -> AccuracyResult:
     """Run an arm with drives along a path at some velocities, and measure how far it is from it.
 
     The path is planned at each velocity, its set points lead the controllers of the unit `driven_arm`, and
@@ -240,9 +240,9 @@ def _runs(
         """Return the path at a velocity; raise a `PathError` if the arm cannot move so."""
         timing = replace(request.timing, velocity=velocity, tsp=float(period))
         found = plan_path(given, replace(request, timing=timing), joints=along)
-        if found.obstacles:
-            one = found.obstacles[0]
-            raise PathError(given.finding(one.row, one.words, "a path that the arm can follow"))
+        if found.infeasibilities:
+            one = found.infeasibilities[0]
+            raise PathError(given.finding(one.row, one.message, "a path that the arm can follow"))
         return found
 
     joints = plan(first).joints
@@ -279,7 +279,7 @@ def _accuracy(
     limit: float | None,
     error: Decides,
     notes: Sequence[LogWarning],
-) -> Accuracy:
+) -> AccuracyResult:
     """Return the result of runs."""
     arm, timing = runs.arm.robot, request.timing
     longest = max(motions, key=len)
@@ -288,7 +288,7 @@ def _accuracy(
     every = {one.velocity: one.errors for one in runs.motions.values()}
     options: dict[str, Any] = {**timing.options, "robot": arm.name, "force": list(runs.arm.force)}
     options |= {"velocities": [one.velocity for one in motions], "limit": limit, "error": error}
-    return Accuracy(
+    return AccuracyResult(
         name=given.name,
         robot=arm,
         rows=given.rows,
@@ -298,10 +298,10 @@ def _accuracy(
         period=float(np.diff(longest.t_ns[:2])[0]) / 1e9,
         force=runs.arm.force,
         motions=tuple(motions),
-        tried=() if limit is None else tuple(one for _, one in sorted(every.items())),
+        probed=() if limit is None else tuple(one for _, one in sorted(every.items())),
         running=None if speed is None else runs.motions[speed],
         limit=limit,
-        decides=error,
+        limited_error=error,
         loop_radius=radius,
         compiled=runs.compiled,
         warnings=(*given.warnings, *notes, *_warnings(motions, radius, speed)),

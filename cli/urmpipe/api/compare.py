@@ -25,7 +25,7 @@ from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, map_collecting_errors
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison.comparison import Comparison, Unjudged, judge_others
+from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog, judge_others
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.verdict import parse_tolerance
 from urmpipe_pipeline.comparison.warnings import CLOCKS_DIFFER, LARGE_NOISE, SWAPPED, large_noises
@@ -184,7 +184,7 @@ def compare(
             return made
 
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
-        unjudged: list[Unjudged] | None = [] if keep_going else None
+        unjudged: list[FailedLog] | None = [] if keep_going else None
         made = checked(made) if made else _compared(operands, load, options, checked, unjudged)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         shown = present(result)
@@ -256,7 +256,7 @@ def _compared(
     load: Callable[..., list[Run]],
     options: CompareOptions,
     checked: Callable[[Comparison], Comparison],
-    unjudged: list[Unjudged] | None,
+    unjudged: list[FailedLog] | None,
 ) -> Comparison:
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
     if any(isinstance(one, Comparison) for one in operands):
@@ -273,7 +273,7 @@ def _compared(
 
     if unjudged is None:
         return judge(others)
-    return replace(judge_others(judge, others, unjudged), unjudged=tuple(unjudged))
+    return replace(judge_others(judge, others, unjudged), failed_logs=tuple(unjudged))
 
 
 def _made_before(reference: Operand | Comparison, output: PathLike | None) -> Comparison | None:

@@ -101,5 +101,5 @@ def diagnose(
     (run,) = made.runs
     if run.diagnosis is None:
         raise TypeError(f"{made.name} was compared without a diagnosis")
-    told = (*run.diagnosis.warnings, *made.own_warnings, *made.warnings_of(run))
+    told = (*run.diagnosis.warnings, *made.general_warnings, *made.warnings_of(run))
     return replace(run.diagnosis, warnings=told, recording=made.recording, comparison=made)

@@ -23,7 +23,7 @@ from urmpipe_pipeline.outputs import check_output, safe_output
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
 from urmpipe_pipeline.solved_targets.request import JointValues, Request, refuse_unsolvable, start_of
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables.csv_files import write_joint_log
@@ -58,7 +58,7 @@ def ik(
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
     **reading: Unpack[TableReading],
-) -> SolvedTargets:
+) -> IkResult:
     """Find the joint values that bring an arm's tool to targets, limits kept. See docs/ik.md.
 
     Targets without times stand for themselves; with times they are a path, followed without a jump where
@@ -145,7 +145,7 @@ def _given(
     return given_targets(targets, t, tsp, read)
 
 
-def _write_joints(result: SolvedTargets, path: Path, kept: Sequence[Path]) -> None:
+def _write_joints(result: IkResult, path: Path, kept: Sequence[Path]) -> None:
     """Write the solutions nearest to the start as a joint log; rows that have none are left out.
 
     Raises:

@@ -123,7 +123,7 @@ def plan(
         writing = None if progress is None else lambda done: progress(share + (1.0 - share) * done)
         write_recording(result, written, kept, writing)
         return replace(result, recording=written)
-    if result.obstacles:
+    if result.infeasibilities:
         said = f"{written} is not written: the arm cannot follow the plan"
         return replace(result, warnings=(*result.warnings, LogWarning("not-written", said)))
     _write_log(result, written, kept)

@@ -15,7 +15,7 @@ from urmpipe.options.reading import path_options
 from urmpipe.options.types import DEVIATION, OneOf, quantity_type
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.accuracy.result import Accuracy
+    from urmpipe_pipeline.accuracy.result import AccuracyResult
 
 
 @click.command(cls=HeadedCommand, short_help="Measure the path error of an arm with drives.")
@@ -93,7 +93,7 @@ def accuracy(path: str, output: Path | None, terminal: Terminal, **options: Any)
     return 1 if result.verdict == "fail" else 0
 
 
-def _print(result: Accuracy, replaces: bool) -> None:
+def _print(result: AccuracyResult, replaces: bool) -> None:
     """Print what the runs came to, and what was written."""
     from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording

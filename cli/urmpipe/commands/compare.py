@@ -195,7 +195,7 @@ def compare(
     terminal.tell_failure(result)
     if result.errors:
         print_findings(result.errors, as_json=False)
-    if result.verdict == "fail" and not result.unjudged:
+    if result.verdict == "fail" and not result.failed_logs:
         return 1
     return 2 if result.errors else 0
 

@@ -84,7 +84,7 @@ def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     click.echo(AS_EXPECTED if as_expected else f"These verdicts differ from the expected ones: {EXPECTED}")
     for one in result.runs:
         if one.diagnosis is not None:
-            say(f"  {one.name}: {one.diagnosis.sentence}")
+            say(f"  {one.name}: {one.diagnosis.summary}")
     say(f"Logs:      {LOGS}  (try the commands with them)")
     say(f"Report:    {report.path}  (open it in any browser)")
     print_recording(result.recording)

@@ -15,7 +15,7 @@ from urmpipe.options.reading import table_options
 from urmpipe.options.types import ANY_FILE, DEVIATION, DURATION, JOINT_VALUES, OneOf, WholeType, parsed
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.solved_targets.result import SolvedTargets
+    from urmpipe_pipeline.solved_targets.result import IkResult
 
 
 def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -123,7 +123,7 @@ def ik(
     return 0 if result.verdict == "pass" else 1
 
 
-def _print(result: SolvedTargets, robot: str | None, replaces: bool) -> None:
+def _print(result: IkResult, robot: str | None, replaces: bool) -> None:
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_recording, say

@@ -158,7 +158,7 @@ def _name_map(hints: Sequence[Hint]) -> Iterator[Hint]:
     for hint in hints:
         if not hint.call and hint.parameter in IN_MAP:
             source = f"from urmpipe ingest {hint} {Hint('write_map')}"
-            yield Hint("log_map", None, f"{source} {hint.does}".strip())
+            yield Hint("log_map", None, f"{source} {hint.effect}".strip())
         elif hint.call or hint.parameter not in NOT_IN_MAP:
             yield hint
 

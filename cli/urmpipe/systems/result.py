@@ -25,11 +25,11 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.measure_units import readings
 from urmpipe_models.toml_tables import quote_toml
-from urmpipe_pipeline.comparison.verdict import DeltaVerdict, delta_verdict
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.coupling import coupling_warnings
-from urmpipe_pipeline.simulations.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedArm, SimulatedBlock, Simulation
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
 TOLERANCE = "tolerance"  # parameter of a delta meter that its verdict depends on
@@ -55,7 +55,7 @@ def check_meters(plan: Plan, blocks: Blocks) -> None:
             faults.append(f"block {block.name}: tolerance: found {start}, allowed: {allowed}")
     if faults:
         raise OptionError(*faults)
-    questions = [warning.as_finding() for warning in blocks.warnings if warning.asks]
+    questions = [warning.as_finding() for warning in blocks.warnings if warning.blocks_verdict]
     if meters and questions:
         raise LogError(*questions)
 
@@ -211,7 +211,7 @@ def _start_value(plan: Plan, port: Port) -> float:
     return _parse_number(starts.get(port.variable, 0.0 if default is None else default))
 
 
-def _iter_robots(plan: Plan, recorded: CosimulationRecord, blocks: Blocks) -> Iterator[Arm]:
+def _iter_robots(plan: Plan, recorded: CosimulationRecord, blocks: Blocks) -> Iterator[SimulatedArm]:
     """Yield the robot of each block of kinematics with its joints: of a unit, or of an FMU of that unit."""
     for block in plan.system.blocks:
         chain = read_robot_entry(block.fmu) if block.fmu else blocks.chains.get(block.name)
@@ -221,7 +221,7 @@ def _iter_robots(plan: Plan, recorded: CosimulationRecord, blocks: Blocks) -> It
         inputs = {variable.name for variable in plan.interfaces[block.name].inputs}
         if {port.variable for port in ports} <= inputs:  # an FMU of another unit computes its joints
             columns = [_input_values(plan, recorded, port) for port in ports]
-            yield Arm(block.name, chain, np.column_stack(columns))
+            yield SimulatedArm(block.name, chain, np.column_stack(columns))
 
 
 def _iter_joint_inputs(chain: Chain) -> Iterator[str]:
@@ -242,7 +242,7 @@ def _input_values(plan: Plan, recorded: CosimulationRecord, destination: Port) -
 
 def _iter_verdicts(
     plan: Plan, recorded: CosimulationRecord, non_finite: Mapping[Port, NonFiniteValues]
-) -> Iterator[DeltaVerdict]:
+) -> Iterator[DeltaMeterResult]:
     for name in _meter_names(plan.system) if len(recorded.t_ns) else ():
         columns = [recorded.column(name, f"delta[{i}]") for i in (1, 2, 3)]
         tolerance = {"axis": _start_value(plan, Port(name, TOLERANCE))}

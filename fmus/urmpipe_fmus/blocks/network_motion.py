@@ -101,7 +101,7 @@ def network_motion(
         is_reached = branch is None or branch.complete
         assembled = single_assembly(mechanism, x, "") if is_reached else assemble(mechanism, values)
     if not assembled.assemblies:
-        gap = assembled.gaps[0]
+        gap = assembled.closure_errors[0]
         raise UnitError(
             f"unit network_motion: {loaded.name} does not close: found a gap of {gap.metres:g} m and"
             f" {gap.radians:g} rad at {gap.name}, allowed: {CLOSED_TOLERANCE:g}; see urmpipe network check"

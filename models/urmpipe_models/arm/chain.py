@@ -315,8 +315,8 @@ def frame_to_steps(frame: Transform) -> tuple[Transform | Step, ...]:
 
     A frame without them becomes x, y, z, its rotation as a constant, and rotations by 0 about z, y, x.
     """
-    if frame.made_of is not None:
-        return frame.made_of
+    if frame.steps is not None:
+        return frame.steps
     x, y, z = frame.translation
     return (
         Step("along", "x", x, source="frame"),

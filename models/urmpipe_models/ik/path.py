@@ -207,7 +207,7 @@ def _build_path(
         jumps,
         _find_speed_violations(chain, motion.q, seconds),
         tuple(
-            SingularStretch(family, first, last, float(seconds[first]), float(seconds[last]))
+            SingularInterval(family, first, last, float(seconds[first]), float(seconds[last]))
             for family, where in motion.families.items()
             for first, last in find_true_runs(where)
         ),
@@ -268,7 +268,7 @@ def _approach_missed(
     for first, end in runs:
         rows = slice(first, end + 1)
         q[rows] = unwrap_within_limits(chain, q[rows], before[first])
-    motion.shortfall[missed] = near.shortfall[:, 0]
+    motion.shortfall[missed] = near.position_residual[:, 0]
     branch[missed[reached]] = near.labels[reached, 0]
 
 
@@ -396,10 +396,10 @@ class JointPath:
         branch: Name of each solution, shape (n,), empty where there is none: of a closed form its
             branch, otherwise "1", and a number more after each jump.
         reasons: Why there is none, one line, shape (n,); empty where there is one.
-        shortfall: Distance of the tool from a target that it comes near to, in [m], shape (n,); 0 where
-            the target is met.
+        position_residual: Distance of the tool from a target that it comes near to, in [m], shape (n,);
+            0 where the target is met.
         jumps: Steps that leave the path; see `find_jumps`.
-        too_fast: Stretches along which a joint exceeds its speed limit.
+        speed_violations: Stretches along which a joint exceeds its speed limit.
         singular: Stretches in families of singular poses; of closed forms only.
     """
 
@@ -410,10 +410,10 @@ class JointPath:
     q: FloatArray
     branch: TextArray
     reasons: TextArray
-    shortfall: FloatArray
-    jumps: tuple[Jump, ...]
-    too_fast: tuple[SpeedViolation, ...]
-    singular: tuple[SingularStretch, ...]
+    position_residual: FloatArray
+    jumps: tuple[BranchJump, ...]
+    speed_violations: tuple[SpeedViolation, ...]
+    singular: tuple[SingularInterval, ...]
 
     def __len__(self) -> int:
         return len(self.q)
@@ -447,7 +447,7 @@ class JointStep:
 
 
 @dataclass(frozen=True, slots=True)
-class Jump:
+class BranchJump:
     """A step from one sample to the next that leaves the path.
 
     Attributes:
@@ -519,7 +519,7 @@ def _build_jumps(
     seconds: FloatArray,
     position: FloatArray,
     branch: TextArray,
-) -> tuple[Jump, ...]:
+) -> tuple[BranchJump, ...]:
     """Return the jumps that lead from samples `before` to `samples`, both of shape (m,)."""
     units = ["m" if joint.kind == "prismatic" else "rad" for joint in chain.moving]
     jumps = []
@@ -529,7 +529,7 @@ def _build_jumps(
         joints = tuple(JointStep(chain.coordinates[k], float(steps[k]), units[k]) for k in large)
         x, y, z = position[sample].tolist()
         t = float(seconds[sample])
-        jumps.append(Jump(sample, last, t, (x, y, z), branch[last], branch[sample], joints))
+        jumps.append(BranchJump(sample, last, t, (x, y, z), branch[last], branch[sample], joints))
     return tuple(jumps)
 
 
@@ -588,7 +588,7 @@ def _find_speed_violations(chain: Chain, q: FloatArray, seconds: FloatArray) -> 
 
 
 @dataclass(frozen=True, slots=True)
-class SingularStretch:
+class SingularInterval:
     """A stretch of a path in a family of singular poses.
 
     Attributes:

@@ -119,13 +119,13 @@ class LeastMotionPath:
         rows = slice(sample, sample + self._at_once)
         targets = self.targets.rows(rows)
         solutions = solve(self.chain, targets, start=last, method="iterative", search=self.search)
-        met = solutions.reached[:, 0] & (solutions.shortfall[:, 0] == 0.0)
+        met = solutions.reached[:, 0] & (solutions.position_residual[:, 0] == 0.0)
         reached = solutions.reached[:, 0]
         other = met | (reached != reached[0])
         count = 1 if met[0] else int(np.argmax(np.append(other, True)))
         self._at_once = min(MAX_AT_ONCE, GROWTH * self._at_once) if count == len(met) and not met[0] else 1
         self.reasons[sample : sample + count] = solutions.reasons[:count, 0]
-        self.shortfall[sample : sample + count] = solutions.shortfall[:count, 0]
+        self.shortfall[sample : sample + count] = solutions.position_residual[:count, 0]
         return unwrap_within_limits(self.chain, solutions.q[:count, 0], last)
 
 

@@ -217,7 +217,7 @@ def _with_nearest_points(attempts: _Attempts, solutions: Solutions, search: Sear
     reasons[missing] = f"no further solution {attempted}"
     for row in np.flatnonzero(missing.all(axis=1)):
         reasons[row] = _reason(attempts, int(row), search.tolerance, attempted)
-    return replace(solutions, q=q, reasons=reasons, labels=labels, shortfall=shortfall)
+    return replace(solutions, q=q, reasons=reasons, labels=labels, position_residual=shortfall)
 
 
 def _within_tolerance(attempts: _Attempts, tolerance: float | None) -> BoolArray:

@@ -152,7 +152,7 @@ class SearchOptions:
     Attributes:
         tolerance: In [m] along each axis: a target out of reach takes the nearest point that the tool can
             get to if it is no farther away than this, and turned by no more than tolerance / l with l of
-            `orientation_length`; `Solutions.shortfall` is the distance. None: it has no solution.
+            `orientation_length`; `Solutions.position_residual` is the distance. None: it has no solution.
         restarts: Random starts of the iterative solver for what it does not reach from the start.
         seed: Of the random starts: the same seed, the same solutions.
     """
@@ -221,8 +221,8 @@ class Solutions:
             reason of the selection.
         reasons: Why there is no solution, one line, shape (n, k); empty where there is one.
         singular: The families of singular poses that solutions lie in.
-        shortfall: Distance of the tool from a target that it need only come near to, in [m], shape (n, k);
-            0, the default, where the target is met.
+        position_residual: Distance of the tool from a target that it need only come near to, in [m],
+            shape (n, k); 0, the default, where the target is met.
         labels: Name of each solution, shape (n, k); by default that of its column, `branches`.
     """
 
@@ -230,13 +230,13 @@ class Solutions:
     branches: tuple[str, ...]
     reasons: TextArray
     singular: tuple[SingularPoses, ...] = ()
-    shortfall: FloatArray = field(default_factory=lambda: np.zeros(()))
+    position_residual: FloatArray = field(default_factory=lambda: np.zeros(()))
     labels: TextArray = field(default_factory=lambda: np.array("", dtype=np.object_))
 
     def __post_init__(self) -> None:
         shape = self.q.shape[:2]
         labels = self.labels if self.labels.ndim else np.array(self.branches, dtype=np.object_)
-        object.__setattr__(self, "shortfall", np.broadcast_to(self.shortfall, shape))
+        object.__setattr__(self, "position_residual", np.broadcast_to(self.position_residual, shape))
         object.__setattr__(self, "labels", np.broadcast_to(labels, shape))
 
     def __len__(self) -> int:
@@ -301,7 +301,7 @@ class Solutions:
             (name,),
             pick(self.reasons),
             tuple(replace(poses, where=pick(poses.where)) for poses in self.singular),
-            pick(self.shortfall),
+            pick(self.position_residual),
             pick(self.labels),
         )
 
@@ -350,7 +350,7 @@ def concatenate_solutions(parts: Sequence[Solutions]) -> Solutions:
         branches,
         joined([part.reasons for part in parts], ""),
         tuple(singular_poses(*family) for family in families),
-        joined([part.shortfall for part in parts], 0.0),
+        joined([part.position_residual for part in parts], 0.0),
         joined([part.labels for part in parts], ""),
     )
 

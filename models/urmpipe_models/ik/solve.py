@@ -158,12 +158,12 @@ def _insert_nearest(solutions: Solutions, missed: BoolArray, nearest: Solutions)
     """Return solutions with those of missed targets, one each, in the first column."""
     near = nearest.reached[:, 0]
     met = np.flatnonzero(missed)[near]
-    q, shortfall = solutions.q.copy(), solutions.shortfall.copy()
+    q, shortfall = solutions.q.copy(), solutions.position_residual.copy()
     reasons, labels = solutions.reasons.copy(), solutions.labels.copy()
-    q[met, 0], shortfall[met, 0] = nearest.q[near, 0], nearest.shortfall[near, 0]
+    q[met, 0], shortfall[met, 0] = nearest.q[near, 0], nearest.position_residual[near, 0]
     reasons[met, 0] = ""
     labels[met, 0] = np.where(shortfall[met, 0] > 0.0, NEAREST_POINT, NO_BRANCH)
-    return replace(solutions, q=q, reasons=reasons, shortfall=shortfall, labels=labels)
+    return replace(solutions, q=q, reasons=reasons, position_residual=shortfall, labels=labels)
 
 
 def _insert_invalid(solutions: Solutions, valid: BoolArray, reasons: list[str]) -> Solutions:
@@ -171,13 +171,13 @@ def _insert_invalid(solutions: Solutions, valid: BoolArray, reasons: list[str]) 
     every = empty_solutions(reasons, solutions.branches, solutions.q.shape[2])
     every.q[valid], every.reasons[valid] = solutions.q, solutions.reasons
     shortfall, labels = np.zeros(every.q.shape[:2]), every.labels.copy()
-    shortfall[valid], labels[valid] = solutions.shortfall, solutions.labels
+    shortfall[valid], labels[valid] = solutions.position_residual, solutions.labels
     singular = []
     for poses in solutions.singular:
         where = np.zeros((len(valid), poses.where.shape[1]), dtype=bool)
         where[valid] = poses.where
         singular.append(replace(poses, where=where))
-    return replace(every, singular=tuple(singular), shortfall=shortfall, labels=labels)
+    return replace(every, singular=tuple(singular), position_residual=shortfall, labels=labels)
 
 
 def _start_faults(chain: Chain, count: int, start: FloatArray | None) -> Iterator[Finding]:

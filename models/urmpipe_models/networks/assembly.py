@@ -64,7 +64,7 @@ class Assembly:
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
+class ClosureError:
     """What does not close.
 
     Attributes:
@@ -90,8 +90,8 @@ class AssemblyResult:
         assemblies: The assemblies; empty if nothing closes.
         nearest: What comes nearest to closing where nothing closes.
         x_nearest: Its variables in [m] and [rad], shape (variables,); of the first assembly if there is one.
-        gaps: What does not close there, the largest first.
-        tried: Number of starts until one closed, or for all assemblies, the network's start counted.
+        closure_errors: What does not close there, the largest first.
+        start_count: Number of starts until one closed, or for all assemblies, the network's start counted.
         reason: Why the search ended.
         elsewhere: Whether only a random start closed, not the network's.
         continuum: Dimension of the assemblies with controls and idle spins held; 0 if they are separate.
@@ -103,8 +103,8 @@ class AssemblyResult:
     assemblies: tuple[Assembly, ...]
     nearest: Assembly | None
     x_nearest: FloatArray
-    gaps: tuple[Gap, ...]
-    tried: int
+    closure_errors: tuple[ClosureError, ...]
+    start_count: int
     reason: str
     elsewhere: bool
     continuum: int
@@ -400,17 +400,19 @@ def body_poses(mechanism: Mechanism, x: FloatArray) -> FloatArray:
     return poses
 
 
-def _find_gaps(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
+def _find_gaps(mechanism: Mechanism, x: FloatArray) -> tuple[ClosureError, ...]:
     """Return what does not close at variables x, shape (variables,), in [m] and [rad], the largest first."""
     residual = evaluate_closure(mechanism, x[:, np.newaxis]).residual[:, 0]
     network, graph = mechanism.network, mechanism.graph
     gaps = []
     for k, cut in enumerate(graph.cuts):
         metres, radians = (float(np.linalg.norm(part)) for part in np.split(residual[6 * k : 6 * k + 6], 2))
-        gaps.append(Gap(network.joints[cut].name, graph.loops[k], metres, radians))
+        gaps.append(ClosureError(network.joints[cut].name, graph.loops[k], metres, radians))
     errors = np.abs(residual[6 * len(graph.cuts) :]).tolist()
     for element, unit, error in zip(network.elements, network.element_units, errors, strict=True):
-        gaps.append(Gap(element.name, (element.name,), *((error, 0.0) if unit == "m" else (0.0, error))))
+        gaps.append(
+            ClosureError(element.name, (element.name,), *((error, 0.0) if unit == "m" else (0.0, error)))
+        )
     sizes = [max(gap.metres / mechanism.length, gap.radians) for gap in gaps]
     worst_first = sorted(zip(sizes, gaps, strict=True), key=lambda pair: -pair[0])
     return tuple(gap for size, gap in worst_first if size > CLOSED_TOLERANCE)

@@ -80,8 +80,8 @@ class Mobility:
         rank: Of the Jacobian.
         kutzbach: 6 (bodies - 1) - sum of (6 - f) - elements - values set by controls.
         redundant: Constraints whose release would free nothing; there are mobility - kutzbach of them.
-        idle: Bodies that spin about the line through two global joints and move nothing else; those that spin
-            together joined by " + ".
+        passive: Bodies that spin about the line through two global joints and move nothing else; those that
+            spin together joined by " + ".
         nearby: The mobility at assembled configurations near to this one.
     """
 
@@ -89,7 +89,7 @@ class Mobility:
     rank: int
     kutzbach: int
     redundant: tuple[RedundantConstraint, ...]
-    idle: tuple[str, ...]
+    passive: tuple[str, ...]
     nearby: int
 
     @property
@@ -105,7 +105,7 @@ class Mobility:
     @property
     def kind(self) -> NetworkKind:
         """A mechanism if anything except idle spins moves, else a structure."""
-        return "mechanism" if self.nearby > len(self.idle) else "structure"
+        return "mechanism" if self.nearby > len(self.passive) else "structure"
 
 
 def analyse_mobility(mechanism: Mechanism, x: FloatArray) -> Mobility:

@@ -369,7 +369,7 @@ def _read_step(table: CheckedTable, units: Units) -> Transform | Step:
         value = (units.length if kind == "along" else units.angle)(table.number("value", 0.0))
         step = Step(kind, axis, value, table.text("name", ""), table.text("source", ""))
     else:
-        step = replace(_read_rigid(table, units), made_of=None)
+        step = replace(_read_rigid(table, units), steps=None)
     table.report_unknown_keys()
     return step
 
@@ -414,7 +414,7 @@ def _read_visual(table: CheckedTable, units: Units) -> Visual:
     visual = Visual(
         table.text("joint", "") if table.has("joint") else None,
         _read_shape(table, units),
-        replace(_read_frame(table.table("origin"), units), made_of=None),
+        replace(_read_frame(table.table("origin"), units), steps=None),
         cast("Colour", table.numbers("colour", 4)) if table.has("colour") else None,
     )
     table.report_unknown_keys()
@@ -540,9 +540,9 @@ def _frame_to_dict(frame: Transform) -> dict[str, Any]:
         "translation": [float(value) for value in frame.translation],
         "rotation": [[float(value) for value in row] for row in frame.rotation],
     }
-    if frame.made_of is None:
+    if frame.steps is None:
         return numbers
-    return {**numbers, "steps": [_step_to_dict(step) for step in frame.made_of]}
+    return {**numbers, "steps": [_step_to_dict(step) for step in frame.steps]}
 
 
 def _step_to_dict(step: Transform | Step) -> dict[str, Any]:

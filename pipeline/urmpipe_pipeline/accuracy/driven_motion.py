@@ -14,7 +14,7 @@ from urmpipe_pipeline.joint_log import ns_to_seconds
 
 
 @dataclass(frozen=True, slots=True)
-class Diverged:
+class Divergence:
     """The end of a motion that leaves its set points by more than a turn.
 
     Attributes:
@@ -27,7 +27,7 @@ class Diverged:
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class TrackingErrors:
     """The errors of a motion, and how often a drive was at its voltage limit.
 
     Attributes:
@@ -35,7 +35,7 @@ class Errors:
         reached: The largest speed of the plan in [m/s].
         error: Largest distance from the set point of the same time in [m]; None if it diverged.
         path_error: Largest distance from the nearest point of the path in [m]; None if it diverged.
-        saturated: Fraction of the samples at which a voltage is at its limit, 0..1; until it diverged.
+        saturated_share: Fraction of the samples at which a voltage is at its limit, 0..1; until it diverged.
         diverged: Where it left its set points; None if it did not.
     """
 
@@ -43,8 +43,8 @@ class Errors:
     reached: float
     error: float | None
     path_error: float | None
-    saturated: float
-    diverged: Diverged | None
+    saturated_share: float
+    diverged: Divergence | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class DrivenMotion:
         voltage: Of the drives in [V], shape (n, d).
         current: Of the drives in [A], shape (n, d).
         limits: Their largest voltages in [V], shape (d,).
-        corner_ns: Times at which the middles of the path's arcs are passed in integer [ns], shape (arcs,).
+        corner_times_ns: Times at the middles of the path's arcs in integer [ns], shape (arcs,).
         diverged: Where it ended early; None if it did not.
     """
 
@@ -80,8 +80,8 @@ class DrivenMotion:
     voltage: FloatArray
     current: FloatArray
     limits: FloatArray
-    corner_ns: IntArray
-    diverged: Diverged | None
+    corner_times_ns: IntArray
+    diverged: Divergence | None
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -117,15 +117,15 @@ class DrivenMotion:
         return int(np.argmax(self.delta[:, 3]))
 
     @property
-    def errors(self) -> Errors:
+    def errors(self) -> TrackingErrors:
         """Its largest distances."""
         has_diverged = self.diverged is not None
         saturated = (np.abs(self.voltage) >= self.limits).any(axis=1)
-        return Errors(
+        return TrackingErrors(
             velocity=self.velocity,
             reached=float(self.speed.max()),
             error=None if has_diverged else float(self.delta[:, 3].max()),
             path_error=None if has_diverged else float(self.from_path.max()),
-            saturated=float(saturated.mean()),
+            saturated_share=float(saturated.mean()),
             diverged=self.diverged,
         )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.presentation.exports import (
     ExportColumn,
     Exports,
@@ -22,13 +22,13 @@ from urmpipe_pipeline.runs.exports import export_metadata, poses_by_kinematics
 from urmpipe_pipeline.text import encodable
 
 
-def exports(result: Accuracy) -> Exports:
+def exports(result: AccuracyResult) -> Exports:
     """Return what can leave of an accuracy."""
     about = export_metadata(result.name, result.provenance) | {
         "robot": result.robot.name,
         "running_speed": result.running_speed,
         "limit": result.limit,
-        "decides": result.decides,
+        "limited_error": result.limited_error,
         "verdict": result.verdict,
     }
     rows = {
@@ -38,17 +38,19 @@ def exports(result: Accuracy) -> Exports:
     return Exports("accuracy", about, rows, {"": lambda rows: _poses(result)}, {})
 
 
-def velocities_table(result: Accuracy) -> ExportTable:
+def velocities_table(result: AccuracyResult) -> ExportTable:
     """Return the errors of the velocities that were asked for; NaN where the motion diverged."""
-    rows = [(one.velocity, one.reached, one.error, one.path_error, one.saturated) for one in result.errors]
+    rows = [
+        (one.velocity, one.reached, one.error, one.path_error, one.saturated_share) for one in result.errors
+    ]
     names, units = ("velocity", "reached", "error", "path_error"), ("m/s", "m/s", "m", "m")
     values = np.array(rows, dtype=np.float64)
     return ExportTable(
-        (*columns_of(names, units, values[:, :4]), ExportColumn("saturated", "", values[:, 4])), None
+        (*columns_of(names, units, values[:, :4]), ExportColumn("saturated_share", "", values[:, 4])), None
     )
 
 
-def samples_table(result: Accuracy) -> ExportTable:
+def samples_table(result: AccuracyResult) -> ExportTable:
     """Return the samples of all motions one below the other: points, deviation, joints, drives."""
     motions, joints = result.motions, [encodable(name) for name in result.robot.coordinates]
     driven, units, rates = (
@@ -76,7 +78,7 @@ def samples_table(result: Accuracy) -> ExportTable:
     return ExportTable((columns[0], t, *columns[1:]), None)
 
 
-def _fields(result: Accuracy, table: ExportTable) -> dict[str, Any]:
+def _fields(result: AccuracyResult, table: ExportTable) -> dict[str, Any]:
     """Return the fields of a table of an accuracy: values in SI, their names and units, and the times."""
     columns = [one for one in table.columns if not isinstance(one.values, Times)]
     times = [one.values.ns / 1e9 for one in table.columns if isinstance(one.values, Times)]
@@ -93,7 +95,7 @@ def _fields(result: Accuracy, table: ExportTable) -> dict[str, Any]:
     }
 
 
-def _poses(result: Accuracy) -> list[Poses]:
+def _poses(result: AccuracyResult) -> list[Poses]:
     """Return the trajectory of the tool at each velocity."""
     where = str(result.recording) if result.recording else result.name
     several = len(result.motions) > 1

@@ -12,7 +12,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.parts import ERROR_DEFINITIONS, format_velocity
 from urmpipe_pipeline.accuracy.published import published_points
-from urmpipe_pipeline.accuracy.result import DECIDES, Accuracy
+from urmpipe_pipeline.accuracy.result import DECIDES, AccuracyResult
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Over, Panel, View
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, INK_COLOUR, REFERENCE_COLOUR, joint_colour
 from urmpipe_pipeline.runs.figures import joint_panels
@@ -24,15 +24,15 @@ ERRORS = {"time": ("error", AXIS_COLOURS["norm"]), "path": ("path error", AXIS_C
 """Name and colour of each error."""
 
 
-def velocity_figure(result: Accuracy) -> Figure:
+def velocity_figure(result: AccuracyResult) -> Figure:
     """Return both errors over the velocity, what is published beside them, the limit and the running speed.
 
     Source: [Iso9283]_ Fig. 7.
     """
-    every = {one.velocity: one for one in (*result.tried, *result.errors)}
+    every = {one.velocity: one for one in (*result.probed, *result.errors)}
     points = {one.velocity: one for one in published_points(result.robot.name, result.rows)}
     at = sorted({*every, *points})
-    order = sorted(DECIDES, key=lambda which: which == result.decides)  # what decides is in front
+    order = sorted(DECIDES, key=lambda which: which == result.limited_error)  # what decides is in front
     lines = []
     for which in order:
         values = [
@@ -40,7 +40,7 @@ def velocity_figure(result: Accuracy) -> Figure:
             for v in at
         ]
         name, colour = ERRORS[which]
-        lines.append(Line(_known(values), (name,), (colour,), strong=which == result.decides))
+        lines.append(Line(_known(values), (name,), (colour,), strong=which == result.limited_error))
     marks = []
     if points:
         values = [points[v].error if v in points else None for v in at]
@@ -56,7 +56,7 @@ def velocity_figure(result: Accuracy) -> Figure:
             )
             for v, one in points.items()
         ]
-    name, colour = ERRORS[result.decides]
+    name, colour = ERRORS[result.limited_error]
     marks += [
         Mark(
             at.index(one.velocity),
@@ -85,7 +85,7 @@ def velocity_figure(result: Accuracy) -> Figure:
     )
 
 
-def motion_figures(result: Accuracy, motion: DrivenMotion) -> Iterator[Figure]:
+def motion_figures(result: AccuracyResult, motion: DrivenMotion) -> Iterator[Figure]:
     """Yield the plots of a motion: how it deviates, its joints, and what its drives did.
 
     Source: [Iso9283]_ Fig. 5 and 6.
@@ -95,9 +95,9 @@ def motion_figures(result: Accuracy, motion: DrivenMotion) -> Iterator[Figure]:
     yield _drives(result, motion)
 
 
-def _velocity_caption(result: Accuracy, *, published: bool) -> str:
+def _velocity_caption(result: AccuracyResult, *, published: bool) -> str:
     said = "The axis is logarithmic. Strong: the error that decides,"
-    said += f" {ERROR_DEFINITIONS[result.decides]}. Diamonds: velocities asked for."
+    said += f" {ERROR_DEFINITIONS[result.limited_error]}. Diamonds: velocities asked for."
     said += " Dashed: the limit." if result.limit is not None else ""
     said += " Dotted: the running speed, the largest within it." if result.running_speed is not None else ""
     said += ' Dark crosses: [Iso9283] Fig. 7; at the triangle only "more than" is known.' if published else ""
@@ -105,7 +105,7 @@ def _velocity_caption(result: Accuracy, *, published: bool) -> str:
     return said + (f" No point at {text.enumerated(gone)}: the arm diverged." if gone else "")
 
 
-def _errors_told(result: Accuracy) -> str:
+def _errors_told(result: AccuracyResult) -> str:
     """Return the error that decides at each velocity."""
     said = ((one, result.judged_error(one)) for one in result.errors)
     return "; ".join(
@@ -114,9 +114,9 @@ def _errors_told(result: Accuracy) -> str:
     )
 
 
-def _deviation(result: Accuracy, motion: DrivenMotion) -> Figure:
+def _deviation(result: AccuracyResult, motion: DrivenMotion) -> Figure:
     """Return delta, its norm, and the distance from the path, with the limit of the one that decides."""
-    limits = {which: result.limit if which == result.decides else None for which in DECIDES}
+    limits = {which: result.limit if which == result.limited_error else None for which in DECIDES}
     panels = [
         Panel(
             f"Δ{axis}",
@@ -139,7 +139,7 @@ def _deviation(result: Accuracy, motion: DrivenMotion) -> Figure:
         f" from the set point, {text.quantity(float(far.max()), 'm')} from the path.",
         (View("delta = planned - real", tuple(panels)), View("Distance from the path", (path,))),
         _instants(motion),
-        opened=0 if result.decides == "time" else 1,
+        opened=0 if result.limited_error == "time" else 1,
         share=2.4,
     )
 
@@ -153,7 +153,7 @@ def _size(title: str, values: FloatArray, colour: str, motion: DrivenMotion, lim
     )  # fmt: skip
 
 
-def _joints(result: Accuracy, motion: DrivenMotion) -> Figure:
+def _joints(result: AccuracyResult, motion: DrivenMotion) -> Figure:
     """Return values and rates of the joints, each with what was set."""
     names = result.robot.coordinates
     views = tuple(
@@ -189,7 +189,7 @@ def _with_set(
         yield replace(panel, lines=(behind, *panel.lines))
 
 
-def _drives(result: Accuracy, motion: DrivenMotion) -> Figure:
+def _drives(result: AccuracyResult, motion: DrivenMotion) -> Figure:
     """Return voltages with their limits, and currents."""
     names, colours = (
         result.driven,
@@ -207,7 +207,7 @@ def _drives(result: Accuracy, motion: DrivenMotion) -> Figure:
         "Voltages and currents",
         "Voltages of the drives, dashed: the largest that they have; and their currents.",
         f"Voltages and currents of {', '.join(names)} at {format_velocity(motion.velocity)}. At the limit:"
-        f" {text.percent(motion.errors.saturated)} of the samples.",
+        f" {text.percent(motion.errors.saturated_share)} of the samples.",
         (View("Voltages", tuple(panels)), View("Currents", (current,))),
         share=1.6,
     )
@@ -215,7 +215,7 @@ def _drives(result: Accuracy, motion: DrivenMotion) -> Figure:
 
 def _instants(motion: DrivenMotion) -> dict[int, str]:
     """Return when corners are passed, unless they are many, and when it diverged, in [ns]."""
-    passed = motion.corner_ns[motion.corner_ns <= motion.t_ns[-1]].tolist()
+    passed = motion.corner_times_ns[motion.corner_times_ns <= motion.t_ns[-1]].tolist()
     found = {at: f"corner {k}" for k, at in enumerate(passed, start=1)} if len(passed) <= MARKED else {}
     return found if motion.diverged is None else found | {int(motion.t_ns[-1]): "diverged"}
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.accuracy.driven_motion import Diverged, DrivenMotion, Errors
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.driven_motion import Divergence, DrivenMotion, TrackingErrors
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.presentation.parts import columns_of
 from urmpipe_pipeline.presentation.section import Cell, Event, Fact, Judged, Ref, Table, Value
 
@@ -20,10 +20,10 @@ ERROR_DEFINITIONS = {
     "path": "from the nearest point of the path",
 }
 
-Cells = Callable[[Errors], Cell]
+Cells = Callable[[TrackingErrors], Cell]
 
 
-def select_shown_motion(result: Accuracy) -> DrivenMotion:
+def select_shown_motion(result: AccuracyResult) -> DrivenMotion:
     """Return the motion that is shown first: nearest to 0.5 m/s, of those that did not diverge if any."""
     return min(
         result.motions,
@@ -36,17 +36,17 @@ def format_velocity(velocity: float) -> str:
     return f"{velocity:.4g} m/s"
 
 
-def format_divergence(diverged: Diverged) -> str:
+def format_divergence(diverged: Divergence) -> str:
     """Return when a motion left its set points, and the joint."""
     return f"diverged at t = {diverged.t:.4g} s ({diverged.joint})"
 
 
-def format_limit(result: Accuracy) -> str:
+def format_limit(result: AccuracyResult) -> str:
     """Return the limit, and its error: "0.4 mm (time)"."""
-    return "" if result.limit is None else f"{text.allowed(result.limit)} ({result.decides})"
+    return "" if result.limit is None else f"{text.allowed(result.limit)} ({result.limited_error})"
 
 
-def headline(result: Accuracy) -> str:
+def headline(result: AccuracyResult) -> str:
     """Return the largest velocity within the limit; without a limit the largest error."""
     robot = result.robot.name
     if result.running_speed is not None:
@@ -58,38 +58,38 @@ def headline(result: Accuracy) -> str:
     return f"{result.name}: {summary}"
 
 
-def _format_errors(result: Accuracy) -> str:
+def _format_errors(result: AccuracyResult) -> str:
     """Return the largest error, and the velocities at which the arm diverged."""
     known = [(error, e.velocity) for e in result.errors if (error := result.judged_error(e)) is not None]
     diverged = [format_velocity(errors.velocity) for errors in result.errors if errors.diverged is not None]
     parts = []
     if known:
         error, velocity = max(known, key=lambda pair: pair[0])
-        off = f"is up to {text.quantity(error, 'm')} off ({result.decides})"
+        off = f"is up to {text.quantity(error, 'm')} off ({result.limited_error})"
         parts.append(f"{off} at {format_velocity(velocity)}")
     if diverged:
         parts.append(f"diverges at {text.enumerated(diverged)}")
     return ", and ".join(parts)
 
 
-def error_cell(result: Accuracy, errors: Errors, which: str) -> Cell:
+def error_cell(result: AccuracyResult, errors: TrackingErrors, which: str) -> Cell:
     """Return an error, with the limit if it decides; if the motion diverged, where."""
     if errors.diverged is not None:
         return format_divergence(errors.diverged)
     error = errors.error if which == "time" else errors.path_error
-    if result.limit is None or which != result.decides or error is None:
+    if result.limit is None or which != result.limited_error or error is None:
         return Value(error, "m")
     return Value(error, "m", result.limit, result.judge(errors), error / result.limit)
 
 
-def facts(result: Accuracy) -> Iterator[Fact]:
+def facts(result: AccuracyResult) -> Iterator[Fact]:
     """Yield the running speed, the limit, and the conditions of the motions."""
     if result.limit is not None:
         speed = result.running_speed
         yield Fact("Running speed", "none" if speed is None else format_velocity(speed))
         yield Fact("Limit", text.allowed(result.limit))
     yield Fact("Robot", f"{result.robot.name}: {result.robot.description}".removesuffix(": "), brief=False)
-    yield Fact("Error that decides", f"{result.decides}: {ERROR_DEFINITIONS[result.decides]}")
+    yield Fact("Error that decides", f"{result.limited_error}: {ERROR_DEFINITIONS[result.limited_error]}")
     yield Fact("Acceleration", _format_acceleration(result))
     if any(result.force):
         yield Fact("Force on the tool", f"({', '.join(f'{component:g}' for component in result.force)}) N")
@@ -98,7 +98,7 @@ def facts(result: Accuracy) -> Iterator[Fact]:
     yield Fact("Assumes", "; ".join(w.assumption for w in result.warnings if w.assumption))
 
 
-def _format_acceleration(result: Accuracy) -> str:
+def _format_acceleration(result: AccuracyResult) -> str:
     """Return the acceleration, the same at all velocities, and the law."""
     if result.acceleration is None:
         return f"that of the joints' limits, law {result.law}"
@@ -107,7 +107,12 @@ def _format_acceleration(result: Accuracy) -> str:
 
 
 def velocities_table(
-    result: Accuracy, title: str, rows: Sequence[Errors], *, linked: bool = False, folded: bool = False
+    result: AccuracyResult,
+    title: str,
+    rows: Sequence[TrackingErrors],
+    *,
+    linked: bool = False,
+    folded: bool = False,
 ) -> Table:
     """Return the errors by velocity; `linked` if each has a section, `folded` for those that were tried."""
     heads: dict[str, tuple[str, Cells]] = {
@@ -120,7 +125,7 @@ def velocities_table(
                 Value(errors.path_error, "m") if errors.diverged else error_cell(result, errors, "path")
             ),
         ),
-        "saturated": ("At voltage limit", lambda errors: Value(errors.saturated, "%")),
+        "saturated_share": ("At voltage limit", lambda errors: Value(errors.saturated_share, "%")),
     }
     if result.limit is not None:
         heads["verdict"] = ("Verdict", lambda errors: Judged(result.judge(errors)))
@@ -128,27 +133,29 @@ def velocities_table(
     return Table(title, columns_of(rows, heads), note=note, brief=not folded, folded=folded)
 
 
-def _velocity_cell(errors: Errors, *, linked: bool) -> Cell:
+def _velocity_cell(errors: TrackingErrors, *, linked: bool) -> Cell:
     velocity = format_velocity(errors.velocity)
     return Ref(velocity) if linked else velocity
 
 
-def _reached(errors: Errors) -> Value:
+def _reached(errors: TrackingErrors) -> Value:
     """Return the largest speed of the plan, if it is less than the commanded one."""
     is_less = errors.reached < errors.velocity * (1.0 - 1e-6)
     return Value(float(f"{errors.reached:.4g}") if is_less else None, "m/s")
 
 
-def motion_facts(result: Accuracy, motion: DrivenMotion) -> Iterator[Fact]:
+def motion_facts(result: AccuracyResult, motion: DrivenMotion) -> Iterator[Fact]:
     """Yield the error that decides, the other one, and how often the drives are at their limits."""
-    errors, other = motion.errors, "path" if result.decides == "time" else "time"
+    errors, other = motion.errors, "path" if result.limited_error == "time" else "time"
     has_diverged = motion.diverged is not None
-    yield Fact(NAMES[result.decides], error_cell(result, errors, result.decides), brief=has_diverged)
+    yield Fact(
+        NAMES[result.limited_error], error_cell(result, errors, result.limited_error), brief=has_diverged
+    )
     if not has_diverged:
         yield Fact(NAMES[other], error_cell(result, errors, other), brief=False)
     if (reached := _reached(errors)).number is not None:
         yield Fact("Reached", reached, brief=False)
-    yield Fact("At voltage limit", Value(errors.saturated, "%"), brief=False)
+    yield Fact("At voltage limit", Value(errors.saturated_share, "%"), brief=False)
     by_drive = zip(result.driven, motion.at_limit.tolist(), strict=True)
     fractions = ", ".join(f"{name} {text.percent(fraction)}" for name, fraction in by_drive)
     yield Fact("Of each drive", fractions, brief=False)
@@ -157,7 +164,7 @@ def motion_facts(result: Accuracy, motion: DrivenMotion) -> Iterator[Fact]:
 
 def events(motion: DrivenMotion) -> Iterator[Event]:
     """Yield the corners that a motion passes, its largest error, and its end if it diverged."""
-    for number, t_ns in enumerate(motion.corner_ns.tolist(), start=1):
+    for number, t_ns in enumerate(motion.corner_times_ns.tolist(), start=1):
         if t_ns <= motion.t_ns[-1]:
             yield Event(t_ns, f"corner {number}")
     distance = text.quantity(float(motion.delta[motion.worst, 3]), "m")

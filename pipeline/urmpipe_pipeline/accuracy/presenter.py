@@ -17,7 +17,7 @@ from urmpipe_pipeline.accuracy.parts import (
     select_shown_motion,
     velocities_table,
 )
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.accuracy.scene import accuracy_scene, arm_drawing, path_figure
 from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
@@ -33,7 +33,7 @@ from urmpipe_pipeline.presentation.section import (
 )
 
 
-def present(result: Accuracy) -> Presentation:
+def present(result: AccuracyResult) -> Presentation:
     """Return what an accuracy shows."""
     every, motion = tuple(facts(result)), select_shown_motion(result)
     return Presentation(
@@ -50,7 +50,7 @@ def present(result: Accuracy) -> Presentation:
     )
 
 
-def line(result: Accuracy) -> Mapping[str, Cell]:
+def line(result: AccuracyResult) -> Mapping[str, Cell]:
     """Return an arm among others: how fast it may run, its errors at the slowest and the fastest velocity."""
     slow, fast = (end(result.errors, key=lambda one: one.velocity) for end in (min, max))
     speed = result.running_speed
@@ -60,20 +60,20 @@ def line(result: Accuracy) -> Mapping[str, Cell]:
         "Verdict": Judged(result.verdict),
         "Running speed": None if speed is None else Value(float(f"{speed:.4g}"), "m/s"),
         "Limit": Value(result.limit, "m", given=True),
-        "Decides": result.decides,
+        "Decides": result.limited_error,
     }
     for one in dict.fromkeys((slow, fast)):
-        found[f"Error at {format_velocity(one.velocity)}"] = error_cell(result, one, result.decides)
-        found[f"At voltage limit at {format_velocity(one.velocity)}"] = Value(one.saturated, "%")
+        found[f"Error at {format_velocity(one.velocity)}"] = error_cell(result, one, result.limited_error)
+        found[f"At voltage limit at {format_velocity(one.velocity)}"] = Value(one.saturated_share, "%")
     return found
 
 
-def _body(result: Accuracy, every: tuple[Fact, ...]) -> Section:
+def _body(result: AccuracyResult, every: tuple[Fact, ...]) -> Section:
     title = f"Accuracy of {result.robot.name}, {result.name}"
     tables = [velocities_table(result, "Errors by velocity", result.errors, linked=True)]
-    if result.tried:
+    if result.probed:
         tried = "Velocities run to find the running speed"
-        tables.append(velocities_table(result, tried, result.tried, folded=True))
+        tables.append(velocities_table(result, tried, result.probed, folded=True))
     return Section(
         title,
         result.verdict,
@@ -84,7 +84,7 @@ def _body(result: Accuracy, every: tuple[Fact, ...]) -> Section:
         properties={
             "running_speed": result.running_speed,
             "limit": result.limit,
-            "decides": result.decides,
+            "limited_error": result.limited_error,
             "loop_radius": result.loop_radius,
             "compiled": result.compiled,
         },
@@ -93,18 +93,18 @@ def _body(result: Accuracy, every: tuple[Fact, ...]) -> Section:
     )
 
 
-def _checks(result: Accuracy) -> Iterator[Check]:
+def _checks(result: AccuracyResult) -> Iterator[Check]:
     """Yield a check a velocity; nothing without a limit."""
     for one in result.errors:
         verdict = result.judge(one)
         if verdict is not None:
-            found = error_cell(result, one, result.decides)
+            found = error_cell(result, one, result.limited_error)
             allowed = written(Value(result.limit, "m", given=True), unit=True)
-            said = f"{written(found, unit=True)} ({result.decides}), allowed: {allowed}"
+            said = f"{written(found, unit=True)} ({result.limited_error}), allowed: {allowed}"
             yield Check(format_velocity(one.velocity), verdict, said if verdict == "fail" else "")
 
 
-def _page(result: Accuracy) -> Iterator[Block]:
+def _page(result: AccuracyResult) -> Iterator[Block]:
     """Yield what only a page shows: errors over velocity, the arm and the path of the motion shown first."""
     yield velocity_figure(result)
     yield arm_drawing(result)
@@ -114,7 +114,7 @@ def _page(result: Accuracy) -> Iterator[Block]:
     yield provenance_table(result.provenance)
 
 
-def _motion(result: Accuracy, motion: DrivenMotion) -> Section:
+def _motion(result: AccuracyResult, motion: DrivenMotion) -> Section:
     """Return the section of a motion."""
     return Section(
         format_velocity(motion.velocity),

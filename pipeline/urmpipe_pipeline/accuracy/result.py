@@ -13,7 +13,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_headline
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import LineArcPath, PathRows
-from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion, Errors
+from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion, TrackingErrors
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.planned_paths.request import Law
@@ -33,7 +33,7 @@ FINE = 1.01  # ratio of the next velocity that is too fast to the running speed,
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Accuracy(Result):
+class AccuracyResult(Result):
     """The errors of a driven arm on a path over velocity, and its largest velocity within a limit.
 
     Attributes:
@@ -47,11 +47,11 @@ class Accuracy(Result):
         period: Sample period in [s].
         force: External force on the tool in [N], along the axes of the world.
         motions: The motions at the requested velocities, in their order.
-        tried: The errors of all motions that were run to find the running speed, by velocity; empty without a
-            limit.
+        probed: The errors of all motions that were run to find the running speed, by velocity; empty
+            without a limit.
         running: The motion at the running speed; None without a limit, or if no velocity is within it.
         limit: The largest error allowed in [m], or None.
-        decides: The error that is judged.
+        limited_error: The error that is judged.
         loop_radius: Largest spectral radius of the sampled loop along the path [-]; below 1 it is stable.
         compiled: Whether the arm ran as machine code; else in NumPy.
         warnings: Warnings for the user.
@@ -68,10 +68,10 @@ class Accuracy(Result):
     period: float
     force: tuple[float, float, float]
     motions: tuple[DrivenMotion, ...]
-    tried: tuple[Errors, ...]
+    probed: tuple[TrackingErrors, ...]
     running: DrivenMotion | None
     limit: float | None
-    decides: Decides
+    limited_error: Decides
     loop_radius: float
     compiled: bool
     warnings: tuple[LogWarning, ...]
@@ -84,15 +84,15 @@ class Accuracy(Result):
         return rows_to_path(self.rows)
 
     @cached_property
-    def errors(self) -> tuple[Errors, ...]:
+    def errors(self) -> tuple[TrackingErrors, ...]:
         """The errors at the requested velocities, in their order."""
         return tuple(motion.errors for motion in self.motions)
 
-    def judged_error(self, errors: Errors) -> float | None:
+    def judged_error(self, errors: TrackingErrors) -> float | None:
         """Return the error that is judged in [m]; None if the motion diverged."""
-        return errors.error if self.decides == "time" else errors.path_error
+        return errors.error if self.limited_error == "time" else errors.path_error
 
-    def judge(self, errors: Errors) -> Verdict | None:
+    def judge(self, errors: TrackingErrors) -> Verdict | None:
         """Return whether an error is within the limit; None without a limit."""
         if self.limit is None:
             return None
@@ -139,14 +139,14 @@ class Accuracy(Result):
         import pandas as pd
 
         requested = {errors.velocity for errors in self.errors}
-        by_velocity = {errors.velocity: errors for errors in (*self.tried, *self.errors)}
+        by_velocity = {errors.velocity: errors for errors in (*self.probed, *self.errors)}
         rows = [
             {
                 "velocity": velocity,
                 "reached": errors.reached,
                 "error": np.nan if errors.error is None else errors.error,
                 "path_error": np.nan if errors.path_error is None else errors.path_error,
-                "saturated": errors.saturated,
+                "saturated_share": errors.saturated_share,
                 "asked": velocity in requested,
             }
             for velocity, errors in sorted(by_velocity.items())
@@ -163,12 +163,12 @@ class Accuracy(Result):
             "reached": [errors.reached for errors in self.errors],
             "errors": [errors.error for errors in self.errors],
             "path_errors": [errors.path_error for errors in self.errors],
-            "saturated": [errors.saturated for errors in self.errors],
+            "saturated_share": [errors.saturated_share for errors in self.errors],
             "diverged": [None if e.diverged is None else asdict(e.diverged) for e in self.errors],
             "running_speed": self.running_speed,
-            "tried": [asdict(errors) for errors in self.tried],
+            "probed": [asdict(errors) for errors in self.probed],
             "limit": self.limit,
-            "decides": self.decides,
+            "limited_error": self.limited_error,
             "loop_radius": self.loop_radius,
             "compiled": self.compiled,
             "verdict": self.verdict,

@@ -9,7 +9,7 @@ from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.parts import format_velocity, select_shown_motion
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.comparison.scene import drawn_larger
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
@@ -22,24 +22,24 @@ ARMS = 8
 """Poses of the arm in a drawing, at most."""
 
 
-def accuracy_scene(result: Accuracy) -> Scene:
+def accuracy_scene(result: AccuracyResult) -> Scene:
     """Return the arm along the contour, what was planned, and where it was, coloured by its deviation."""
     motion = select_shown_motion(result)
     at = motion.worst
     arm = Arm(result.robot, motion.q, motion.t_ns, run_colour(0), kept=(at,))
     now = Path("planned", motion.planned, motion.t_ns, REFERENCE_COLOUR, asked=True, kept=(at,), line=False)
     larger = _larger(motion)
-    by = "‖Δ‖" if result.decides == "time" else "its distance from the planned one"
+    by = "‖Δ‖" if result.limited_error == "time" else "its distance from the planned one"
     said = f"real path coloured by {by}{f', in crimson the {larger.name}' if larger else ''}"
     title = f"Arm and paths at {format_velocity(motion.velocity)} [m], {said}"
     return Scene(title, (arm,), (*_paths(result, motion), now), (_worst(motion),))
 
 
-def path_figure(result: Accuracy) -> SpaceFigure:
+def path_figure(result: AccuracyResult) -> SpaceFigure:
     """Return the planned and the real path of the shown motion, and its deviation enlarged."""
     motion = select_shown_motion(result)
     larger = _larger(motion)
-    nearest = "set point" if result.decides == "time" else "planned path"
+    nearest = "set point" if result.limited_error == "time" else "planned path"
     drawn = f" Crimson: {larger.name}." if larger else ""
     return SpaceFigure(
         f"Path in space at {format_velocity(motion.velocity)}",
@@ -50,13 +50,13 @@ def path_figure(result: Accuracy) -> SpaceFigure:
     )
 
 
-def arm_drawing(result: Accuracy) -> Drawing:
+def arm_drawing(result: AccuracyResult) -> Drawing:
     """Return the arm along the contour in three projections, with the deviation enlarged.
 
     Source: [Iso9283]_ Fig. 4.
     """
     motion = select_shown_motion(result)
-    larger, asked = _larger(motion), np.clip(motion.corner_ns, 0, motion.t_ns[-1])
+    larger, asked = _larger(motion), np.clip(motion.corner_times_ns, 0, motion.t_ns[-1])
     at = np.unique(np.searchsorted(motion.t_ns, [motion.t_ns[0], *asked, motion.t_ns[-1]]))
     at = at[np.unique(np.linspace(0, len(at) - 1, ARMS).astype(np.intp))]
     run = motion.position if larger is None else larger.position
@@ -73,9 +73,9 @@ def arm_drawing(result: Accuracy) -> Drawing:
     return Drawing(f"Arm on the path at {format_velocity(motion.velocity)}", alt, svg)
 
 
-def _paths(result: Accuracy, motion: DrivenMotion) -> tuple[Path, ...]:
+def _paths(result: AccuracyResult, motion: DrivenMotion) -> tuple[Path, ...]:
     """Return the planned path, the real one coloured by the error that decides, the deviation enlarged."""
-    by_time = result.decides == "time"
+    by_time = result.limited_error == "time"
     real = Path(
         "real: ‖Δ‖" if by_time else "real: distance from the path", motion.position, motion.t_ns,
         AXIS_COLOURS["norm"], values=motion.delta[:, 3] if by_time else motion.from_path, limit=result.limit,

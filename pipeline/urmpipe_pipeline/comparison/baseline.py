@@ -11,12 +11,12 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.math3d import Transform, matrix_to_rpy
 from urmpipe_pipeline.comparison.comparison import (
-    Absent,
     BaselineComparison,
-    Change,
     Comparison,
     CriterionChange,
-    Difference,
+    QuantityChange,
+    SettingDifference,
+    UnmatchedQuantity,
 )
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
 from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, allowed_for, check_tolerance, parse_tolerance
@@ -101,7 +101,9 @@ def against_baseline(
             change for pair in pairs if not _on_grid(now, before, pair) for change in _changes(*pair, level)
         ),
         new=tuple(_absent(now, {run.name: (run, old) for run, old in pairs})),
-        gone=tuple(one for one in gone if one not in [Absent(log.name) for log in now.unjudged]),
+        missing=tuple(
+            one for one in gone if one not in [UnmatchedQuantity(log.name) for log in now.failed_logs]
+        ),
         differences=tuple(_differences(now, before, pairs)),
     )
 
@@ -121,10 +123,10 @@ def _tests(now: Comparison, before: Comparison, noise: Mapping[str, float]) -> B
         recording=before.recording,
         noise=noise,
         changes=(),
-        new=tuple(Absent(now.name, name) for name in new if name not in old),
-        gone=(
-            *(Absent(now.name, name) for name in old if name not in new),
-            *(Absent(now.name, cycle.name) for cycle in failed),
+        new=tuple(UnmatchedQuantity(now.name, name) for name in new if name not in old),
+        missing=(
+            *(UnmatchedQuantity(now.name, name) for name in old if name not in new),
+            *(UnmatchedQuantity(now.name, cycle.name) for cycle in failed),
         ),
         differences=(
             *_differing(_made(before), _made(now)),
@@ -144,7 +146,7 @@ def _noise_of(one: Criterion, noise: Mapping[str, float]) -> float:
 
 def _pairs(now: Comparison, before: Comparison) -> list[Pair]:
     """Return the logs of both that are held against each other: by name, or the only ones."""
-    if len(now.runs) + len(now.unjudged) == len(before.runs) == 1:
+    if len(now.runs) + len(now.failed_logs) == len(before.runs) == 1:
         return [(now.runs[0], before.runs[0])]
     old = {run.name: run for run in before.runs}
     return [(run, old[run.name]) for run in now.runs if run.name in old]
@@ -160,21 +162,23 @@ def _keyed(statistics: tuple[Statistics, ...]) -> dict[Key, Statistics]:
     return {(one.kind, one.quantity, one.unit): one for one in statistics}
 
 
-def _absent(result: Comparison, pairs: Mapping[str, Pair]) -> Iterator[Absent]:
+def _absent(result: Comparison, pairs: Mapping[str, Pair]) -> Iterator[UnmatchedQuantity]:
     """Yield the logs of a comparison that the other lacks, and the quantities that the log of a pair lacks.
 
     A quantity is that of the log now, whatever the log was called before.
     """
     for run in result.runs:
         if run.name not in pairs:
-            yield Absent(run.name)
+            yield UnmatchedQuantity(run.name)
             continue
         now, before = pairs[run.name]
         theirs = _keyed((before if run is now else now).all_statistics)
-        yield from (Absent(now.name, key[1]) for key in _keyed(run.all_statistics) if key not in theirs)
+        yield from (
+            UnmatchedQuantity(now.name, key[1]) for key in _keyed(run.all_statistics) if key not in theirs
+        )
 
 
-def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> Iterator[Change]:
+def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> Iterator[QuantityChange]:
     """Yield the change of each quantity that both have."""
     _, here, there = np.intersect1d(now.t_ns, before.t_ns, assume_unique=True, return_indices=True)
     same = len(here) == len(now.t_ns) == len(before.t_ns)
@@ -186,16 +190,16 @@ def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> I
         step = np.abs(values[key][here] - old_values[key][there])
         known = np.flatnonzero(np.isfinite(step))
         at = known[np.argmax(step[known])] if len(known) else None
-        yield Change(
+        yield QuantityChange(
             run=now.name,
             before=old[key],
             now=one,
             noise=level,
-            share_noise=_share_noise((old[key], one), (old_values[key], values[key]), level, same),
+            out_fraction_noise=_share_noise((old[key], one), (old_values[key], values[key]), level, same),
             periods=(_period(before), _period(now)),
             samples_shared=len(known),
-            largest=None if at is None else float(step[at]),
-            t_largest=float(now.t[here[at]]) if at is not None and now.run.timed else None,
+            largest_change=None if at is None else float(step[at]),
+            t_largest_change=float(now.t[here[at]]) if at is not None and now.run.timed else None,
         )
 
 
@@ -228,19 +232,19 @@ def _share_noise(
     return before + spare, now + spare
 
 
-def _differences(now: Comparison, before: Comparison, pairs: Sequence[Pair]) -> Iterator[Difference]:
+def _differences(now: Comparison, before: Comparison, pairs: Sequence[Pair]) -> Iterator[SettingDifference]:
     """Yield what differs in how the two were made, in all and log by log."""
     yield from _differing(_made(before), _made(now))
     for run, old in pairs:
         yield from _differing(_facts(old), _facts(run), f" of {run.name}")
         if _on_grid(now, before, (run, old)):
-            yield Difference(f"judged on of {run.name}", "the grid", "the log's rows")
+            yield SettingDifference(f"judged on of {run.name}", "the grid", "the log's rows")
 
 
-def _differing(was: Mapping[str, Any], made: Mapping[str, Any], of: str = "") -> Iterator[Difference]:
+def _differing(was: Mapping[str, Any], made: Mapping[str, Any], of: str = "") -> Iterator[SettingDifference]:
     for what in dict.fromkeys([*was, *made]):
         if was.get(what) != made.get(what):
-            yield Difference(f"{what}{of}", was.get(what), made.get(what))
+            yield SettingDifference(f"{what}{of}", was.get(what), made.get(what))
 
 
 def _made(result: Comparison) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import BaselineComparison, Change, CriterionChange, Worse
+from urmpipe_pipeline.comparison.comparison import BaselineComparison, CriterionChange, QuantityChange, Worse
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.comparison.wording import quantity_name, size_of, symbol
@@ -16,7 +16,7 @@ from urmpipe_pipeline.presentation.section import Cell, Check, Fact, Judged, Ref
 NAMED = 30
 """Quantities and logs that a fact names; more are counted."""
 
-WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out", "samples": "samples"}
+WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "out_fraction": "out", "samples": "samples"}
 """What people call what may be worse."""
 
 
@@ -25,7 +25,7 @@ def baseline_section(found: BaselineComparison, rank: int) -> Section:
     said = "a log of the baseline, not compared any more"
     gone = [
         Section(one.run, "fail", checks=(_check(one.run, "log is there", f"{one.run}: {said}"),))
-        for one in found.gone
+        for one in found.missing
         if one.quantity is None
     ]
     return Section(
@@ -45,7 +45,7 @@ def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
             noise = text.allowed(one.noise, one.now.unit)
             said = f"{size_of(one.now)}: {worse_words(one)} (noise {noise})" if one.worse else ""
             yield _check(run, quantity_name(one.now), said)
-    for lost in found.gone:
+    for lost in found.missing:
         if lost.run == run:
             said = f"{lost.quantity}: in the baseline, not compared any more"
             yield _check(run, f"{lost.quantity} is there", said)
@@ -57,7 +57,7 @@ def criterion_checks(found: BaselineComparison) -> Iterator[Check]:
         noise = f" (noise {written(Value(one.noise, _shown(one.now.unit), given=True), unit=True)})"
         said = f"{one.now.name}: {criterion_words(one)}{noise}" if one.worse else ""
         yield _check("criteria", one.now.name, said)
-    for lost in found.gone:
+    for lost in found.missing:
         said = f"{lost.quantity}: in the baseline, without a value now"
         yield _check("criteria", f"{lost.quantity} is there", said)
 
@@ -85,7 +85,7 @@ def since_words(found: BaselineComparison) -> str:
     said = [f"{quantities(len(found.worse))} worse"] if found.worse else []
     criteria = text.enumerated([one.now.name for one in found.worse_criteria])
     said += [f"{criteria} worse"] if criteria else []
-    said += [f"{len(found.gone)} gone"] if found.gone else []
+    said += [f"{len(found.missing)} gone"] if found.missing else []
     return ", ".join(said) or "nothing worse"
 
 
@@ -94,7 +94,7 @@ def quantities(count: int) -> str:
     return f"{count} {'quantity' if count == 1 else 'quantities'}"
 
 
-def worse_words(one: Change) -> str:
+def worse_words(one: QuantityChange) -> str:
     """Return what of a quantity is worse, before and now: "max 1.0000 → 2.0000 mm, out 1.0 % → 3.0 %"."""
     pairs = {name: _pair(one, name) for name in one.worse}
     return ", ".join(
@@ -103,10 +103,10 @@ def worse_words(one: Change) -> str:
     )
 
 
-def _pair(one: Change, name: Worse) -> tuple[Value, Value]:
+def _pair(one: QuantityChange, name: Worse) -> tuple[Value, Value]:
     """Return a statistic before and now, with digits that tell them apart if it changed."""
     before, now = getattr(one.before, name), getattr(one.now, name)
-    unit = {"share_out": "%", "samples": ""}.get(name, one.now.unit)
+    unit = {"out_fraction": "%", "samples": ""}.get(name, one.now.unit)
     told = name in (*one.worse, *one.better)
     return Value(before, unit, now if told else None), Value(now, unit, before if told else None)
 
@@ -116,7 +116,7 @@ def worse_facts(found: BaselineComparison) -> Iterator[Fact]:
     yield Fact("Since the baseline", since_words(found))
     worse = [f"{symbol(one.now)} of {one.run} ({_words(one.worse)})" for one in found.worse]
     yield Fact("Worse", _listed(worse))
-    yield Fact("Gone", _listed(list(map(str, found.gone))))
+    yield Fact("Gone", _listed(list(map(str, found.missing))))
 
 
 def _facts(found: BaselineComparison) -> Iterator[Fact]:
@@ -157,10 +157,10 @@ def _words(found: Sequence[Worse]) -> str:
     return ", ".join(WORDS[name] for name in found)
 
 
-def _columns(name: Worse) -> dict[str, tuple[str, Callable[[Change], Cell]]]:
+def _columns(name: Worse) -> dict[str, tuple[str, Callable[[QuantityChange], Cell]]]:
     """Return a statistic before and now; a share or a count only where it changed."""
 
-    def cells(one: Change) -> tuple[Cell, Cell]:
+    def cells(one: QuantityChange) -> tuple[Cell, Cell]:
         shown = name in ("max", "rms", *one.worse, *one.better)
         return _pair(one, name) if shown else (None, None)
 
@@ -171,7 +171,7 @@ def _columns(name: Worse) -> dict[str, tuple[str, Callable[[Change], Cell]]]:
     }
 
 
-def _verdict(one: Change, verdict: Verdict | None) -> Judged:
+def _verdict(one: QuantityChange, verdict: Verdict | None) -> Judged:
     """Return a verdict where it changed."""
     return Judged(verdict if one.before.verdict != one.now.verdict else None)
 
@@ -184,17 +184,17 @@ _CRITERIA: Heads[CriterionChange] = {
 }
 """The columns of criteria that changed, by their keys."""
 
-_HEADS: Heads[Change] = {
+_HEADS: Heads[QuantityChange] = {
     "run": ("Log", lambda one: Ref(one.run)),
     "quantity": ("Quantity", lambda one: symbol(one.now)),
     "worse": ("worse", lambda one: _words(one.worse)),
     "better": ("better", lambda one: _words(one.better)),
     **_columns("max"),
     **_columns("rms"),
-    **_columns("share_out"),
+    **_columns("out_fraction"),
     **_columns("samples"),
-    "largest_change": ("most at one sample", lambda one: Value(one.largest, one.now.unit)),
-    "t_largest_change": ("at t", lambda one: Value(one.t_largest, "s")),
+    "largest_change": ("most at one sample", lambda one: Value(one.largest_change, one.now.unit)),
+    "t_largest_change": ("at t", lambda one: Value(one.t_largest_change, "s")),
     "verdict_before": ("verdict before", lambda one: _verdict(one, one.before.verdict)),
     "verdict_now": ("verdict now", lambda one: _verdict(one, one.now.verdict)),
 }

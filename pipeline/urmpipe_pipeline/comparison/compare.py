@@ -195,7 +195,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if chosen.tcp == "fk" and wanted.joints:
         told += recorded_tcp_mismatch((reference, *runs), RECORDED_APART)
     elif chosen.tcp == "fk":
-        failed = [one for one in deviations if one.furthest.verdict == "fail"]
+        failed = [one for one in deviations if one.worst_statistics.verdict == "fail"]
         told += [
             hint.of(one.name) for one in failed for hint in missing_tool_warning(one.run.robot, one.run.log)
         ]
@@ -372,7 +372,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     assumed = verdict_assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])
     sides = Side(run, recorded, by_joints=False), Side(run, computed, by_joints=True)
     found = _comparison(recorded, [_deviation(*sides, chosen)], chosen, (), assumed)
-    failed = any(one.furthest.verdict == "fail" for one in found.runs)
+    failed = any(one.worst_statistics.verdict == "fail" for one in found.runs)
     asked, turned = failed and "tool" not in chosen.align, "angle" in chosen.tolerance
     lacks = missing_tool_warning(run.robot, log, turned=turned) if asked else []
     return replace(found, warnings=(*found.warnings, *lacks))

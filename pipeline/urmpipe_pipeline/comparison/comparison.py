@@ -28,7 +28,11 @@ ROW = ("run", "sync_offset", *(one.name for one in fields(Statistics)), "value")
 
 def by_tolerance(run: Deviation) -> tuple[bool, float, float]:
     """Return how far out of its tolerance a log is, the furthest last: share used up, then the rms norm."""
-    return run.verdict == "fail", run.decisive.used or 0.0, run.statistics.get("norm", run.furthest).rms
+    return (
+        run.verdict == "fail",
+        run.decisive.utilisation or 0.0,
+        run.statistics.get("norm", run.worst_statistics).rms,
+    )
 
 
 def _decided(run: Deviation) -> str:
@@ -52,7 +56,7 @@ class Comparison(Result):
         assumptions: What the verdict takes for granted, each as the end of "assuming ...".
         on_rows: Whether the logs were judged on their own rows; before that was so, on the grid.
         iso: The test after ISO 9283 whose cycles the runs are; its criteria are judged, the runs are not.
-        unjudged: The logs without a verdict, where the others were judged all the same.
+        failed_logs: The logs without a verdict, where the others were judged all the same.
     """
 
     name: str
@@ -66,7 +70,7 @@ class Comparison(Result):
     assumptions: tuple[str, ...] = ()
     on_rows: bool = False
     iso: IsoTest | None = None
-    unjudged: tuple[Unjudged, ...] = ()
+    failed_logs: tuple[FailedLog, ...] = ()
 
     @property
     def within_tolerance(self) -> bool:
@@ -92,14 +96,14 @@ class Comparison(Result):
     def errors(self) -> tuple[Finding, ...]:
         """Why some logs, or some criteria after ISO 9283, have no verdict."""
         criteria = () if self.iso is None else not_judged_findings(self.iso)
-        return (*(error for log in self.unjudged for error in log.errors), *criteria)
+        return (*(error for log in self.failed_logs for error in log.errors), *criteria)
 
     def warnings_of(self, run: Deviation) -> tuple[LogWarning, ...]:
         """Return the warnings of a log: those from before, and what the comparison says of it."""
         return (*run.run.warnings, *(one for one in self.warnings if one.about == run.name))
 
     @property
-    def own_warnings(self) -> tuple[LogWarning, ...]:
+    def general_warnings(self) -> tuple[LogWarning, ...]:
         """The warnings that are about no single log."""
         return tuple(one for one in self.warnings if one.about not in [run.name for run in self.runs])
 
@@ -111,7 +115,7 @@ class Comparison(Result):
         the share of a tolerance that is used up decides, then the rms norm.
         """
         by_used = sorted(self.runs, key=by_tolerance)
-        return tuple(sorted(by_used, key=lambda run: (run.verdict == "fail", bool(run.partly))))
+        return tuple(sorted(by_used, key=lambda run: (run.verdict == "fail", bool(run.incomplete_shares))))
 
     @property
     def worst(self) -> Deviation:
@@ -149,7 +153,7 @@ class Comparison(Result):
         worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""
         count = len(self.assumptions)
         assumed = f", on {format_count(count, 'assumption')}" if count else ""
-        lost = (f"{one.name} not judged" for one in self.unjudged)
+        lost = (f"{one.name} not judged" for one in self.failed_logs)
         return format_headline(
             f"{self.name}: {self.verdict or 'incomplete'}{share}{worse}{assumed}", *lost, *logs
         )
@@ -178,14 +182,15 @@ class Comparison(Result):
             "warnings": [one.to_dict() for one in self.warnings],
             "baseline": None if self.baseline is None else self.baseline.to_dict(),
             "iso": None if self.iso is None else self.iso.to_dict(),
-            "unjudged": [
-                {"name": log.name, "errors": [one.to_dict() for one in log.errors]} for log in self.unjudged
+            "failed_logs": [
+                {"name": log.name, "errors": [one.to_dict() for one in log.errors]}
+                for log in self.failed_logs
             ],
             "recording": str(self.recording) if self.recording else None,
         }
 
 
-Worse: TypeAlias = Literal["max", "rms", "share_out", "samples"]
+Worse: TypeAlias = Literal["max", "rms", "out_fraction", "samples"]
 
 KEPT = 0.9
 """A log that keeps a smaller share of its samples lost some: one program, recorded by hand, varies less.
@@ -194,7 +199,7 @@ Samples count by the time that they stand for: another rate of recording loses n
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class QuantityChange:
     """How one quantity of one log stands to the baseline.
 
     Attributes:
@@ -202,24 +207,24 @@ class Change:
         before: The statistics of the baseline.
         now: The statistics now.
         noise: What means nothing, in the unit of the statistics.
-        share_noise: Share of the samples, 0..1, that the noise can have put out of tolerance, before and now:
-            those that are out by no more than it, and one sample where the times differ; None where the
-            shares do not compare (no tolerance, or another one than before).
+        out_fraction_noise: Fraction of the samples, 0..1, that the noise can have put out of tolerance,
+            before and now: those that are out by no more than it, and one sample where the times differ;
+            None where the fractions do not compare (no tolerance, or another one than before).
         periods: Periods of the samples before and now in [ns]: of another rate, they stand for another time.
         samples_shared: Samples at times that both have, with a value on both sides.
-        largest: Largest absolute change at one of them; None without any.
-        t_largest: When that was, in [s] of the log; None without times.
+        largest_change: Largest absolute change at one of them; None without any.
+        t_largest_change: When that was, in [s] of the log; None without times.
     """
 
     run: str
     before: Statistics
     now: Statistics
     noise: float
-    share_noise: tuple[float, float] | None
+    out_fraction_noise: tuple[float, float] | None
     periods: tuple[float, float]
     samples_shared: int
-    largest: float | None
-    t_largest: float | None
+    largest_change: float | None
+    t_largest_change: float | None
 
     @property
     def worse(self) -> tuple[Worse, ...]:
@@ -234,17 +239,22 @@ class Change:
     @property
     def changed(self) -> bool:
         """Whether anything changed beyond the noise: the statistics, the verdict, or one sample."""
-        moved = self.largest is not None and self.largest > self.noise
+        moved = self.largest_change is not None and self.largest_change > self.noise
         return bool(self.worse or self.better or moved or self.before.verdict != self.now.verdict)
 
     def _grown(self, *, before: int, now: int) -> tuple[Worse, ...]:
         """Return what is larger on one side (0 the baseline, 1 now) than on the other, or rests on less."""
         one, other = ((self.before, self.now)[side] for side in (before, now))
-        noise, count, lasted = self.share_noise, other.samples, (one.samples or 0) * self.periods[before]
+        noise, count, lasted = (
+            self.out_fraction_noise,
+            other.samples,
+            (one.samples or 0) * self.periods[before],
+        )
         grown: dict[Worse, bool] = {
             "max": other.max > one.max + self.noise,
             "rms": other.rms > one.rms + self.noise,
-            "share_out": noise is not None and (other.share_out or 0.0) > (one.share_out or 0.0) + noise[now],
+            "out_fraction": noise is not None
+            and (other.out_fraction or 0.0) > (one.out_fraction or 0.0) + noise[now],
             "samples": count is not None and count * self.periods[now] < KEPT * lasted,
         }
         return tuple(name for name, more in grown.items() if more)
@@ -253,7 +263,7 @@ class Change:
         """Return the JSON object."""
         both = {
             name: {"before": getattr(self.before, name), "now": getattr(self.now, name)}
-            for name in ("max", "rms", "share_out", "samples", "verdict")
+            for name in ("max", "rms", "out_fraction", "samples", "verdict")
         }
         return {
             "run": self.run,
@@ -263,8 +273,8 @@ class Change:
             "noise": self.noise,
             **both,
             "samples_shared": self.samples_shared,
-            "largest_change": self.largest,
-            "t_largest_change": self.t_largest,
+            "largest_change": self.largest_change,
+            "t_largest_change": self.t_largest_change,
             "changed": self.changed,
             "worse": list(self.worse),
             "better": list(self.better),
@@ -309,7 +319,7 @@ class CriterionChange:
 
 
 @dataclass(frozen=True, slots=True)
-class Absent:
+class UnmatchedQuantity:
     """What only one of the two comparisons has.
 
     Attributes:
@@ -325,7 +335,7 @@ class Absent:
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class SettingDifference:
     """What differs in the way the two comparisons were made, as JSON has it."""
 
     what: str
@@ -343,7 +353,7 @@ class BaselineComparison:
         noise: Changes in [m] and [rad] that mean nothing, by kind.
         changes: One a log and quantity that both have.
         new: What the earlier one did not have.
-        gone: What only the earlier one had.
+        missing: What only the earlier one had.
         differences: What differs in the way the two were made.
         criteria: Of tests after ISO 9283: one a criterion that has a value in both; the cycles themselves are
             not held against each other.
@@ -352,21 +362,21 @@ class BaselineComparison:
     name: str
     recording: Path | None
     noise: Mapping[str, float]
-    changes: tuple[Change, ...]
-    new: tuple[Absent, ...]
-    gone: tuple[Absent, ...]
-    differences: tuple[Difference, ...]
+    changes: tuple[QuantityChange, ...]
+    new: tuple[UnmatchedQuantity, ...]
+    missing: tuple[UnmatchedQuantity, ...]
+    differences: tuple[SettingDifference, ...]
     criteria: tuple[CriterionChange, ...] = ()
 
     @property
-    def worse(self) -> tuple[Change, ...]:
+    def worse(self) -> tuple[QuantityChange, ...]:
         """The quantities that are worse than before, beyond the noise."""
         return tuple(change for change in self.changes if change.worse)
 
     @property
     def verdict(self) -> Verdict:
         """Fail if a quantity is worse, or something that was compared before is compared no more."""
-        return "fail" if self.worse or self.worse_criteria or self.gone else "pass"
+        return "fail" if self.worse or self.worse_criteria or self.missing else "pass"
 
     @property
     def worse_criteria(self) -> tuple[CriterionChange, ...]:
@@ -382,7 +392,7 @@ class BaselineComparison:
             "noise": dict(self.noise),
             "changes": [change.to_dict() for change in self.changes],
             "new": [asdict(one) for one in self.new],
-            "gone": [asdict(one) for one in self.gone],
+            "missing": [asdict(one) for one in self.missing],
             "differences": [asdict(one) for one in self.differences],
             "criteria": [one.to_dict() for one in self.criteria],
         }
@@ -392,7 +402,7 @@ Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True)
-class Unjudged:
+class FailedLog:
     """A log that was to be compared, and could not be.
 
     Attributes:
@@ -405,7 +415,7 @@ class Unjudged:
 
 
 def judge_others(
-    judge: Callable[[Sequence[Run]], Made], runs: Sequence[Run], unjudged: list[Unjudged]
+    judge: Callable[[Sequence[Run]], Made], runs: Sequence[Run], failed_logs: list[FailedLog]
 ) -> Made:
     """Return what a function makes of those runs that it takes, and add the others to a list.
 
@@ -419,14 +429,14 @@ def judge_others(
         kept = [run for run, lost in zip(runs, alone, strict=True) if lost is None]
         if not kept or len(kept) == len(runs):
             raise
-    unjudged += [lost for lost in alone if lost is not None]
+    failed_logs += [lost for lost in alone if lost is not None]
     return judge(kept)
 
 
-def _lost(judge: Callable[[Sequence[Run]], object], run: Run) -> Unjudged | None:
+def _lost(judge: Callable[[Sequence[Run]], object], run: Run) -> FailedLog | None:
     """Return why a run cannot be judged, even alone; None if it can."""
     try:
         judge([run])
     except UrmpipeError as error:
-        return Unjudged(run.name, error.findings)
+        return FailedLog(run.name, error.findings)
     return None

@@ -54,7 +54,7 @@ class Statistics:
         sample_max: Row of the log with the largest, from 0.
         tolerance: Largest absolute value allowed, or None.
         out_of_tolerance: Compared samples above it or without a value; None without a tolerance.
-        share_out: Their share of the compared samples, 0..1; None without a tolerance.
+        out_fraction: Their fraction of the compared samples, 0..1; None without a tolerance.
         verdict: pass or fail, None without a tolerance.
         samples: Compared samples that have a value; None in a recording made before they were counted.
         missing: Compared samples that have none: they cannot be shown to be within a tolerance.
@@ -72,13 +72,13 @@ class Statistics:
     sample_max: int
     tolerance: float | None
     out_of_tolerance: int | None
-    share_out: float | None
+    out_fraction: float | None
     verdict: Verdict | None
     samples: int | None = None
     missing: int = 0
 
     @property
-    def used(self) -> float | None:
+    def utilisation(self) -> float | None:
         """Share of the tolerance that the largest value uses up; None without one, inf if one is missing."""
         if not self.tolerance:
             return None
@@ -94,7 +94,7 @@ class Statistics:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class SampleInterval:
     """Samples in a row that are out of tolerance, or unseen.
 
     Attributes:
@@ -118,19 +118,19 @@ class Share:
         quantity: coverage or judged.
         value: Share of the reference's samples that the log shows; of the log's motion that was judged; 0..1.
         samples: Samples shown or judged.
-        of: Samples with a value, of the reference or of the log.
+        total: Samples with a value, of the reference or of the log.
         tolerance: Least share allowed, or None.
         verdict: pass or fail, None without a tolerance.
-        unseen: The longest stretch that was not seen, of the first of equally long ones; None without any.
+        longest_unseen: The longest interval not seen, the first of equally long ones; None without any.
     """
 
     quantity: ShareKind
     value: float
     samples: int
-    of: int
+    total: int
     tolerance: float | None
     verdict: Verdict | None
-    unseen: Stretch | None
+    longest_unseen: SampleInterval | None
 
     @property
     def kind(self) -> ShareKind:
@@ -138,7 +138,7 @@ class Share:
         return self.quantity
 
     @property
-    def used(self) -> float | None:
+    def utilisation(self) -> float | None:
         """Part of what may be unseen that is; None without a tolerance, inf if nothing may be."""
         if self.tolerance is None:
             return None
@@ -148,7 +148,7 @@ class Share:
     def fields(self) -> dict[str, Any]:
         """Return the fields of `Statistics` that it has, its share as `value`."""
         own = {name: getattr(self, name) for name in ("quantity", "kind", "value", "tolerance", "verdict")}
-        return own | {"unit": "1", "samples": self.samples, "missing": self.of - self.samples}
+        return own | {"unit": "1", "samples": self.samples, "missing": self.total - self.samples}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -170,7 +170,7 @@ class Deviation(Displayable):
             where a side has none.
         joint_turns: Whole turns that two motions count apart for the pose they start in, one a joint; they
             are taken out of `joint_delta`.
-        outside: Where any quantity with a tolerance is out of it, shape (m,).
+        out_of_tolerance: Where any quantity with a tolerance is out of it, shape (m,).
         sync: How the clocks were put together.
         alignment: How the log was moved in space.
         left_out: Samples of the log without a reference or without a value.
@@ -198,7 +198,7 @@ class Deviation(Displayable):
     angle: FloatArray | None
     joint_delta: FloatArray | None
     joint_turns: tuple[int, ...]
-    outside: NDArray[np.bool_]
+    out_of_tolerance: NDArray[np.bool_]
     sync: Sync
     alignment: Alignment
     left_out: int
@@ -229,30 +229,30 @@ class Deviation(Displayable):
     @property
     def worst(self) -> int:
         """Index into the compared samples of the largest norm."""
-        return int(np.argmax(self.delta[:, 3])) if self.statistics else self.furthest_at
+        return int(np.argmax(self.delta[:, 3])) if self.statistics else self.worst_statistics_index
 
     @property
-    def share_out(self) -> float:
+    def out_fraction(self) -> float:
         """Share of the compared samples out of tolerance, 0..1."""
-        return float(np.count_nonzero(self.outside)) / len(self.sample)
+        return float(np.count_nonzero(self.out_of_tolerance)) / len(self.sample)
 
     @property
-    def longest_out(self) -> Stretch | None:
+    def longest_out_interval(self) -> SampleInterval | None:
         """The longest stretch out of tolerance, the first of equally long ones; None without any."""
         edges = np.flatnonzero(np.diff(self.sample) > 1) + 1  # a stretch ends where samples are left out
-        changes = np.flatnonzero(np.diff(self.outside)) + 1
+        changes = np.flatnonzero(np.diff(self.out_of_tolerance)) + 1
         starts = np.unique(np.concatenate(([0], edges, changes)))
         ends = np.append(starts[1:], len(self.sample))
-        lengths = np.where(self.outside[starts], ends - starts, 0)
+        lengths = np.where(self.out_of_tolerance[starts], ends - starts, 0)
         longest = int(np.argmax(lengths))
         if not lengths[longest]:
             return None
         first, last = int(starts[longest]), int(ends[longest]) - 1
         count, sample = last - first + 1, int(self.sample[first])
         if not self.run.timed:
-            return Stretch(count, sample, None, None)
+            return SampleInterval(count, sample, None, None)
         lasts = float(self.t_ns[last] - self.t_ns[first]) / 1e9
-        return Stretch(count, sample, float(self.t[first]), lasts)
+        return SampleInterval(count, sample, float(self.t[first]), lasts)
 
     @property
     def all_statistics(self) -> tuple[Statistics, ...]:
@@ -271,7 +271,7 @@ class Deviation(Displayable):
         joints = () if self.joint_delta is None else tuple(self.joint_delta.T)
         return (*self.delta.T, self.path, *angle, *joints) if self.statistics else joints
 
-    def furthest_joint(self, unit: str) -> Statistics | None:
+    def worst_joint(self, unit: str) -> Statistics | None:
         """Return the joint in rad or m that is furthest off; None without one."""
         joints = [one for one in self.joint_statistics.values() if one.unit == unit]
         return max(joints, key=lambda one: one.max, default=None)
@@ -281,9 +281,9 @@ class Deviation(Displayable):
         return int(np.searchsorted(self.sample, one.sample_max))
 
     @property
-    def furthest_at(self) -> int:
+    def worst_statistics_index(self) -> int:
         """Index into the compared samples of the furthest quantity; the norm need not be largest there."""
-        return self.peak(self.furthest)
+        return self.peak(self.worst_statistics)
 
     def place(self, one: Statistics) -> tuple[float, float, float] | None:
         """Return where the log was when one of its quantities was largest, in [m]; None without a place."""
@@ -297,30 +297,30 @@ class Deviation(Displayable):
         return one.sample_max + 1
 
     @property
-    def furthest(self) -> Statistics:
+    def worst_statistics(self) -> Statistics:
         """The deviation that uses up most of its tolerance; the norm where nothing has one."""
-        held = [one for one in self.all_statistics if one.used is not None]
+        held = [one for one in self.all_statistics if one.utilisation is not None]
         otherwise = self.statistics.get("norm", self.all_statistics[0])
-        return max(held, key=lambda one: one.used or 0.0, default=otherwise)
+        return max(held, key=lambda one: one.utilisation or 0.0, default=otherwise)
 
     @property
     def decisive(self) -> Statistics | Share:
         """What decides the verdict: the furthest deviation; if none fails, a share that is too small."""
         small = [one for one in self.shares.values() if one.verdict == "fail"]
-        if self.furthest.verdict == "fail" or not small:
-            return self.furthest
-        return max(small, key=lambda one: one.used or 0.0)
+        if self.worst_statistics.verdict == "fail" or not small:
+            return self.worst_statistics
+        return max(small, key=lambda one: one.utilisation or 0.0)
 
     @property
-    def partly(self) -> tuple[Share, ...]:
+    def incomplete_shares(self) -> tuple[Share, ...]:
         """The shares that are not nearly whole, which its verdict has to name."""
         return tuple(one for one in self.shares.values() if one.value < WHOLE)
 
     def _headline(self) -> str:
         """Return its verdict, and by what it is decided."""
-        one, samples = self.furthest, format_count(len(self.sample), "sample")
+        one, samples = self.worst_statistics, format_count(len(self.sample), "sample")
         largest = f"{one.quantity} up to {one.max:.4g} {one.unit}"
-        shares = (f"{share.quantity} {share.value:.1%}" for share in self.partly)
+        shares = (f"{share.quantity} {share.value:.1%}" for share in self.incomplete_shares)
         return format_headline(self.name, self.verdict, largest, f"{samples} compared", *shares)
 
     def _notes(self) -> list[str]:
@@ -341,7 +341,7 @@ class Deviation(Displayable):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of one run."""
-        worst, longest, timed = self.worst, self.longest_out, self.run.timed
+        worst, longest, timed = self.worst, self.longest_out_interval, self.run.timed
         told = {name: one.to_dict() for name, one in self.statistics.items()}
         norm = float(self.delta[worst, 3]) if told else None
         return {
@@ -366,9 +366,9 @@ class Deviation(Displayable):
                 "sample": int(self.sample[worst]),
                 "norm": norm,
             },
-            "out_of_tolerance": int(np.count_nonzero(self.outside)),
-            "share_out": self.share_out,
-            "longest_out": None if longest is None else asdict(longest),
+            "out_of_tolerance": int(np.count_nonzero(self.out_of_tolerance)),
+            "out_fraction": self.out_fraction,
+            "longest_out_interval": None if longest is None else asdict(longest),
             "speed_correlation": self.speed_correlation,
             "verdict": self.verdict,
             "warnings": [one.to_dict() for one in self.run.warnings],

@@ -71,7 +71,7 @@ def delta_table(comparison: Comparison) -> ExportTable:
     for what, axes in (("delta", AXES), ("reference", AXES[:3]), ("actual", AXES[:3])) if placed else ():
         values = np.concatenate([getattr(run, what) for run in runs])
         columns += columns_of([f"{what}_{axis}" for axis in axes], ["m"] * len(axes), values)
-    outside = np.concatenate([run.outside for run in runs]).astype(np.int64)
+    outside = np.concatenate([run.out_of_tolerance for run in runs]).astype(np.int64)
     columns.append(ExportColumn("out_of_tolerance", "", outside))
     clock = np.concatenate([run.run.log.clock_start_ns + run.t_ns for run in runs])
     return ExportTable(tuple(columns), clock if timed else None)
@@ -134,7 +134,7 @@ def _deviation(comparison: Comparison, run: Deviation) -> dict[str, Any]:
         "t": run.t if timed else nothing,
         "clock_ns": run.run.log.clock_start_ns + run.t_ns if timed else nothing,
         **(placed if run.statistics else {"joints": joints, "delta": _joint_delta(comparison, run)}),
-        "out_of_tolerance": run.outside,
+        "out_of_tolerance": run.out_of_tolerance,
     }
 
 

@@ -34,7 +34,7 @@ LEADING = 3
 def cause_facts(result: Comparison) -> Iterator[Fact]:
     """Yield why the logs deviate that are furthest out, where that is known."""
     for one in _leading(result) or [result.worst]:
-        if one.diagnosis is not None and one.decisive is one.furthest:
+        if one.diagnosis is not None and one.decisive is one.worst_statistics:
             cause = diagnosis_facts(one.diagnosis)[0]
             name = f"{cause.name} of {one.name}" if len(result.runs) > 1 else cause.name
             yield replace(cause, name=name, page=one.verdict == "fail")
@@ -42,7 +42,7 @@ def cause_facts(result: Comparison) -> Iterator[Fact]:
 
 def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     """Yield what decided the verdict: how much, when and where."""
-    held, furthest = one.decisive, one.furthest
+    held, furthest = one.decisive, one.worst_statistics
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held), page=False)
     yield Fact("Decided by", ", ".join(filter(None, (size_of(held), used_words(held)))), brief=False)
@@ -57,7 +57,7 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
 def _leading(result: Comparison) -> list[Deviation]:
     """Return the logs whose causes are at the top of a page: those that fail, the worst first."""
     known = (one for one in reversed(result.ranking) if one.diagnosis is not None)
-    return [one for one in known if one.verdict == "fail" and one.decisive is one.furthest][:LEADING]
+    return [one for one in known if one.verdict == "fail" and one.decisive is one.worst_statistics][:LEADING]
 
 
 def place_of(one: Deviation, held: Statistics) -> Place | None:
@@ -70,14 +70,14 @@ def largest(one: Statistics | None, *, most: bool = False) -> Value | None:
     """Return the largest absolute value of a quantity, with what is allowed of it; None without one."""
     if one is None:
         return None
-    return Value(one.max, one.unit, one.tolerance, one.verdict, one.used, most=most)
+    return Value(one.max, one.unit, one.tolerance, one.verdict, one.utilisation, most=most)
 
 
 def share_value(one: Share | None) -> Value | None:
     """Return a share with what is needed of it; None without one."""
     if one is None:
         return None
-    used = math.inf if one.verdict == "fail" else one.used
+    used = math.inf if one.verdict == "fail" else one.utilisation
     return Value(one.value, "%", one.tolerance, one.verdict, used, least=True)
 
 
@@ -97,9 +97,9 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared if timed else f"{text.counted(len(one.sample), 'pose')}, row by row")
     for share in one.shares.values():
-        seen = f"{share.samples} of {text.counted(share.of, 'sample')}"
+        seen = f"{share.samples} of {text.counted(share.total, 'sample')}"
         name, words = share.quantity.capitalize(), f"{MEANING[share.quantity]}: {seen}"
-        yield Fact(name, share_value(share), words, share in one.partly, page=False)
+        yield Fact(name, share_value(share), words, share in one.incomplete_shares, page=False)
     yield _left_out(one, len(result.reference.t_ns))
     yield from _out_of_tolerance(one, ranked=ranked)
     if timed:
@@ -131,7 +131,7 @@ def _undiagnosed(one: Deviation) -> Iterator[Fact]:
     Nothing if that is known, with an alignment, or where a diagnosis finds nothing: in one pose, or in few.
     """
     told = len(one.sample) >= MIN_SAMPLES and not is_stationary(one)
-    failed = one.furthest.verdict == "fail"
+    failed = one.worst_statistics.verdict == "fail"
     if failed and one.diagnosis is None and one.alignment.mode == "none" and told:
         yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))
 
@@ -191,8 +191,8 @@ def _vector(metres: tuple[float, ...]) -> str:
 
 def _furthest_joint(one: Deviation) -> Iterator[Fact]:
     """Yield the joint that deviates most, of a log that is decided by something else."""
-    joint = one.furthest_joint("rad") or one.furthest_joint("m")
-    if joint is not None and one.furthest.kind != "joint" and joint.max:
+    joint = one.worst_joint("rad") or one.worst_joint("m")
+    if joint is not None and one.worst_statistics.kind != "joint" and joint.max:
         said = f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}"
         yield Fact("Joint furthest off", said, page=False)
 
@@ -205,9 +205,9 @@ def _left_out(one: Deviation, reference_samples: int) -> Fact:
 
 
 def _out_of_tolerance(one: Deviation, *, ranked: bool) -> Iterator[Fact]:
-    out = int(np.count_nonzero(one.outside))
+    out = int(np.count_nonzero(one.out_of_tolerance))
     yield Fact("Out of tolerance", out_words(out, len(one.sample)), brief=out > 0, page=not ranked)
-    if longest := one.longest_out:
+    if longest := one.longest_out_interval:
         yield Fact("Longest stretch out", stretch_words(longest))
 
 
@@ -225,14 +225,14 @@ def _alignment(one: Deviation) -> Iterator[Fact]:
         hints = [Hint("tool", _given(arm.tool))]
         if mode == "base+tool":
             moved = Hint("base", _given(arm.base), "moves the arm")
-            hints = [moved, replace(hints[0], does="moves its tool as well")]
+            hints = [moved, replace(hints[0], effect="moves its tool as well")]
         yield Fact("To apply this permanently", Advice(hints=tuple(hints)))
 
 
 def remedy_hints(one: Deviation) -> list[Hint]:
     """Return the parameters that remove causes of a diagnosed log, with their complete new values."""
     diagnosis, robot = one.diagnosis, one.run.robot
-    if diagnosis is None or diagnosis.remainder.different:
+    if diagnosis is None or diagnosis.unexplained.is_unrelated_motion:
         return []
     hints = []
     for cause in diagnosis.causes:
@@ -243,7 +243,7 @@ def remedy_hints(one: Deviation) -> list[Hint]:
             hints.append(Hint("unit", dict.fromkeys(cause.joints, unit), "reads it so"))
         elif cause.kind == "other_robot":
             hints.append(Hint("robot", cause.name, "takes this arm"))
-    by_joints = all("joint_offset" not in untested.kinds for untested in diagnosis.not_looked_for)
+    by_joints = all("joint_offset" not in untested.kinds for untested in diagnosis.untested)
     if robot is not None and by_joints:  # poses that a log recorded have another base and tool than its arm
         base, tool = _corrected_frames(diagnosis.causes, robot.base, robot.tool)
         hints += [Hint("base", _given(base), "puts the arm there")] if base != robot.base else []

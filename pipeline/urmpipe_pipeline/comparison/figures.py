@@ -83,7 +83,7 @@ def deviation_figures(one: Deviation) -> Iterator[Figure]:
 
 def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
     """Yield the reference and the actual path in space, the actual one coloured by its deviation."""
-    place = one.place(one.furthest)
+    place = one.place(one.worst_statistics)
     if place is None:
         return
     spots = (*ends(one.actual), Spot(place, peak_words(one), DEVIATION_COLOUR))
@@ -95,7 +95,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
             f"Equal scale on all axes. A dot is where a pose was asked for, the arrow from it"
             f" the {arrows.name}, in the colour of its size.",
             f"Poses of {one.name} in three dimensions, each with its deviation as an arrow."
-            f" {decided} at x, y, z = {text.point(place)} m: {amount_words(one.furthest)}.",
+            f" {decided} at x, y, z = {text.point(place)} m: {amount_words(one.worst_statistics)}.",
             (),
             spots[2:],
             arrows,
@@ -109,13 +109,13 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
         "Path in space",
         said,
         f"Paths of the reference and of {one.name} in three dimensions. {decided} at"
-        f" x, y, z = {text.point(place)} m: {amount_words(one.furthest)}.",
+        f" x, y, z = {text.point(place)} m: {amount_words(one.worst_statistics)}.",
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             *supposed,
             Path(
                 "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
-                limit=allowed_norm(one), sample=one.sample, kept=(one.furthest_at,),
+                limit=allowed_norm(one), sample=one.sample, kept=(one.worst_statistics_index,),
             ),
         ),
         spots,
@@ -193,7 +193,7 @@ def _deviation(one: Deviation) -> Figure:
         f" {_out_words(one)}",
         tuple(views),
         _instant(one),
-        opened={"path": 1, "angle": 2}.get(one.furthest.kind, 0),
+        opened={"path": 1, "angle": 2}.get(one.worst_statistics.kind, 0),
         share=3.6,
     )
 
@@ -214,7 +214,7 @@ def _joints(one: Deviation) -> Iterator[Figure]:
         f"Deviation of the joints of {one.name}. Largest absolute values: {largest}.",
         tuple(View("Joints, reference - log", (panel,)) for panel in panels),
         _instant(one),
-        opened=units.index(one.furthest.unit) if one.furthest.kind == "joint" else 0,
+        opened=units.index(one.worst_statistics.unit) if one.worst_statistics.kind == "joint" else 0,
         share=3.0,
     )
 
@@ -246,12 +246,16 @@ def _line(one: Deviation, values: FloatArray, names: tuple[str, ...], colours: t
 def _instant(one: Deviation) -> dict[int, str]:
     """Return when the verdict was decided, or the log deviates most."""
     if not one.run.timed:
-        return {one.furthest.sample_max: f"{peak_words(one)} {when(one.furthest)}"}
-    return {int(one.t_ns[one.furthest_at]): f"{peak_words(one)} at {text.seconds(one.furthest.t_max)} s"}
+        return {one.worst_statistics.sample_max: f"{peak_words(one)} {when(one.worst_statistics)}"}
+    return {
+        int(
+            one.t_ns[one.worst_statistics_index]
+        ): f"{peak_words(one)} at {text.seconds(one.worst_statistics.t_max)} s"
+    }
 
 
 def _out_words(one: Deviation) -> str:
     """Say how much of the log is out of tolerance."""
     if all(held.tolerance is None for held in one.all_statistics):
         return "There is no tolerance."
-    return f"Out of tolerance: {text.percent(one.share_out)} of the samples."
+    return f"Out of tolerance: {text.percent(one.out_fraction)} of the samples."

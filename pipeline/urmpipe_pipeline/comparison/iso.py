@@ -221,7 +221,12 @@ def _part(log: Side, first: int, last: int, number: int) -> _Candidate:
 def _take_rows(trajectory: Trajectory, first: int, last: int, name: str) -> Trajectory:
     """Return the rows of a trajectory from `first` to `last`, both included, with times from 0."""
     rows = slice(first, last + 1)
-    t_ns, quat, q, broken = trajectory.t_ns[rows], trajectory.quat_xyzw, trajectory.q, trajectory.broken
+    t_ns, quat, q, broken = (
+        trajectory.t_ns[rows],
+        trajectory.quat_xyzw,
+        trajectory.q,
+        trajectory.discontinuities,
+    )
     return replace(
         trajectory,
         name=name,
@@ -229,7 +234,7 @@ def _take_rows(trajectory: Trajectory, first: int, last: int, name: str) -> Traj
         position=trajectory.position[rows],
         quat_xyzw=None if quat is None else quat[rows],
         q=None if q is None else q[rows],
-        broken=None if broken is None else broken[(broken >= first) & (broken < last)] - first,
+        discontinuities=None if broken is None else broken[(broken >= first) & (broken < last)] - first,
     )
 
 
@@ -302,11 +307,11 @@ def _shares(
         return {}
     samples = samples._replace(t_ns=cycle.t_ns[samples.sample])
     shares = measure_shares(on_cycle_clock, cycle, samples, least_shares, timed=reference.run.timed)
-    unseen = shares["coverage"].unseen
+    unseen = shares["coverage"].longest_unseen
     if unseen is not None and unseen.t is not None:  # in times of the command
         first, last = command.t[[unseen.sample, unseen.sample + unseen.samples - 1]].tolist()
         unseen = replace(unseen, t=first, duration=last - first)
-        shares["coverage"] = replace(shares["coverage"], unseen=unseen)
+        shares["coverage"] = replace(shares["coverage"], longest_unseen=unseen)
     return shares
 
 

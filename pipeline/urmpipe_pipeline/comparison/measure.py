@@ -42,10 +42,10 @@ from urmpipe_pipeline.comparison.deviation import (
     KINDS,
     Deviation,
     Kind,
+    SampleInterval,
     Share,
     ShareKind,
     Statistics,
-    Stretch,
     Verdict,
 )
 from urmpipe_pipeline.comparison.path_distance import distance_from_path
@@ -142,7 +142,7 @@ def measure(
     path, in_space = values[:, 3], list[Quantity]()
     if np.isfinite(values).any():
         joined = ~has_gap_after(reference.t_ns) & run.timed  # nothing joins still poses
-        joined[[] if reference.broken is None else reference.broken] = False
+        joined[[] if reference.discontinuities is None else reference.discontinuities] = False
         path = distance_from_path(matched.actual, reference.position, joined)
         path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, within rounding
         in_space = [Quantity(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
@@ -174,7 +174,7 @@ def measure(
         angle=angle,
         joint_delta=joint_delta,
         joint_turns=turns,
-        outside=np.any([one.out_of_tolerance(tolerance) for one in (*in_space, *joints)], axis=0),
+        out_of_tolerance=np.any([one.out_of_tolerance(tolerance) for one in (*in_space, *joints)], axis=0),
         sync=matched.sync,
         alignment=matched.alignment,
         left_out=matched.left_out,
@@ -286,7 +286,7 @@ def compute_statistics(
         sample_max=int(sample[known[worst]]),
         tolerance=allowed,
         out_of_tolerance=out,
-        share_out=None if out is None else out / len(quantity.values),
+        out_fraction=None if out is None else out / len(quantity.values),
         verdict=None if out is None else "fail" if out else "pass",
         samples=len(known),
         missing=len(quantity.values) - len(known),
@@ -380,7 +380,7 @@ def _share(
         first, end = edges[np.argmax(edges[:, 1] - edges[:, 0])].tolist()
         lasts = float(t_ns[end - 1] - t_ns[first]) / 1e9
         times = (float(t_ns[first]) / 1e9, lasts) if timed else (None, None)
-        unseen = Stretch(end - first, int(rows[first]), *times)
+        unseen = SampleInterval(end - first, int(rows[first]), *times)
     least = tolerance.get(quantity)
     verdict: Verdict | None = None if least is None else "pass" if value >= least else "fail"
     return Share(quantity, value, int(np.count_nonzero(seen)), len(seen), least, verdict, unseen)

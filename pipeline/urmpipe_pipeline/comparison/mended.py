@@ -36,8 +36,8 @@ def mended_figure(one: Deviation) -> Iterator[Figure]:
     yield Figure(
         f"Deviation over {over} without the causes",
         "What stays when the causes above are taken away. Dashed: the tolerance; tinted: out of it.",
-        f"Deviation of {one.name} over {over} without the causes: {found.sentence}."
-        f" What stays: {format_residual(found.remainder, found.unit)}.",
+        f"Deviation of {one.name} over {over} without the causes: {found.summary}."
+        f" What stays: {format_residual(found.unexplained, found.unit)}.",
         (View("delta without the causes", panels),),
         share=3.0,
         beside=True,
@@ -53,7 +53,7 @@ def _panels(one: Deviation, found: Diagnosis) -> Iterator[Panel]:
     else:
         held = list(one.joint_statistics.values())
         looks = [(f"Δ {joint.quantity}", joint_colour(k)) for k, joint in enumerate(held)]
-    mended = np.asarray(found.mended)
+    mended = np.asarray(found.residual)
     largest = np.nanmax(np.abs(mended), axis=0, initial=0.0)
     for k, ((name, colour), statistics) in enumerate(zip(looks, held, strict=True)):
         unit = statistics.unit
@@ -77,7 +77,7 @@ def mended_path(one: Deviation) -> Iterator[Path]:
     if found is None or not found.causes or found.unit != "m":
         return
     both, own, mended = np.intersect1d(one.sample, found.sample, return_indices=True)
-    position = np.asarray(one.reference)[own] - np.asarray(found.mended)[mended]
+    position = np.asarray(one.reference)[own] - np.asarray(found.residual)[mended]
     t_ns = one.t_ns[own] if one.run.timed else None
     yield Path(
         "without the causes", position, t_ns, CORRECTED_COLOUR, supposed=True, sample=both, line=one.run.timed

@@ -69,8 +69,8 @@ def present(result: Comparison) -> Presentation:
         verdict=result.verdict,
         facts=(*cause_facts(result), *decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
-        opens_at_ns=int(worst.t_ns[worst.furthest_at]) if worst.run.timed else 0,
-        opens_at_row=None if worst.run.timed else worst.furthest.sample_max,
+        opens_at_ns=int(worst.t_ns[worst.worst_statistics_index]) if worst.run.timed else 0,
+        opens_at_row=None if worst.run.timed else worst.worst_statistics.sample_max,
         scene=partial(comparison_scene, result) if worst.statistics else None,
         lines=tuple(comparison_lines(result)),
         rows=partial(statistics_rows, result),
@@ -103,7 +103,7 @@ def _against(result: Comparison) -> tuple[Fact, ...]:
 
 def _body(result: Comparison) -> Section:
     sections = [_log(one, result) for one in result.runs]
-    for log in result.unjudged:
+    for log in result.failed_logs:
         sections.append(Section(log.name, errors=log.errors, rank=len(sections)))
     if result.baseline is not None:
         sections.append(baseline_section(result.baseline, len(sections)))
@@ -118,7 +118,7 @@ def _body(result: Comparison) -> Section:
         ),
         ranking_tables(result),
         blocks=partial(_overview, result),
-        warnings=result.own_warnings,
+        warnings=result.general_warnings,
         sections=tuple(sections),
     )
 
@@ -169,20 +169,20 @@ def _checks(result: Comparison, one: Deviation) -> Iterator[Check]:
 
 def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
     """Return what is worth keeping of a log, and every field of the statistics of each quantity."""
-    longest = one.longest_out
+    longest = one.longest_out_interval
     return {
         "reference": result.reference.name,
         "robot": one.run.robot.name if one.run.robot else None,
         "verdict": one.verdict,
-        **({"cause": one.diagnosis.sentence} if one.diagnosis else {}),
+        **({"cause": one.diagnosis.summary} if one.diagnosis else {}),
         "assumptions": "; ".join(result.assumptions),
         "duration": one.duration if one.run.timed else None,
         "samples": len(one.sample),
         "left_out": one.left_out,
         "reference_left_out": one.reference_left_out,
         "sync_offset": one.sync.offset if one.run.timed else None,
-        "share_out": one.share_out,
-        "longest_out": 0.0 if longest is None else longest.duration,
+        "out_fraction": one.out_fraction,
+        "longest_out_interval": 0.0 if longest is None else longest.duration,
         "speed_correlation": one.speed_correlation,
     } | {
         f"{quantity_name(held)}.{field}": value
@@ -211,10 +211,14 @@ def _events(one: Deviation) -> Iterator[Event]:
         yield Event(start, f"{one.left_out} of {whole} samples left out: no reference or no value", "warning")
     yield from log_events(one.run)
     level: Level = "info" if one.verdict == "pass" else "error"
-    if (longest := one.longest_out) is not None and longest.t is not None and longest.duration is not None:
+    if (
+        (longest := one.longest_out_interval) is not None
+        and longest.t is not None
+        and longest.duration is not None
+    ):
         lasts = f"{longest.samples} samples, {text.seconds(longest.duration)} s"
         yield Event(round(longest.t * 1e9), f"longest stretch out of tolerance begins: {lasts}", level)
-    held, timed = one.furthest, one.run.timed
+    held, timed = one.worst_statistics, one.run.timed
     if isinstance(one.decisive, Share):
         yield Event(start, f"decides: {decided_words(one.decisive)}", level)
     elif held.tolerance is not None:

@@ -86,7 +86,7 @@ def _arm(one: Deviation, colour: str) -> Iterator[Arm]:
     run = one.run
     if run.robot is None or run.tcp is None:
         return
-    decided = int(one.t_ns[one.furthest_at])
+    decided = int(one.t_ns[one.worst_statistics_index])
     row = min(int(np.searchsorted(run.t_ns, decided)), len(run.t_ns) - 1)
     chain = placed(run.robot, one.alignment)
     yield Arm(chain, run.q, times_of(run), colour, kept=(row,), marks=cause_marks(one, chain))
@@ -98,14 +98,14 @@ def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:
         yield Path(reference.name, reference.position, None, REFERENCE_COLOUR, asked=True)
     yield Path(
         reference.name, shown.reference, shown.axis_ns, REFERENCE_COLOUR, asked=True, sample=shown.sample,
-        kept=(shown.furthest_at,), line=False,
+        kept=(shown.worst_statistics_index,), line=False,
     )  # fmt: skip
 
 
 def _log(one: Deviation, colour: str) -> Path:
     """Return where a compared log was."""
     return Path(
-        one.name, one.actual, one.axis_ns, colour, sample=one.sample, kept=(one.furthest_at,),
+        one.name, one.actual, one.axis_ns, colour, sample=one.sample, kept=(one.worst_statistics_index,),
         line=one.run.timed,
     )  # fmt: skip
 
@@ -113,8 +113,8 @@ def _log(one: Deviation, colour: str) -> Path:
 def _decided(one: Deviation, *, several: bool) -> Spot:
     """Return where the verdict on a log was decided: by what, how much and when."""
     whose = f", {one.name}" if several else ""
-    said = f"{amount_words(one.furthest)} {when(one.furthest)}{whose}"
-    return Spot(spot_at(one.actual[one.furthest_at]), said, DEVIATION_COLOUR)
+    said = f"{amount_words(one.worst_statistics)} {when(one.worst_statistics)}{whose}"
+    return Spot(spot_at(one.actual[one.worst_statistics_index]), said, DEVIATION_COLOUR)
 
 
 def _enlarged(one: Deviation, radius: float) -> Path | None:
@@ -126,7 +126,7 @@ def _enlarged(one: Deviation, radius: float) -> Path | None:
     if factor is None:
         return None
     position = one.reference + factor * (np.asarray(one.actual) - one.reference)
-    kept = (one.furthest_at,)
+    kept = (one.worst_statistics_index,)
     return Path(f"deviation x{factor}", position, one.t_ns, DEVIATION_COLOUR, sample=one.sample, kept=kept)
 
 

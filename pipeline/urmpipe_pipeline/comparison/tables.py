@@ -32,7 +32,7 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
     }
     note = "The logs are ranked by the largest share of a tolerance that each uses."
     left_out = "Left out: samples of the log without a counterpart or without a value."
-    partly = {share.quantity for one in result.runs for share in one.partly}
+    partly = {share.quantity for one in result.runs for share in one.incomplete_shares}
     note += "".join(f" {name.capitalize()}: share {MEANING[name]}." for name in MEANING if name in partly)
     hidden = set(MEANING) - partly
     columns = (
@@ -79,9 +79,9 @@ def _sizes(result: Comparison) -> Heads[Deviation]:
         "max_norm": ("max ‖Δ‖", lambda one: largest(one.statistics.get("norm"))),
         "max_path": ("max path", lambda one: largest(one.statistics.get("path"))),
         "max_angle": ("max angle", lambda one: largest(one.statistics.get("angle"))),
-        "max_joint": ("max joint", lambda one: largest(one.furthest_joint("rad"))),
-        "max_slide": ("max slide", lambda one: largest(one.furthest_joint("m"))),
-        "share_out": ("out", lambda one: Value(one.share_out, "%")),
+        "max_joint": ("max joint", lambda one: largest(one.worst_joint("rad"))),
+        "max_slide": ("max slide", lambda one: largest(one.worst_joint("m"))),
+        "out_fraction": ("out", lambda one: Value(one.out_fraction, "%")),
         "coverage": ("coverage", seen("coverage")),
         "judged": ("judged", seen("judged")),
     }
@@ -94,8 +94,8 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
         **names,
         "t": ("decided at t", lambda one: Value(_decided_t(one), "s")),
         "place": ("log there at x, y, z", _decided_place),
-        "longest_out": ("longest out", lambda one: _stretch(one, "duration")),
-        "longest_out_t": ("longest out from t", lambda one: _stretch(one, "t")),
+        "longest_out_interval": ("longest out", lambda one: _stretch(one, "duration")),
+        "longest_out_interval_t": ("longest out from t", lambda one: _stretch(one, "t")),
         "sync_offset": ("offset", lambda one: Value(one.sync.offset, "s", signed=True)),
         "speed_correlation": ("r(‖Δ‖, speed)", lambda one: Value(one.speed_correlation, "1", signed=True)),
         "left_out": ("left out", lambda one: Value(one.left_out)),
@@ -109,7 +109,7 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
             "t": row,
             **{key: heads[key] for key in ("place", "left_out", "warnings", "alignment")},
         }
-    brief = {"run", "t", "longest_out", "longest_out_t", "speed_correlation"}
+    brief = {"run", "t", "longest_out_interval", "longest_out_interval_t", "speed_correlation"}
     brief |= {"sync_offset"} if any(one.sync.offset for one in runs) else set()
     brief |= {"left_out"} if any(one.left_out for one in runs) else set()
     for column in columns_of(runs, heads):
@@ -119,11 +119,13 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
 def _decided_t(one: Deviation) -> float | None:
     """Return when the verdict was decided in [s]: of a share where most was unseen."""
     held = one.decisive
-    return held.t_max if isinstance(held, Statistics) else held.unseen.t if held.unseen else None
+    return (
+        held.t_max if isinstance(held, Statistics) else held.longest_unseen.t if held.longest_unseen else None
+    )
 
 
 def _decided_place(one: Deviation) -> Place | None:
-    return place_of(one, one.furthest) if one.decisive is one.furthest else None
+    return place_of(one, one.worst_statistics) if one.decisive is one.worst_statistics else None
 
 
 def _decided_row(one: Deviation) -> int | None:
@@ -131,11 +133,11 @@ def _decided_row(one: Deviation) -> int | None:
     held = one.decisive
     if isinstance(held, Statistics):
         return one.row(held)
-    return held.unseen.sample + 1 if held.unseen else None
+    return held.longest_unseen.sample + 1 if held.longest_unseen else None
 
 
 def _stretch(one: Deviation, name: str) -> Value | None:
-    longest = one.longest_out
+    longest = one.longest_out_interval
     return None if longest is None else Value(getattr(longest, name), "s")
 
 
@@ -143,7 +145,7 @@ def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
     """Yield the lines of a comparison among several: one a log, from best to worst."""
     lost: list[str] = []
     if result.baseline:
-        lost = [*(one.run for one in result.baseline.worse), *(one.run for one in result.baseline.gone)]
+        lost = [*(one.run for one in result.baseline.worse), *(one.run for one in result.baseline.missing)]
     for one in result.ranking:
         worse = lost.count(one.name)
         yield {
@@ -192,7 +194,9 @@ def _shares(one: Deviation) -> tuple[Column, ...]:
     """Return the columns of the shares of a log."""
 
     def unseen(name: str, unit: str = "") -> Callable[[Share], Cell]:
-        return lambda held: None if held.unseen is None else Value(getattr(held.unseen, name), unit)
+        return lambda held: (
+            None if held.longest_unseen is None else Value(getattr(held.longest_unseen, name), unit)
+        )
 
     heads: Heads[Share] = {
         "quantity": ("Quantity", lambda held: held.quantity),
@@ -200,9 +204,9 @@ def _shares(one: Deviation) -> tuple[Column, ...]:
         "tolerance": ("at least", lambda held: Value(held.tolerance, "%", given=True)),
         "value": ("share", share_value),
         "samples": ("samples", lambda held: Value(held.samples)),
-        "of": ("of", lambda held: Value(held.of)),
+        "total": ("total", lambda held: Value(held.total)),
         "unseen_t": ("longest unseen from t", unseen("t", "s")),
-        "unseen": ("unseen for", unseen("duration", "s")),
+        "longest_unseen": ("unseen for", unseen("duration", "s")),
         "unseen_samples": ("unseen samples", unseen("samples")),
     }
     return columns_of(list(one.shares.values()), heads)
@@ -210,7 +214,7 @@ def _shares(one: Deviation) -> tuple[Column, ...]:
 
 def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, float]) -> tuple[Column, ...]:
     """Return the columns of the statistics of some quantities in one unit."""
-    joint = one.furthest_joint(own[0].unit)
+    joint = one.worst_joint(own[0].unit)
 
     def number(key: str) -> tuple[str, Callable[[Statistics], Cell]]:
         return key, lambda held: Value(getattr(held, key), held.unit)
@@ -226,7 +230,7 @@ def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, floa
         **{key: number(key) for key in ("rms", "p95", "mean", "std")},
         "start": ("at start", lambda held: Value(starts[id(held)], held.unit)),
         "out_of_tolerance": ("samples out", lambda held: Value(held.out_of_tolerance)),
-        "share_out": ("out", lambda held: Value(held.share_out, "%")),
+        "out_fraction": ("out", lambda held: Value(held.out_fraction, "%")),
         "missing": ("no value", lambda held: Value(held.missing or None)),
     }
     return columns_of(own, heads)

@@ -169,7 +169,7 @@ def _fits(kind: str, value: float, zero: bool) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class DeltaVerdict:
+class DeltaMeterResult:
     """What a delta meter of a co-simulated system found.
 
     Attributes:
@@ -183,7 +183,7 @@ class DeltaVerdict:
         samples: How many were judged.
         out_of_tolerance: How many of them are out of it in any quantity; one without a value is.
         verdict: pass if none is, and nothing else is to be doubted.
-        doubts: What else keeps it from passing, such as "bad.y, which leads to it, is not finite".
+        caveats: What else keeps it from passing, such as "bad.y, which leads to it, is not finite".
         missing: Samples without a value, which are out of tolerance.
     """
 
@@ -197,7 +197,7 @@ class DeltaVerdict:
     samples: int
     out_of_tolerance: int
     verdict: Verdict
-    doubts: tuple[str, ...] = ()
+    caveats: tuple[str, ...] = ()
     missing: int = 0
 
     @property
@@ -216,21 +216,21 @@ class DeltaVerdict:
         return allowed_for(self.quantity, self.kind, self.tolerance)
 
     @property
-    def used(self) -> float | None:
+    def utilisation(self) -> float | None:
         """Share of its tolerance that the worst value uses up; None where a sample has no value."""
         if self.allowed is None or not math.isfinite(self.worst):
             return None
         return float(_shares(np.array(self.worst), np.array(self.allowed)))
 
     @property
-    def share_out(self) -> float:
+    def out_fraction(self) -> float:
         """Share of the samples out of tolerance, 0..1."""
         return self.out_of_tolerance / self.samples
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
         worst = self.worst if math.isfinite(self.worst) else None
-        told = asdict(self) | {"worst": worst, "doubts": list(self.doubts), "coverage": self.coverage}
+        told = asdict(self) | {"worst": worst, "caveats": list(self.caveats), "coverage": self.coverage}
         return {name: value for name, value in told.items() if name != "variables"}
 
 
@@ -239,8 +239,8 @@ def delta_verdict(
     t_ns: IntArray,
     delta: FloatArray,
     tolerance: Mapping[str, float],
-    doubts: Sequence[str] = (),
-) -> DeltaVerdict | None:
+    caveats: Sequence[str] = (),
+) -> DeltaMeterResult | None:
     """Hold the deviation of a delta meter against a tolerance; None without a sample.
 
     Args:
@@ -248,7 +248,7 @@ def delta_verdict(
         t_ns: Times in integer [ns], shape (n,).
         delta: reference - actual in [m], shape (n, 3).
         tolerance: Largest absolute deviation allowed in [m]: axis, norm, or x, y, z.
-        doubts: Why it shall not pass even where no sample is out of tolerance.
+        caveats: Why it shall not pass even where no sample is out of tolerance.
 
     Raises:
         OptionError: If a tolerance is none of those, or negative.
@@ -263,7 +263,7 @@ def delta_verdict(
     known = np.isfinite(sizes).all(axis=1)
     out = ~known | (sizes > allowed).any(axis=1)
     row, axis = _worst(np.where(known[:, np.newaxis], sizes, math.inf), allowed)
-    return DeltaVerdict(
+    return DeltaMeterResult(
         block=block,
         variables=("delta", "norm"),
         tolerance=dict(tolerance),
@@ -273,8 +273,8 @@ def delta_verdict(
         sample=row,
         samples=len(t_ns),
         out_of_tolerance=int(np.count_nonzero(out)),
-        verdict="fail" if out.any() or doubts else "pass",
-        doubts=tuple(doubts),
+        verdict="fail" if out.any() or caveats else "pass",
+        caveats=tuple(caveats),
         missing=int(np.count_nonzero(~known)),
     )
 

@@ -55,7 +55,7 @@ def verdict_assumptions(sides: Sequence[tuple[Run, Collection[Role]]]) -> tuple[
         LogError: With each reading that needs an answer before a verdict is based on it.
     """
     used = [(run, warning) for run, roles in sides for warning in run.warnings if warning.role in roles]
-    if blocking := [(run, warning) for run, warning in used if warning.asks]:
+    if blocking := [(run, warning) for run, warning in used if warning.blocks_verdict]:
         raise LogError(*(replace(warning.as_finding(), file=run_label(run)) for run, warning in blocking))
     assumptions = [(warning.assumption, run.name) for run, warning in used if warning.assumption]
     return list_assumptions(assumptions, {run.name for run, _ in sides})
@@ -131,8 +131,8 @@ def left_out_warnings(deviation: Deviation, reference: Trajectory) -> Iterator[L
         message = f"{deviation.left_out - beyond} of {samples} samples have no reference or no value"
         yield LogWarning("left-out", message, about=deviation.name)
     coverage = deviation.shares["coverage"]
-    if coverage.verdict != "fail" and coverage in deviation.partly:
-        samples_of = f"{coverage.samples} of {text.counted(coverage.of, 'sample')} of {reference.name}"
+    if coverage.verdict != "fail" and coverage in deviation.incomplete_shares:
+        samples_of = f"{coverage.samples} of {text.counted(coverage.total, 'sample')} of {reference.name}"
         message = f"it shows {samples_of} ({text.percent(coverage.value)}){unseen_words(coverage)}"
         yield LogWarning("not-covered", message, about=deviation.name)
 
@@ -164,8 +164,8 @@ def is_stationary(deviation: Deviation) -> bool:
 def undetermined_frames(deviation: Deviation) -> Iterator[LogWarning]:
     """Yield a warning about components of base and tool that the compared poses do not determine."""
     unobservable = deviation.alignment.unobservable
-    undetermined = [direction for direction in unobservable if direction.seen < MIN_SENSITIVITY]
-    weak = [direction for direction in unobservable if direction.seen >= MIN_SENSITIVITY]
+    undetermined = [direction for direction in unobservable if direction.sensitivity < MIN_SENSITIVITY]
+    weak = [direction for direction in unobservable if direction.sensitivity >= MIN_SENSITIVITY]
     parts = []
     if undetermined:
         parts.append(f"do not determine {_format_directions(undetermined)}, so the smallest values are used")

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, Statistics, Stretch
-from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, DeltaVerdict
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, SampleInterval, Share, Statistics
+from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, DeltaMeterResult
 from urmpipe_pipeline.presentation.digits import held, written
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.provenance import format_assumptions, format_defaults
@@ -23,12 +23,14 @@ NAMED = 3
 def verdict_words(one: Comparison) -> str:
     """Return which logs are out of tolerance against what, or that all are within, and what that rests on."""
     failed = [run for run in one.runs if run.verdict == "fail"]
-    total = len(one.runs) + len(one.unjudged)
+    total = len(one.runs) + len(one.failed_logs)
     said = f"{_who(failed or one.runs, total)} {'out of' if failed else 'within'} tolerance"
     said += f" against {one.reference.name}{_points(one)}{_part(one)}{_clocks(one)}"
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
-    lost = f"; not judged: {text.enumerated([log.name for log in one.unjudged])}" if one.unjudged else ""
+    lost = (
+        f"; not judged: {text.enumerated([log.name for log in one.failed_logs])}" if one.failed_logs else ""
+    )
     return said + format_assumptions(one.assumptions) + format_defaults(one.provenance) + lost
 
 
@@ -56,12 +58,14 @@ def _points(one: Comparison) -> str:
 
 def _part(one: Comparison) -> str:
     """Return what a verdict does not rest on, as "; coverage 0.5 % of 90 % needed, ..."; else nothing."""
-    partly = [run for run in one.runs if run.partly]
+    partly = [run for run in one.runs if run.incomplete_shares]
     if len(partly) > NAMED:
         return f"; coverage or judged below 99 % in {len(partly)} logs"
     several = len(one.runs) > 1
     return "".join(
-        f"; {share_words(share, run.name if several else '')}" for run in partly for share in run.partly
+        f"; {share_words(share, run.name if several else '')}"
+        for run in partly
+        for share in run.incomplete_shares
     )
 
 
@@ -91,15 +95,19 @@ def share_words(one: Share, whose: str = "") -> str:
 def unseen_words(one: Share) -> str:
     """Return where most was unseen, as ", longest unseen: 3.970 s from t = 0.010 s of the reference"."""
     side = "reference" if one.quantity == "coverage" else "log"
-    return "" if one.unseen is None else f", longest unseen: {stretch_words(one.unseen)} of the {side}"
+    return (
+        ""
+        if one.longest_unseen is None
+        else f", longest unseen: {stretch_words(one.longest_unseen)} of the {side}"
+    )
 
 
-def symbol(one: Statistics | Share | DeltaVerdict) -> str:
+def symbol(one: Statistics | Share | DeltaMeterResult) -> str:
     """Return what a quantity is called: Δx, ‖Δ‖, path, angle, coverage, or a joint by its name."""
     return SYMBOLS[one.quantity] if one.kind in ("axis", "norm") else one.quantity
 
 
-def size_of(one: Statistics | Share | DeltaVerdict) -> str:
+def size_of(one: Statistics | Share | DeltaMeterResult) -> str:
     """Return what the absolute value of a quantity is called: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
     if one.kind == "joint":
         return f"|Δ {one.quantity}|"
@@ -111,13 +119,13 @@ def quantity_name(one: Statistics | Share) -> str:
     return f"joint {one.quantity}" if one.kind == "joint" else one.quantity
 
 
-def used_words(one: Statistics | Share | DeltaVerdict) -> str:
+def used_words(one: Statistics | Share | DeltaMeterResult) -> str:
     """Return how much of its tolerance a deviation uses up: "71.0 % of the tolerance"; else nothing."""
-    if one.used is None or isinstance(one, Share):
+    if one.utilisation is None or isinstance(one, Share):
         return ""
     if isinstance(one, Statistics) and one.missing:
         return f"no value at {one.missing} of {(one.samples or 0) + one.missing} samples"
-    return "" if math.isinf(one.used) else f"{text.portion(one.used)} the tolerance"
+    return "" if math.isinf(one.utilisation) else f"{text.portion(one.utilisation)} the tolerance"
 
 
 def amount_words(one: Statistics | Share) -> str:
@@ -138,7 +146,9 @@ def decided_words(one: Statistics | Share) -> str:
     As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
     """
     if isinstance(one, Share):
-        return f"{amount_words(one)} ({one.samples} of {text.counted(one.of, 'sample')}){unseen_words(one)}"
+        return (
+            f"{amount_words(one)} ({one.samples} of {text.counted(one.total, 'sample')}){unseen_words(one)}"
+        )
     lacks = one.tolerance is not None and one.missing
     used = used_words(one)
     return amount_words(one) if lacks else f"{amount_words(one)}{f' ({used})' if used else ''} {when(one)}"
@@ -155,14 +165,14 @@ def when(one: Statistics) -> str:
     return f"at t = {text.seconds(one.t_max)} s" if timed else f"in row {one.sample_max + 1}"
 
 
-def meter_words(one: DeltaVerdict) -> str:
+def meter_words(one: DeltaMeterResult) -> str:
     """Return what a delta meter found: how much of how much, when, how often it was too much; its doubts."""
-    amount = "has no value" if one.used is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
+    amount = "has no value" if one.utilisation is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
     used = used_words(one)
     said = f"{size_of(one)} {amount}{f' ({used})' if used else ''} at t = {text.seconds(one.t)} s"
     out = f"out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
     lacks = f"coverage {text.percent(one.coverage)}: {one.missing} without a value" if one.missing else ""
-    return "; ".join(filter(None, (said, out, lacks, *one.doubts)))
+    return "; ".join(filter(None, (said, out, lacks, *one.caveats)))
 
 
 def out_words(out: int, of: int) -> str:
@@ -170,7 +180,7 @@ def out_words(out: int, of: int) -> str:
     return f"{out} of {text.counted(of, 'sample')} ({text.percent(out / of)})"
 
 
-def stretch_words(found: Stretch) -> str:
+def stretch_words(found: SampleInterval) -> str:
     """Return how long and from when a log was out of tolerance or unseen: "0.500 s from t = 1.250 s"."""
     if found.t is None or found.duration is None:
         return f"{text.counted(found.samples, 'row')} from row {found.sample + 1}"

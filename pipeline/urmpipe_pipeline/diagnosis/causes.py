@@ -48,13 +48,13 @@ class Cause:
         high: Upper end.
         from_sample: Row of the log, from 0, from which on it holds; None for all of them.
         rows: Rows of the log, from 0, that are outliers; none of other causes.
-        twins: Short names of what would move the tool centre point in the very same way.
+        equivalents: Short names of equivalent causes: they move the tool centre point in the same way.
         rms_before: Root mean square of the deviation in the unit of the diagnosis, without the causes that
             stand before this one.
         rms_after: The same without this one, too.
         rms_alone: Root mean square without this cause alone.
         effect: Largest deviation that this cause alone makes, in the unit of the diagnosis.
-        breaks: Whether that is out of tolerance.
+        exceeds_tolerance: Whether that is out of tolerance.
     """
 
     kind: Kind
@@ -68,12 +68,12 @@ class Cause:
     high: tuple[float, ...] = ()
     from_sample: int | None = None
     rows: tuple[int, ...] = ()
-    twins: tuple[str, ...] = ()
+    equivalents: tuple[str, ...] = ()
     rms_before: float = 0.0
     rms_after: float = 0.0
     rms_alone: float = 0.0
     effect: float = 0.0
-    breaks: bool = False
+    exceeds_tolerance: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object: null where a key does not apply, lists of three of base and tool."""
@@ -91,12 +91,12 @@ class Cause:
             "interval": interval,
             "from_sample": self.from_sample,
             "rows": list(self.rows),
-            "twins": list(self.twins),
+            "equivalents": list(self.equivalents),
             "rms_before": self.rms_before,
             "rms_after": self.rms_after,
             "rms_alone": self.rms_alone,
             "effect": self.effect,
-            "breaks_tolerance": self.breaks,
+            "exceeds_tolerance": self.exceeds_tolerance,
         }
 
 
@@ -106,45 +106,52 @@ class Alternative:
 
     Attributes:
         causes: What it takes; none for the explanation that nothing of the kind is there.
-        needs: The joint whose motion would decide; empty if none would.
+        discriminating_joint: The joint whose motion would decide; empty if none would.
     """
 
     causes: tuple[Cause, ...]
-    needs: str = ""
+    discriminating_joint: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {"causes": [one.to_dict() for one in self.causes], "needs": self.needs or None}
+        return {
+            "causes": [one.to_dict() for one in self.causes],
+            "discriminating_joint": self.discriminating_joint or None,
+        }
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class UnidentifiableCauses:
     """Causes that leave less, but that this motion does not determine.
 
     Attributes:
         causes: What was fitted.
         reason: Why it is not believed.
-        needs: The joint whose motion would determine it; empty if none would.
+        discriminating_joint: The joint whose motion would determine it; empty if none would.
     """
 
     causes: tuple[Cause, ...]
     reason: str
-    needs: str = ""
+    discriminating_joint: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
         causes = [one.to_dict() for one in self.causes]
-        return {"causes": causes, "reason": self.reason, "needs": self.needs or None}
+        return {
+            "causes": causes,
+            "reason": self.reason,
+            "discriminating_joint": self.discriminating_joint or None,
+        }
 
 
 @dataclass(frozen=True, slots=True)
-class OwnTcp:
-    """How far the kinematics of a side are from the tool centre point that it recorded itself.
+class RecordedTcpCheck:
+    """Distance of the kinematics of a side from the tool centre point that it recorded.
 
     Attributes:
         name: What the side is called.
         rms: Root mean square distance in [m].
-        largest: Largest distance in [m].
+        max: Largest distance in [m].
         agrees: Whether that is within the tolerance, with the tool as it is given.
         rms_with_tool: Root mean square distance with the constant tool that fits best in [m]; `rms` where the
             motion does not determine one.
@@ -152,14 +159,14 @@ class OwnTcp:
 
     name: str
     rms: float
-    largest: float
+    max: float
     agrees: bool
     rms_with_tool: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class NotLookedFor:
-    """Causes that these sides cannot tell.
+class UntestedCauses:
+    """Causes that these sides cannot show.
 
     Attributes:
         kinds: Which.
@@ -171,18 +178,18 @@ class NotLookedFor:
 
 
 @dataclass(frozen=True, slots=True)
-class Remainder:
-    """What no named cause explains.
+class Unexplained:
+    """Deviation that no named cause explains.
 
     Attributes:
         rms: Root mean square of what stays, in the unit of the diagnosis.
-        words: What it is taken for, where that is known; else empty.
-        different: Whether it is so large that the two sides are probably different motions.
+        interpretation: What it is taken for, where that is known; else empty.
+        is_unrelated_motion: Whether it is so large that the two sides are probably different motions.
     """
 
     rms: float
-    words: str = ""
-    different: bool = False
+    interpretation: str = ""
+    is_unrelated_motion: bool = False
 
 
 def rms(deviation: FloatArray) -> float:

@@ -49,9 +49,9 @@ from urmpipe_pipeline.diagnosis.causes import (
     Alternative,
     Cause,
     Kind,
-    NotLookedFor,
-    OwnTcp,
-    Remainder,
+    RecordedTcpCheck,
+    Unexplained,
+    UntestedCauses,
     rms,
 )
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
@@ -222,21 +222,21 @@ def _diagnose_problem(compared: Compared, problem: Problem, lag: float | None, *
     return Diagnosis(
         name=compared.name,
         verdict=compared.verdict,
-        seen=dict(compared.shares),
+        shares=dict(compared.shares),
         samples=model.rows,
         unit=model.unit,
         rms=before,
         causes=causes,
         undecided=undecided,
-        refused=explanation.refused(),
-        not_looked_for=problem.untested,
-        remainder=_residual_of(compared, model, left, OWN_GEOMETRY if unnamed else ""),
+        unidentifiable=explanation.refused(),
+        untested=problem.untested,
+        unexplained=_residual_of(compared, model, left, OWN_GEOMETRY if unnamed else ""),
         sample=model.sample,
-        mended=problem.sign * after.T,
+        residual=problem.sign * after.T,
     )
 
 
-def _residual_of(compared: Compared, model: Model, left: float, words: str) -> Remainder:
+def _residual_of(compared: Compared, model: Model, left: float, words: str) -> Unexplained:
     """Return what remains of a deviation, rms in [m] or [rad].
 
     If it is out of tolerance, and more than half the reference's motion from its mean, no cause has made the
@@ -247,7 +247,7 @@ def _residual_of(compared: Compared, model: Model, left: float, words: str) -> R
     kinds = ("joint",) if model.of_joints else LENGTHS
     tolerance = compared.tolerance(kinds, DEFAULT_TOLERANCE)
     is_unrelated = left > max(tolerance, UNRELATED_RATIO * moves)
-    return Remainder(left, UNRELATED if is_unrelated else words, is_unrelated)
+    return Unexplained(left, UNRELATED if is_unrelated else words, is_unrelated)
 
 
 def _iter_onsets(problem: Problem, *, timed: bool) -> Iterator[Edits]:
@@ -338,20 +338,20 @@ def _diagnose_nothing(
     undecided, after = _tool_hypotheses(model, tolerance) if before > tolerance > 0.0 else ((), left)
     groups, edits = model.groups, (edit for edits in problem.edits for edit in edits)
     kinds = tuple(dict.fromkeys([*(group.kind for group in groups), *(edit.kind for edit in edits)]))
-    untested = () if tested else (NotLookedFor(kinds, reason),)
+    untested = () if tested else (UntestedCauses(kinds, reason),)
     return Diagnosis(
         name=compared.name,
         verdict=compared.verdict,
-        seen=dict(compared.shares),
+        shares=dict(compared.shares),
         samples=model.rows,
         unit=model.unit,
         rms=before,
         causes=(),
         undecided=undecided,
-        not_looked_for=(*untested, *problem.untested),
-        remainder=Remainder(rms(after.T), reason),
+        untested=(*untested, *problem.untested),
+        unexplained=Unexplained(rms(after.T), reason),
         sample=model.sample,
-        mended=problem.sign * after.T,
+        residual=problem.sign * after.T,
     )
 
 
@@ -416,7 +416,7 @@ def _find_origin(
     tcps = [_own_tcp(side, tolerance) for side in sides]
     size = _shown_size(diagnosis)
     distances = [_record_distance(matched, side.run, is_log=side is log) for side in sides]
-    left = float(np.hypot(diagnosis.remainder.rms, size / CLEARLY))
+    left = float(np.hypot(diagnosis.unexplained.rms, size / CLEARLY))
 
     def agrees(k: int) -> bool:
         tcp = tcps[k]
@@ -432,12 +432,12 @@ def _find_origin(
     origin = [side.run.name for k, side in enumerate(sides) if size and has_causes(k)]
     return replace(
         diagnosis,
-        own_tcp=tuple(tcp for tcp in tcps if tcp is not None),
+        recorded_tcp=tuple(tcp for tcp in tcps if tcp is not None),
         origin=origin[0] if len(origin) == 1 else "",
     )
 
 
-def _own_tcp(side: Side, tolerance: float) -> OwnTcp | None:
+def _own_tcp(side: Side, tolerance: float) -> RecordedTcpCheck | None:
     """Return how far a side is from its recorded tool centre point; None without one."""
     run, position = side.run, side.trajectory.position
     by_kinematics = side.by_joints and run.tcp is not None and np.isfinite(position).any()
@@ -446,7 +446,9 @@ def _own_tcp(side: Side, tolerance: float) -> OwnTcp | None:
     if not len(distance) or run.robot is None or poses is None:
         return None
     largest, mean = float(distance.max()), rms(distance[:, np.newaxis])
-    return OwnTcp(run.name, mean, largest, largest <= tolerance, min(mean, poses.fit(run.robot).with_tool))
+    return RecordedTcpCheck(
+        run.name, mean, largest, largest <= tolerance, min(mean, poses.fit(run.robot).with_tool)
+    )
 
 
 def _shown_size(diagnosis: Diagnosis) -> float:

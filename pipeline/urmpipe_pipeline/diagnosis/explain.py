@@ -19,7 +19,14 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray, map_blocks, row_blocks
 from urmpipe_pipeline.diagnosis.cause_texts import short_name
-from urmpipe_pipeline.diagnosis.causes import CLOCKS, NOT_CONSTANT, Alternative, Cause, Refused, rms
+from urmpipe_pipeline.diagnosis.causes import (
+    CLOCKS,
+    NOT_CONSTANT,
+    Alternative,
+    Cause,
+    UnidentifiableCauses,
+    rms,
+)
 from urmpipe_pipeline.diagnosis.explanations import COARSE, MAX_SIZE, Explanation, SearchResult
 from urmpipe_pipeline.diagnosis.fit import (
     BLOCK,
@@ -199,10 +206,10 @@ class ExplanationBuilder:
         before = self.model.residual(self.search.null, rows)
         return self.exceeds_tolerance(before - self.model.residual(without, rows), True, False)
 
-    def refused(self) -> tuple[Refused, ...]:
+    def refused(self) -> tuple[UnidentifiableCauses, ...]:
         """Return what the gate refused though it leaves less, with the rms before and after its causes."""
         rows = self.search.spread(ORDERING_ROWS)
-        before, refusals = self._rms_without(self.search.null, (), rows), list[Refused]()
+        before, refusals = self._rms_without(self.search.null, (), rows), list[UnidentifiableCauses]()
         for explanation, reason, subset, edits in self.result.refused:
             fit = self.search.fit_forced(explanation.state, self.result.rows)
             after = rms(self.model.deviation(fit, rows).T)
@@ -211,7 +218,7 @@ class ExplanationBuilder:
             changed = tuple(replace(cause, rms_before=before, rms_after=after) for cause in causes)
             is_changing = reason == NOT_CONSTANT  # no other motion makes it constant
             needs = "" if is_changing else self._needs([explanation, self.result.best])
-            refusals.append(Refused(changed, reason, needs))
+            refusals.append(UnidentifiableCauses(changed, reason, needs))
         return tuple(refusals)
 
     def after(self) -> FloatArray:
@@ -294,7 +301,7 @@ class ExplanationBuilder:
                     self._cause_of(part, explanation, effect, equivalents.get(part, ())),
                     rms_before=after[k], rms_after=after[k + 1],
                     rms_alone=self._rms_without(explanation.state, (part,)),
-                    effect=effect, breaks=self._breaks_a_tolerance(part, change, without),
+                    effect=effect, exceeds_tolerance=self._breaks_a_tolerance(part, change, without),
                 )
             )  # fmt: skip
         return tuple(causes)
@@ -318,8 +325,8 @@ class ExplanationBuilder:
         if part.usual:
             return Cause("own_geometry", "arm")
         cause = self._cause_of_edit(part.edit) if part.edit else self._cause_of_group(part.group, explanation)
-        names = (*cause.twins, *(name for name in equivalents if name not in cause.twins))
-        return replace(cause, twins=names)
+        names = (*cause.equivalents, *(name for name in equivalents if name not in cause.equivalents))
+        return replace(cause, equivalents=names)
 
     def _usual_columns(self, explanation: Explanation) -> tuple[int, ...]:
         """Return the columns that arms usually differ by, if they were fitted together with a cause."""
@@ -386,7 +393,7 @@ class ExplanationBuilder:
             tuple((nominal + part).tolist()) for part in (values - reach, values, values + reach)
         )
         names = tuple(dict.fromkeys(self._iter_equivalents(g, explanation.state)))
-        return replace(self._without_size(group), value=middle, low=low, high=high, twins=names)
+        return replace(self._without_size(group), value=middle, low=low, high=high, equivalents=names)
 
     def _without_size(self, group: Group) -> Cause:
         """Return the cause of a group without its parameters."""

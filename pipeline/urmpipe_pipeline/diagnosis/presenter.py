@@ -16,7 +16,7 @@ from urmpipe_pipeline.diagnosis.cause_texts import (
     format_value,
     short_name,
 )
-from urmpipe_pipeline.diagnosis.causes import Alternative, Cause, Refused
+from urmpipe_pipeline.diagnosis.causes import Alternative, Cause, UnidentifiableCauses
 from urmpipe_pipeline.diagnosis.result import (
     PASSES,
     Diagnosis,
@@ -34,9 +34,15 @@ NOTE = (
     " and the rms if this cause alone is removed."
 )
 
-MAX_NAMED = 3  # twins, and kinds not tested for one reason, in a line of a terminal; a page has all
-EXPLAINED = {"explanation": "Explanation", "interval": "95 % interval", "twins": "twins"}
-DETAILS = ("value", "from_row", "rms_alone", "twins", "breaks_tolerance")  # only a page has room for these
+MAX_NAMED = 3  # equivalent causes, and kinds untested for one reason, in a line of a terminal
+EXPLAINED = {"explanation": "Explanation", "interval": "95 % interval", "equivalents": "equivalent causes"}
+DETAILS = (
+    "value",
+    "from_row",
+    "rms_alone",
+    "equivalents",
+    "exceeds_tolerance",
+)  # only a page has room for these
 
 
 def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
@@ -53,7 +59,7 @@ def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
     )
     tables = tuple(diagnosis_tables(diagnosis))
     body = Section(f"Diagnosis of {diagnosis.name}", None, facts, tables, warnings=diagnosis.warnings)
-    headline = diagnosis.sentence.removeprefix(PASSES)  # the verdict precedes it
+    headline = diagnosis.summary.removeprefix(PASSES)  # the verdict precedes it
     return Presentation(diagnosis.name, headline, diagnosis.verdict, (), body)
 
 
@@ -66,15 +72,16 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
     """
     undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
     has_residual = diagnosis.causes or diagnosis.undecided  # else the answer says it
-    residual = format_residual(diagnosis.remainder, diagnosis.unit) if has_residual else ""
+    residual = format_residual(diagnosis.unexplained, diagnosis.unit) if has_residual else ""
     single = diagnosis.causes[0] if len(diagnosis.causes) == 1 else None
-    own_tcp = "; ".join(map(format_own_tcp, diagnosis.own_tcp))
+    own_tcp = "; ".join(map(format_own_tcp, diagnosis.recorded_tcp))
     return (
-        Fact("Diagnosis" if diagnosis.verdict == "pass" else "Cause", diagnosis.sentence, leads=True),
+        Fact("Diagnosis" if diagnosis.verdict == "pass" else "Cause", diagnosis.summary, leads=True),
         Fact("Meaning", _meaning(diagnosis, hints), brief=False, leads=True),
         Fact("95 % interval", format_interval(single) if single else "", brief=False, page=False),
         Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
-        Fact("Twins", _twins(single) if single and not undecided else "", page=False),  # tables have all
+        # tables have all of them
+        Fact("Equivalent causes", _equivalents(single) if single and not undecided else "", page=False),
         Fact("Remaining deviation", residual, brief=False, page=False),
         Fact("Own TCP", "" if diagnosis.origin else own_tcp, brief=False),
         Fact("Not tested", "; ".join(_untested(diagnosis)), brief=False),
@@ -83,7 +90,7 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
 
 def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
     """Return what to do about the causes of the answer; None without any, or if the answer says it."""
-    if not diagnosis.causes or diagnosis.remainder.different:
+    if not diagnosis.causes or diagnosis.unexplained.is_unrelated_motion:
         return None
     if diagnosis.verdict == "pass":
         return Advice("to try it", tuple(hints)) if hints else None
@@ -98,15 +105,17 @@ def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
     return Advice("; ".join(steps), tuple(hints))
 
 
-def _twins(cause: Cause) -> str:
+def _equivalents(cause: Cause) -> str:
     """Return a cause and what the log does not distinguish from it."""
-    return " or ".join([short_name(cause), *_named(cause.twins, MAX_NAMED)]) if cause.twins else ""
+    return (
+        " or ".join([short_name(cause), *_named(cause.equivalents, MAX_NAMED)]) if cause.equivalents else ""
+    )
 
 
 def _untested(diagnosis: Diagnosis, most: int | None = None) -> Iterator[str]:
     """Yield which kinds were not tested, and why; without the reason that the answer gives."""
-    for untested in diagnosis.not_looked_for:
-        if untested.reason != diagnosis.remainder.words:
+    for untested in diagnosis.untested:
+        if untested.reason != diagnosis.unexplained.interpretation:
             labels = [KIND_TEXTS[kind].label for kind in untested.kinds]
             yield f"{text.enumerated(_named(labels, most))} ({untested.reason})"
 
@@ -120,37 +129,37 @@ def _named(names: Sequence[str], most: int | None) -> list[str]:
 def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
     """Yield the causes, the undecided explanations, and those that are not determined."""
     if diagnosis.causes:
-        several = len(diagnosis.causes) > 1 or diagnosis.remainder.different
+        several = len(diagnosis.causes) > 1 or diagnosis.unexplained.is_unrelated_motion
         shown = several or bool(diagnosis.causes[0].low)  # the answer has all of a cause without an interval
         columns = (
-            replace(column, brief=column.key not in DETAILS, page=column.key != "few_twins")
+            replace(column, brief=column.key not in DETAILS, page=column.key != "few_equivalents")
             for column in columns_of(diagnosis.causes, _heads(diagnosis.unit))
         )
         yield Table("Causes", tuple(columns), NOTE, several, page=shown)
     if diagnosis.undecided:
-        heads = {**EXPLAINED, "needs": "more motion of this decides"}
-        rows = [(*_explained(one), one.needs or "none") for one in diagnosis.undecided]
+        heads = {**EXPLAINED, "discriminating_joint": "more motion of this decides"}
+        rows = [(*_explained(one), one.discriminating_joint or "none") for one in diagnosis.undecided]
         table = table_of("Undecided between", heads, rows, brief=True)
         yield replace(table, columns=(*table.columns[:-1], replace(table.columns[-1], brief=False)))
-    if diagnosis.refused:
+    if diagnosis.unidentifiable:
         heads = {
             **EXPLAINED, "rms_after": "rms after", "reason": "reason",
-            "needs": "more motion of this determines it",
+            "discriminating_joint": "more motion of this determines it",
         }  # fmt: skip
         refused = [
             (
                 *_explained(one), format_amount(one.causes[-1].rms_after, diagnosis.unit),
-                one.reason, one.needs or "none",
+                one.reason, one.discriminating_joint or "none",
             )
-            for one in diagnosis.refused
+            for one in diagnosis.unidentifiable
         ]  # fmt: skip
         yield table_of("Not determined by this motion", heads, refused)
 
 
-def _explained(explanation: Alternative | Refused) -> tuple[str, str, str]:
+def _explained(explanation: Alternative | UnidentifiableCauses) -> tuple[str, str, str]:
     """Return the causes of an explanation, their intervals, and their twins."""
     intervals = "; ".join(filter(None, map(format_interval, explanation.causes)))
-    twins = ", ".join(twin for cause in explanation.causes for twin in cause.twins)
+    twins = ", ".join(twin for cause in explanation.causes for twin in cause.equivalents)
     return format_explanation(explanation), intervals, twins
 
 
@@ -167,7 +176,13 @@ def _heads(unit: str) -> Heads[Cause]:
         "rms_before": ("rms before", lambda cause: Value(cause.rms_before, unit)),
         "rms_after": ("rms after", lambda cause: Value(cause.rms_after, unit)),
         "rms_alone": ("without it alone", lambda cause: Value(cause.rms_alone, unit)),
-        "few_twins": ("twins", lambda cause: ", ".join(_named(cause.twins, MAX_NAMED))),
-        "twins": ("twins", lambda cause: ", ".join(cause.twins)),
-        "breaks_tolerance": ("alone out of tolerance", lambda cause: "yes" if cause.breaks else "no"),
+        "few_equivalents": (
+            "equivalent causes",
+            lambda cause: ", ".join(_named(cause.equivalents, MAX_NAMED)),
+        ),
+        "equivalents": ("equivalent causes", lambda cause: ", ".join(cause.equivalents)),
+        "exceeds_tolerance": (
+            "alone out of tolerance",
+            lambda cause: "yes" if cause.exceeds_tolerance else "no",
+        ),
     }

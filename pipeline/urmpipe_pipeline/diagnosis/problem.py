@@ -25,7 +25,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, spread_r
 from urmpipe_models.kinematics.forward import jacobian, positions_over_log
 from urmpipe_models.math3d import Transform, to_matrices
 from urmpipe_pipeline import text
-from urmpipe_pipeline.diagnosis.causes import STRUCTURE, NotLookedFor
+from urmpipe_pipeline.diagnosis.causes import STRUCTURE, UntestedCauses
 from urmpipe_pipeline.diagnosis.hypotheses import (
     Group,
     assign_columns,
@@ -95,7 +95,7 @@ class Problem(NamedTuple):
     rounding: FloatArray
     forced: tuple[int, ...]
     sign: float
-    untested: tuple[NotLookedFor, ...]
+    untested: tuple[UntestedCauses, ...]
 
 
 def build_problem(matched: Matched, reference: Side, log: Side) -> Problem:
@@ -132,13 +132,13 @@ def _joint_problem(matched: Matched, reference: Side, log: Side) -> Problem:
         judged,
     )
     untested = [
-        NotLookedFor(
+        UntestedCauses(
             (*STRUCTURE, *FRAMES, "base_mirrored", "path_unit", "other_robot"),
             _why_joints_show_no_arm(reference, log),
         )
     ]
     if run.robot is None:
-        untested.append(NotLookedFor(("sag",), "without a robot gravity is unknown"))
+        untested.append(UntestedCauses(("sag",), "without a robot gravity is unknown"))
     is_revolute = tuple(not is_sliding for is_sliding in sliding)
     return Problem(
         model=model,
@@ -186,7 +186,7 @@ def _arm_problem(matched: Matched, reference: Side, log: Side) -> Problem:
     motion, lines = _joint_motion(run), matched.reference
     if place.between and not log.by_joints:
         q, trajectory = np.asarray(reference.trajectory.q), reference.trajectory
-        cubics = Cubics.through(trajectory.t_ns, q, trajectory.broken)
+        cubics = Cubics.through(trajectory.t_ns, q, trajectory.discontinuities)
         motion = SparseMotion(motion.t, motion.value, motion.rate, motion.second, motion.noise, cubics=cubics)
         lines = position + positions_over_log(robot, motion.at(clock.t)[0].T) - lines
     judged = lines.T.copy() if place.between and not frames_open else None
@@ -208,12 +208,12 @@ def _arm_problem(matched: Matched, reference: Side, log: Side) -> Problem:
         *robot_edits(robot),
     )
     edits += () if frames_open else tuple(unit_edits("reference" if log.by_joints else "log"))
-    untested = [NotLookedFor(("turns",), "only joints on both sides show them")]
+    untested = [UntestedCauses(("turns",), "only joints on both sides show them")]
     if rotation is None:
-        untested.append(NotLookedFor(("tool_rotation",), "a side has no orientation"))
+        untested.append(UntestedCauses(("tool_rotation",), "a side has no orientation"))
     if frames_open:
         reason = "measured in a frame of its own: base and tool are unknown"  # plain: ok
-        untested.append(NotLookedFor((*FRAMES, "path_unit"), reason))
+        untested.append(UntestedCauses((*FRAMES, "path_unit"), reason))
     return Problem(
         model=model,
         edits=edits,
@@ -251,11 +251,11 @@ def _tcp_problem(matched: Matched, reference: Side, log: Side) -> Problem:
         + _rounding(matched.actual, run) ** 2
         + place.error**2
     )
-    untested = [NotLookedFor((*STRUCTURE, *JOINTS, "turns", "other_robot"), "no side has joints")]
+    untested = [UntestedCauses((*STRUCTURE, *JOINTS, "turns", "other_robot"), "no side has joints")]
     if not is_oriented:
-        untested.append(NotLookedFor(("tool_shift", "tool_rotation"), "the log has no orientation"))
+        untested.append(UntestedCauses(("tool_shift", "tool_rotation"), "the log has no orientation"))
     elif rotation is None:
-        untested.append(NotLookedFor(("tool_rotation",), "the reference has no orientation"))
+        untested.append(UntestedCauses(("tool_rotation",), "the reference has no orientation"))
     return Problem(
         model=model,
         edits=(*axis_edits(base_known=True), *unit_edits("reference", "log")),
@@ -287,16 +287,16 @@ def _arm_joints(run: Run) -> tuple[str, ...]:
     return run.log.joints if run.robot is None else run.robot.coordinates
 
 
-def _unknown_rates(run: Run, motion: Motion | None = None) -> Iterator[NotLookedFor]:
+def _unknown_rates(run: Run, motion: Motion | None = None) -> Iterator[UntestedCauses]:
     """Yield that static poses show nothing of time, and which joints of a log have unknown accelerations."""
     if not run.timed:
-        yield NotLookedFor(TIME, "still poses have no time")
+        yield UntestedCauses(TIME, "still poses have no time")
     elif motion is not None:
         moves = np.fmax.reduce(motion.value, axis=1) - np.fmin.reduce(motion.value, axis=1) > AT_REST
         unknown = np.flatnonzero(moves & ~motion.second.any(axis=1)).tolist()
         if unknown:
             names = text.enumerated([run.log.joints[j] for j in unknown])
-            yield NotLookedFor(
+            yield UntestedCauses(
                 ("compliance",), f"the rows do not show how {names} accelerate{'s' * (len(unknown) == 1)}"
             )
 
@@ -484,12 +484,12 @@ def interpolate_reference(
     fraction = float(np.mean(distance > ROUNDING_NS))
     if not fraction:
         return none
-    cubic = Cubics.through(known_ns, values, reference.broken).at(at_ns / 1e9).T
+    cubic = Cubics.through(known_ns, values, reference.discontinuities).at(at_ns / 1e9).T
     cubic = np.where(np.isfinite(cubic), cubic, linear)
     on_lines, on_cubics = (_scatter(log - values_at, after) for values_at in (linear, cubic))
     if on_lines.sum() < STRAIGHT * on_cubics.sum():
         return Interpolated(linear, np.sqrt(on_lines), True)
-    error = np.sqrt(fraction) * _cubic_error(known_ns, values, reference.broken)
+    error = np.sqrt(fraction) * _cubic_error(known_ns, values, reference.discontinuities)
     return Interpolated(cubic, error, True)
 
 

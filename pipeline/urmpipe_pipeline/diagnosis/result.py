@@ -19,10 +19,10 @@ from urmpipe_pipeline.diagnosis.causes import (
     NOT_CONSTANT,
     Alternative,
     Cause,
-    NotLookedFor,
-    OwnTcp,
-    Refused,
-    Remainder,
+    RecordedTcpCheck,
+    Unexplained,
+    UnidentifiableCauses,
+    UntestedCauses,
 )
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
@@ -52,18 +52,18 @@ class Diagnosis(Result):
         rms: Root mean square of the deviation before, in `unit`.
         causes: What was found: clocks first, then in the order of what each takes away after those before.
         undecided: Explanations between which the log does not decide.
-        not_looked_for: What these sides cannot tell, and why.
-        remainder: What stays.
-        sample: Rows of the log, from 0, at which `mended` stands, shape (m,).
-        mended: reference - log after the causes are taken away: x, y, z in [m], shape (m, 3), or the joints
+        untested: Causes that these sides cannot show, and why.
+        unexplained: Deviation left after the causes.
+        sample: Rows of the log, from 0, of the residual, shape (m,).
+        residual: reference - log after the causes are removed: x, y, z in [m], shape (m, 3), or the joints
             in [rad] or [m], shape (m, joints).
         warnings: What a person should know.
         recording: Where it was written.
         comparison: The comparison that it stands in, where `urmpipe.diagnose` made it.
-        seen: The shares, 0..1, on which the verdict and the causes rest: coverage of the reference, judged of
+        shares: In 0..1, on which the verdict and the causes rest: coverage of the reference, judged of
             the log's motion.
-        refused: What was fitted and is not believed.
-        own_tcp: How far each side with joints is from its own recorded tool centre point.
+        unidentifiable: Explanations that this motion does not determine.
+        recorded_tcp: How far each side with joints is from its recorded tool centre point.
         origin: Name of the side that the causes are in, as its own tool centre point shows; empty if unknown.
     """
 
@@ -74,26 +74,26 @@ class Diagnosis(Result):
     rms: float
     causes: tuple[Cause, ...]
     undecided: tuple[Alternative, ...]
-    not_looked_for: tuple[NotLookedFor, ...]
-    remainder: Remainder
+    untested: tuple[UntestedCauses, ...]
+    unexplained: Unexplained
     sample: IntArray
-    mended: FloatArray
+    residual: FloatArray
     warnings: tuple[LogWarning, ...] = ()
     recording: Path | None = field(default=None, metadata={"stored": False})
     comparison: Result | None = field(default=None, metadata={"stored": False})
-    seen: Mapping[str, float] = field(default_factory=dict)
-    refused: tuple[Refused, ...] = ()
-    own_tcp: tuple[OwnTcp, ...] = ()
+    shares: Mapping[str, float] = field(default_factory=dict)
+    unidentifiable: tuple[UnidentifiableCauses, ...] = ()
+    recorded_tcp: tuple[RecordedTcpCheck, ...] = ()
     origin: str = ""
 
     @property
-    def sentence(self) -> str:
+    def summary(self) -> str:
         """The answer in one sentence."""
         return format_summary(self)
 
     def _headline(self) -> str:
         """Return the answer."""
-        return f"{self.name}: {self.sentence}"
+        return f"{self.name}: {self.summary}"
 
     def _notes(self) -> list[str]:
         """Return what is to be known of it."""
@@ -112,16 +112,16 @@ class Diagnosis(Result):
             "name": self.name,
             "verdict": self.verdict,
             "samples": self.samples,
-            **{"coverage": None, "judged": None, **self.seen},
+            **{"coverage": None, "judged": None, **self.shares},
             "unit": self.unit,
             "rms": self.rms,
             "causes": [one.to_dict() for one in self.causes],
             "undecided": [one.to_dict() for one in self.undecided],
-            "refused": [one.to_dict() for one in self.refused],
-            "own_tcp": [asdict(one) for one in self.own_tcp],
+            "unidentifiable": [one.to_dict() for one in self.unidentifiable],
+            "recorded_tcp": [asdict(one) for one in self.recorded_tcp],
             "origin": self.origin or None,
-            "not_looked_for": [asdict(one) for one in self.not_looked_for],
-            "remainder": asdict(self.remainder),
+            "untested": [asdict(one) for one in self.untested],
+            "unexplained": asdict(self.unexplained),
             "warnings": [one.to_dict() for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
@@ -131,18 +131,19 @@ _NO_CAUSE = Cause("joint_sign", "")
 
 
 def format_summary(diagnosis: Diagnosis) -> str:
-    """Return the answer in one sentence."""
-    causes, alternatives, residual = diagnosis.causes, diagnosis.undecided, diagnosis.remainder
+    """Return the answer in one summary."""
+    causes, alternatives, residual = diagnosis.causes, diagnosis.undecided, diagnosis.unexplained
     before, after = (format_amount(rms, diagnosis.unit) for rms in (diagnosis.rms, residual.rms))
-    if residual.different:
+    if residual.is_unrelated_motion:
         fitted = f"the causes found leave {after} of it" if causes or alternatives else "no cause found"
         return f"probably different motions: rms {before}, {fitted}"
     if not causes and not alternatives:
-        few = bool(diagnosis.refused) and len(diagnosis.refused[0].causes) <= MAX_LISTED
-        if diagnosis.refused and (few or diagnosis.verdict != "pass"):
+        few = bool(diagnosis.unidentifiable) and len(diagnosis.unidentifiable[0].causes) <= MAX_LISTED
+        if diagnosis.unidentifiable and (few or diagnosis.verdict != "pass"):
             passes = PASSES if diagnosis.verdict == "pass" else ""
-            return f"{passes}{format_refusal(diagnosis.refused[0])}; rms {after} remains"
-        return f"no cause found: rms {before} remains{f' ({residual.words})' if residual.words else ''}"
+            return f"{passes}{format_refusal(diagnosis.unidentifiable[0])}; rms {after} remains"
+        meaning = f" ({residual.interpretation})" if residual.interpretation else ""
+        return f"no cause found: rms {before} remains{meaning}"
     unseen = [cause for cause in causes if _moves_nothing(cause, diagnosis.unit)]
     if unseen:
         seen = tuple(cause for cause in causes if cause not in unseen)
@@ -168,8 +169,8 @@ def select_causes(causes: Sequence[Cause]) -> list[Cause]:
 
     With them those that they partly cancel.
     """
-    listed = [cause for cause in causes if cause.breaks]
-    listed += [cause for cause in causes if not cause.breaks][: max(MAX_CAUSES - len(listed), 0)]
+    listed = [cause for cause in causes if cause.exceeds_tolerance]
+    listed += [cause for cause in causes if not cause.exceeds_tolerance][: max(MAX_CAUSES - len(listed), 0)]
     return [cause for step in _split_steps(causes) if any(one in listed for one in step) for cause in step]
 
 
@@ -197,7 +198,7 @@ def _lowers(step: Sequence[Cause]) -> bool:
 def _format_avoidable(diagnosis: Diagnosis) -> str:
     """Return how much of the deviation of a passed log would go, and under which condition."""
     unit, listed = diagnosis.unit, select_causes(diagnosis.causes)
-    some, all_of_it = diagnosis.rms - diagnosis.remainder.rms, diagnosis.rms
+    some, all_of_it = diagnosis.rms - diagnosis.unexplained.rms, diagnosis.rms
     little = "only " if some < MIN_EXPLAINED * all_of_it else ""
     amount = "next to nothing" if some < NOTHING * all_of_it else f"{little}{format_amount(some, unit)}"
     amounts = f"{amount} of {format_amount(all_of_it, unit)} rms"
@@ -234,8 +235,8 @@ def _format_chain(diagnosis: Diagnosis) -> str:
     more = _format_more(diagnosis, listed)
     parts += [more] if more else []
     if diagnosis.undecided:
-        change = format_change(diagnosis.rms, diagnosis.remainder.rms, unit)
-        stays = f"; rms {format_amount(diagnosis.remainder.rms, unit)} remains" if parts else f": {change}"
+        change = format_change(diagnosis.rms, diagnosis.unexplained.rms, unit)
+        stays = f"; rms {format_amount(diagnosis.unexplained.rms, unit)} remains" if parts else f": {change}"
         parts.append(f"{'then ' if parts else ''}{format_undecided(diagnosis.undecided)}{stays}")
     return "; ".join(parts)
 
@@ -263,7 +264,7 @@ def _format_more(diagnosis: Diagnosis, listed: Sequence[Cause]) -> str:
 
 def _format_origin(diagnosis: Diagnosis) -> str:
     """Return which side has the causes, as the other side's own tool centre point shows."""
-    names = [side for side in diagnosis.own_tcp if side.agrees and side.name != diagnosis.origin]
+    names = [side for side in diagnosis.recorded_tcp if side.agrees and side.name != diagnosis.origin]
     if not diagnosis.origin:
         return ""
     causes = "that is" if len(diagnosis.causes) < 2 else "these are"
@@ -271,9 +272,9 @@ def _format_origin(diagnosis: Diagnosis) -> str:
     return f"; {format_own_tcp(names[0]) if names else follows}, so {causes} in {diagnosis.origin}"
 
 
-def format_own_tcp(side: OwnTcp) -> str:
-    """Return how far a side is from its own recorded tool centre point."""
-    largest = format_amount(side.largest, "m")
+def format_own_tcp(side: RecordedTcpCheck) -> str:
+    """Return how far a side is from its recorded tool centre point."""
+    largest = format_amount(side.max, "m")
     if side.agrees:
         return f"{side.name} agrees with its own TCP within {largest}"
     return f"{side.name} is {format_amount(side.rms, 'm')} rms from its own TCP, {largest} at most"
@@ -286,26 +287,37 @@ def format_undecided(alternatives: Sequence[Alternative]) -> str:
     clauses = [format_explanation(alternative) for alternative in listed]
     more = len(alternatives) - len(listed)
     clauses += [f"{more} more" if more > 1 else "another"] if more > 0 else []
-    needs = list(dict.fromkeys(alternative.needs for alternative in alternatives if alternative.needs))
+    needs = list(
+        dict.fromkeys(
+            alternative.discriminating_joint
+            for alternative in alternatives
+            if alternative.discriminating_joint
+        )
+    )
     decides = f"more motion of {text.enumerated(needs)} would decide" if needs else "this log cannot decide"
     return f"either {' or '.join(clauses)} ({decides})"
 
 
-def format_explanation(explanation: Alternative | Refused) -> str:
+def format_explanation(explanation: Alternative | UnidentifiableCauses) -> str:
     """Return the causes of one explanation."""
     return text.enumerated([format_cause(cause) for cause in explanation.causes]) or "none of these"
 
 
-def format_refusal(refused: Refused) -> str:
+def format_refusal(refused: UnidentifiableCauses) -> str:
     """Return why causes are not believed, and which motion would determine them."""
     if len(refused.causes) > 1 and refused.reason == NOT_CONSTANT:
         return f"not determined by this motion: {refused.reason}"
     if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines so many
         return f"not determined by this motion: {len(refused.causes)} causes ({refused.reason})"
-    needs = f"; more motion of {refused.needs} would determine it" if refused.needs else ""
+    needs = (
+        f"; more motion of {refused.discriminating_joint} would determine it"
+        if refused.discriminating_joint
+        else ""
+    )
     return f"not determined by this motion: {format_explanation(refused)} ({refused.reason}){needs}"
 
 
-def format_residual(residual: Remainder, unit: str) -> str:
+def format_residual(residual: Unexplained, unit: str) -> str:
     """Return what remains, and its interpretation."""
-    return f"rms {format_amount(residual.rms, unit)}{f': {residual.words}' if residual.words else ''}"
+    meaning = f": {residual.interpretation}" if residual.interpretation else ""
+    return f"rms {format_amount(residual.rms, unit)}{meaning}"

@@ -35,9 +35,9 @@ class CornerPath:
         mean: The mean path there in [m], shape (k, 3).
         nearest: The point of the mean path that is nearest to the corner, in [m], shape (3,).
         rounding: CR: distance of that point from the corner, in [m].
-        beyond: The point of the mean path that is furthest beyond the leg after the corner, in [m],
+        overshoot_point: The point of the mean path that is furthest beyond the leg after the corner, in [m],
             shape (3,); None if it goes nowhere beyond it, or the leg is not straight.
-        foot: The point of that leg that is nearest to it, in [m], shape (3,); None without one.
+        nearest_on_leg: The point of that leg that is nearest to it, in [m], shape (3,); None without one.
         overshoot: CO: distance of `beyond` from the leg, in [m]; None if the leg is not straight.
     """
 
@@ -47,8 +47,8 @@ class CornerPath:
     mean: FloatArray
     nearest: FloatArray
     rounding: float
-    beyond: FloatArray | None
-    foot: FloatArray | None
+    overshoot_point: FloatArray | None
+    nearest_on_leg: FloatArray | None
     overshoot: float | None
 
 

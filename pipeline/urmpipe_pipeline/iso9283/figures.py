@@ -428,10 +428,10 @@ def _corner_view(corner: CornerPath, left: float, top: float) -> Iterator[str]:
         yield f'<path d="{_polyline(view.to_pixels(visible))}" {style}/>'
     yield "</g>"
     lengths = {"CR": (corner.point, corner.nearest)}
-    if corner.beyond is not None and corner.foot is not None:
-        distance = float(np.linalg.norm(corner.beyond - corner.point))
+    if corner.overshoot_point is not None and corner.nearest_on_leg is not None:
+        distance = float(np.linalg.norm(corner.overshoot_point - corner.point))
         if distance <= view.half:
-            lengths["CO"] = (corner.foot, corner.beyond)
+            lengths["CO"] = (corner.nearest_on_leg, corner.overshoot_point)
         else:
             bottom = f'x="{view.left + 6:.1f}" y="{view.top + view.size - 8:.1f}"'
             yield f'<text {bottom} fill="#5b6770">CO: {format_amount(distance, "m")} from the corner</text>'
@@ -457,7 +457,11 @@ def _corner_half_width(corner: CornerPath) -> float:
     """
     legs = max(float(np.linalg.norm(corner.command[end] - corner.point)) for end in (0, -1))
     half = min(CORNER_MARGIN * max(corner.rounding, corner.overshoot or 0.0), legs)
-    distance = 0.0 if corner.beyond is None else float(np.linalg.norm(corner.beyond - corner.point))
+    distance = (
+        0.0
+        if corner.overshoot_point is None
+        else float(np.linalg.norm(corner.overshoot_point - corner.point))
+    )
     distance *= VIEW_MARGIN
     return max(half, distance if distance <= MAX_WIDENING * half else 0.0, MIN_HALF_WIDTH)
 

@@ -39,7 +39,7 @@ def drawings(result: NetworkResult) -> Iterator[Drawing]:
     )
     if svg := mechanism_svg(result):
         yield Drawing("Mechanism", f"{bodies} of {result.name}, {view_words(motion_plane(result))}.", svg)
-    if result.every and len(result.assemblies) > 1:
+    if result.all_solutions and len(result.assemblies) > 1:
         alt = f"The assemblies of {result.name} as {len(result.assemblies)} small pictures."
         yield Drawing("Assemblies", alt, gallery_svg(result))
 

@@ -404,7 +404,7 @@ def _find_assembly(
         restarts=request.restarts, seed=request.seed,
     )  # fmt: skip
     if not solution.assemblies:
-        gap = solution.gaps[0] if solution.gaps else None
+        gap = solution.closure_errors[0] if solution.closure_errors else None
         what = f": {gap.name} has a gap of {gap.metres:.4g} m and {gap.radians:.4g} rad" if gap else ""
         raise NetworkError(Finding(f"the network does not close at the start{what}", parameter="drives"))
     number = request.branch or 1

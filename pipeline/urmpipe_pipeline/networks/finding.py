@@ -120,10 +120,10 @@ def find_network(
         assemblies=found.assemblies,
         distances=found.distances,
         nearest=found.nearest,
-        gaps=found.gaps,
+        closure_errors=found.closure_errors,
         mobility=mobility,
-        every=search.every,
-        tried=found.tried,
+        all_solutions=search.every,
+        start_count=found.start_count,
         reason=found.reason,
         warnings=(
             *_warnings(mechanism, found, mobility, every=search.every),
@@ -141,7 +141,9 @@ def _warnings(
     if found.elsewhere:
         said = "the start does not close; the assembly nearest to it was found from a random start"
         yield LogWarning("assembled-elsewhere", said)
-    if found.gaps and all(max(gap.metres / mechanism.length, gap.radians) < ROUNDED for gap in found.gaps):
+    if found.closure_errors and all(
+        max(gap.metres / mechanism.length, gap.radians) < ROUNDED for gap in found.closure_errors
+    ):
         said = "the gap is so small that the network may close if its lengths and directions have more digits"
         yield LogWarning("rounded-figures", said)
     if every and found.continuum:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from urmpipe_models.networks.assembly import Assembly, Gap
+from urmpipe_models.networks.assembly import Assembly, ClosureError
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mobility import Mobility
 from urmpipe_models.networks.parts import POSE_UNITS
@@ -26,7 +26,7 @@ ROUNDED = 9
 """Digits after the point of variables in SI: what is less is rounding."""
 
 
-def gap_words(gap: Gap) -> str:
+def gap_words(gap: ClosureError) -> str:
     """Return what does not close, and by how much: "loop A, B, C, D is 12.3 mm and 1.2 deg apart"."""
     if gap.loop == (gap.name,):
         off = in_words(gap.radians, "rad") if gap.radians else in_words(gap.metres, "m")
@@ -36,22 +36,22 @@ def gap_words(gap: Gap) -> str:
     return f"loop {', '.join(gap.loop)} is {' and '.join(apart)} apart"
 
 
-def _is_turned(gap: Gap) -> bool:
+def _is_turned(gap: ClosureError) -> bool:
     """Return whether a gap has an angle that matters."""
     return gap.radians > LEAST_TURN or not gap.metres
 
 
 def gap_facts(result: NetworkResult) -> Iterator[Fact]:
     """Yield what does not close besides what the headline names."""
-    yield from (Fact("Does not close", gap_words(one)) for one in result.gaps[1:MANY])
-    if (more := len(result.gaps) - MANY) > 0:
+    yield from (Fact("Does not close", gap_words(one)) for one in result.closure_errors[1:MANY])
+    if (more := len(result.closure_errors) - MANY) > 0:
         yield Fact("Does not close", f"and {more} more")
 
 
 def mobility_facts(moves: Mobility) -> Iterator[Fact]:
     """Yield what makes the mobility another than Kutzbach's, and what is special about it."""
     yield Fact("Redundant", redundant_words(moves), "their loss would set nothing free")
-    spins = ", ".join(moves.idle)
+    spins = ", ".join(moves.passive)
     yield Fact(
         "Idle spins", spins, "they turn about the line through two global joints and move nothing else"
     )
@@ -112,7 +112,9 @@ def control_values(result: NetworkResult) -> str:
 
 def found_words(result: NetworkResult) -> str:
     """Return how many assemblies there are, of how many starts, and why the search ended."""
-    return result.reason + (f" ({counted(result.tried, 'start')} in all)" if result.tried > 1 else "")
+    return result.reason + (
+        f" ({counted(result.start_count, 'start')} in all)" if result.start_count > 1 else ""
+    )
 
 
 def mobility_table(moves: Mobility) -> Table:
@@ -129,14 +131,14 @@ def mobility_table(moves: Mobility) -> Table:
     ]
     if moves.redundant:
         rows.append(("redundant", Value(len(moves.redundant)), redundant_words(moves)))
-    if moves.idle:
-        rows.append(("idle spins", Value(len(moves.idle)), ", ".join(moves.idle)))
+    if moves.passive:
+        rows.append(("idle spins", Value(len(moves.passive)), ", ".join(moves.passive)))
     if moves.special:
         rows.append(("mobility nearby", Value(moves.nearby), "a special configuration: less moves nearby"))
     return table_of("Mobility", {"quantity": "", "value": "Value", "about": "Description"}, rows, brief=True)
 
 
-def gaps_table(gaps: Sequence[Gap]) -> Table:
+def gaps_table(gaps: Sequence[ClosureError]) -> Table:
     """Return what does not close, the largest gap first."""
     rows = [
         (

@@ -75,17 +75,19 @@ def present(result: NetworkResult) -> Presentation:
 def headline(result: NetworkResult) -> str:
     """Return whether it closes, what it is and how much of it moves, or what does not close."""
     if not result.assemblies:
-        return f"{result.name}: does not close" + (f": {gap_words(result.gaps[0])}" if result.gaps else "")
+        return f"{result.name}: does not close" + (
+            f": {gap_words(result.closure_errors[0])}" if result.closure_errors else ""
+        )
     count = len(result.assemblies)
     found = "assembled"
-    if result.every:
-        least = "at least " if result.tried > 1 else ""  # random starts may miss some
+    if result.all_solutions:
+        least = "at least " if result.start_count > 1 else ""  # random starts may miss some
         found = f"{least}{count} {'assembly' if count == 1 else 'assemblies'}"
     moves = result.mobility
     if moves is None:
         return f"{result.name}: {found}"
     said = f"{result.name}: {found}, a {moves.kind} of mobility {moves.mobility}"
-    said += f", {counted(len(moves.idle), 'idle spin')} of it" if moves.idle else ""
+    said += f", {counted(len(moves.passive), 'idle spin')} of it" if moves.passive else ""
     if moves.kutzbach == moves.mobility:
         return said
     count = len(moves.redundant)
@@ -96,7 +98,7 @@ def headline(result: NetworkResult) -> str:
 def _facts(result: NetworkResult) -> Iterator[Fact]:
     """Yield what explains the headline."""
     yield from gap_facts(result)
-    if not result.every and len(result.distances) > 1:
+    if not result.all_solutions and len(result.distances) > 1:
         others = ", ".join(f"{distance:.4g}" for distance in result.distances[1:7])
         more = " ..." if len(result.distances) > 7 else ""
         words = f"{result.distances[0]:.4g}; others {others}{more}"
@@ -107,8 +109,8 @@ def _facts(result: NetworkResult) -> Iterator[Fact]:
 
 def _tables(result: NetworkResult) -> Iterator[Table]:
     """Yield what does not close, what moves, and where it closes."""
-    if result.gaps:
-        yield gaps_table(result.gaps)
+    if result.closure_errors:
+        yield gaps_table(result.closure_errors)
     if result.mobility is not None:
         yield mobility_table(result.mobility)
     if result.assemblies or result.nearest is not None:
@@ -117,7 +119,7 @@ def _tables(result: NetworkResult) -> Iterator[Table]:
 
 def _check(result: NetworkResult) -> Check:
     """Return what the verdict rests on."""
-    words = "; ".join(gap_words(one) for one in result.gaps[:1]) or result.reason
+    words = "; ".join(gap_words(one) for one in result.closure_errors[:1]) or result.reason
     closed = result.verdict == "pass"
     return Check("every loop closes", result.verdict, "" if closed else words, kind="not-assembled")
 
@@ -125,7 +127,11 @@ def _check(result: NetworkResult) -> Check:
 def _properties(result: NetworkResult) -> dict[str, Any]:
     """Return what a test suite says of it."""
     moves = result.mobility
-    counts = {"structure": result.structure, "assemblies": len(result.assemblies), "starts": result.tried}
+    counts = {
+        "structure": result.structure,
+        "assemblies": len(result.assemblies),
+        "starts": result.start_count,
+    }
     return counts | ({} if moves is None else {"mobility": moves.mobility, "kutzbach": moves.kutzbach})
 
 
@@ -140,5 +146,5 @@ def _page(result: NetworkResult) -> Iterator[Block]:
 
 def _events(result: NetworkResult) -> Iterator[Event]:
     """Yield what does not close, and warnings: they hold at all times."""
-    yield from (Event(None, f"does not close: {gap_words(one)}", "error") for one in result.gaps)
+    yield from (Event(None, f"does not close: {gap_words(one)}", "error") for one in result.closure_errors)
     yield from (Event(None, f"{one.kind}: {one.sentence()}", "warning") for one in result.warnings)

@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_models.networks.assembly import Assembly, Gap
+from urmpipe_models.networks.assembly import Assembly, ClosureError
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Structure, build_mechanism
 from urmpipe_models.networks.mobility import Mobility
@@ -42,10 +42,10 @@ class NetworkResult(Result):
         distances: How far all assemblies that the search came to are from the start, in [rad] and lengths
             of the mechanism, rising, shape (k,): those of `assemblies` come first.
         nearest: The configuration that comes nearest to closing where nothing closes; else None.
-        gaps: What does not close there, the largest first.
+        closure_errors: What does not close there, the largest first.
         mobility: Of the first assembly; None without.
-        every: Whether all assemblies were requested.
-        tried: How many starts were tried until one closed, or for every assembly.
+        all_solutions: Whether all assemblies were requested.
+        start_count: How many starts were tried until one closed, or for every assembly.
         reason: Why the search ended.
         warnings: What a person should know.
         provenance: How to repeat it.
@@ -61,10 +61,10 @@ class NetworkResult(Result):
     assemblies: tuple[Assembly, ...]
     distances: tuple[float, ...]
     nearest: Assembly | None
-    gaps: tuple[Gap, ...]
+    closure_errors: tuple[ClosureError, ...]
     mobility: Mobility | None
-    every: bool
-    tried: int
+    all_solutions: bool
+    start_count: int
     reason: str
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
@@ -132,11 +132,11 @@ class NetworkResult(Result):
                 {"joint": one.joint, "constraint": one.constraint}
                 for one in (moves.redundant if moves else ())
             ],
-            "idle": list(moves.idle) if moves else [],
+            "passive": list(moves.passive) if moves else [],
             "special": moves and moves.special,
             "residual": self.residual,
             "assemblies": self._assemblies(),
-            "gaps": self._gaps(),
+            "closure_errors": self._gaps(),
             "warnings": [one.to_dict() for one in self.warnings],
             "output": str(self.recording) if self.recording else None,
         }
@@ -148,9 +148,9 @@ class NetworkResult(Result):
             "name": self.name,
             "assemblies": self._assemblies(),
             "distances": list(self.distances),
-            "restarts": max(self.tried - 1, 0),
+            "restarts": max(self.start_count - 1, 0),
             "reason": self.reason,
-            "gaps": self._gaps(),
+            "closure_errors": self._gaps(),
             "warnings": [one.to_dict() for one in self.warnings],
             "output": str(self.recording) if self.recording else None,
         }
@@ -174,7 +174,7 @@ class NetworkResult(Result):
         """Return what does not close."""
         return [
             {"name": one.name, "loop": list(one.loop), "m": one.metres, "rad": one.radians}
-            for one in self.gaps
+            for one in self.closure_errors
         ]
 
 

@@ -58,7 +58,7 @@ def space_figure(result: NetworkResult) -> Iterator[SpaceFigure]:
         return
     others = len(result.assemblies) - 1
     caption = f"{title(result)}. Grey: the ground; vermilion: what controls drive."
-    caption += " Crimson: a joint whose bodies do not meet." if result.gaps else ""
+    caption += " Crimson: a joint whose bodies do not meet." if result.closure_errors else ""
     caption += " Faint: further assemblies, which the legend switches." if others > 0 else ""
     alt = f"{result.name} in three dimensions, {len(result.network.body_names)} bodies."
     shown_solids = [

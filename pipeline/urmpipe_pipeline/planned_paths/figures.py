@@ -36,7 +36,7 @@ def plan_figures(plan: PlannedPath) -> Iterator[Figure]:
 
 def law_figure(plan: PlannedPath) -> Figure:
     """Return arc length, speed, acceleration and jerk along the path, arcs tinted, with the law's limits."""
-    factor, motion = plan.scaled, plan.motion
+    factor, motion = plan.speed_factor, plan.motion
     limits = (None, plan.velocity, plan.acceleration, plan.jerk)
     held = [None if limit is None else limit * factor**order for order, limit in enumerate(limits)]
     on_arc = np.isfinite(plan.path.radius[plan.path.segment_at(motion.s)])
@@ -134,7 +134,7 @@ def instants(plan: PlannedPath) -> dict[int, str]:
     """Return when it stops on the way, unless often, and what is first in the way, by times in [ns]."""
     at, inner = passes_ns(plan), plan.path.stop_row[1:-1].tolist()
     stops = {at[row]: f"stop, row {row + 1}" for row in inner} if len(inner) <= MARKED else {}
-    obstacles = {round(one.t * 1e9): f"{one.kind}, row {one.row}" for one in plan.obstacles[:MARKED]}
+    obstacles = {round(one.t * 1e9): f"{one.kind}, row {one.row}" for one in plan.infeasibilities[:MARKED]}
     return stops | obstacles
 
 

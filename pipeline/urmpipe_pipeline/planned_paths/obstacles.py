@@ -24,7 +24,7 @@ ObstacleKind = Literal["unreachable", "jump", "singular", "too-slow"]
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle:
+class Infeasibility:
     """Why an arm cannot move as planned.
 
     Attributes:
@@ -35,7 +35,7 @@ class Obstacle:
         s: Where along the path, in [m].
         t: When, in [s].
         joint: The joint that is concerned most; empty where it is the arm as a whole.
-        words: What is in the way, without its place.
+        message: What is in the way, without its place.
     """
 
     kind: ObstacleKind
@@ -44,10 +44,10 @@ class Obstacle:
     s: float
     t: float
     joint: str
-    words: str
+    message: str
 
 
-def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Obstacle]:
+def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Infeasibility]:
     """Yield where an arm does not get along a path, whatever its speed, each kind for itself.
 
     Args:
@@ -70,7 +70,7 @@ def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Obstacle]:
         yield _obstacle(joints, law, float(s[first]), "singular", words, names[moved_most])
 
 
-def too_slow(joints: PathJoints, law: TimeLaw, usage: LimitUtilisation, factor: float) -> Obstacle:
+def too_slow(joints: PathJoints, law: TimeLaw, usage: LimitUtilisation, factor: float) -> Infeasibility:
     """Return the obstacle that speeds would have to fall by a factor [-] for a joint.
 
     Args:
@@ -88,12 +88,12 @@ def too_slow(joints: PathJoints, law: TimeLaw, usage: LimitUtilisation, factor: 
 
 def _obstacle(
     joints: PathJoints, law: TimeLaw, s: float, kind: ObstacleKind, words: str, joint: str = ""
-) -> Obstacle:
+) -> Infeasibility:
     """Return an obstacle at an arc length in [m]."""
     place = np.array([s])
     segment = int(joints.path.segment_at(place)[0])
     t = float(law.time_at(place)[0])
-    return Obstacle(kind, segment, int(joints.path.row[segment]) + 1, s, t, joint, words)
+    return Infeasibility(kind, segment, int(joints.path.row[segment]) + 1, s, t, joint, words)
 
 
 def _singular(grid: JointPath) -> BoolArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.planned_paths.obstacles import Obstacle
+from urmpipe_pipeline.planned_paths.obstacles import Infeasibility
 from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.parts import columns_of
@@ -28,8 +28,8 @@ Cells = Callable[[int], Cell]
 
 def facts(plan: PlannedPath) -> Iterator[Fact]:
     """Yield how long the path is and takes, by which law, what limits the arm, and what is in its way."""
-    yield from (Fact("In the way", obstacle_words(one)) for one in plan.obstacles[:MANY])
-    if (more := len(plan.obstacles) - MANY) > 0:
+    yield from (Fact("In the way", obstacle_words(one)) for one in plan.infeasibilities[:MANY])
+    if (more := len(plan.infeasibilities) - MANY) > 0:
         yield Fact("In the way", f"and {more} more")
     stops_often = len(plan.path.stop_row) == len(plan.rows) > 2  # as where the name of a radius is misspelt
     yield Fact("Rows", _rows_words(plan), brief=stops_often)
@@ -39,7 +39,7 @@ def facts(plan: PlannedPath) -> Iterator[Fact]:
     joints = plan.joints
     if joints is None or not plan.reached.any():
         return
-    if not plan.obstacles:  # else the speeds stand as they were requested, whatever the joints allow
+    if not plan.infeasibilities:  # else the speeds stand as they were requested, whatever the joints allow
         yield Fact("Reduced", reduced_words(plan, joints))
         yield Fact(LIMITS, limit_words(plan, joints))
     yield Fact("Nearest to a singularity", _singular_words(plan, joints))
@@ -56,11 +56,11 @@ def law_words(plan: PlannedPath) -> str:
 
 def reduced_words(plan: PlannedPath, joints: PlannedJoints) -> str:
     """Return what the speeds were reduced to, and what a joint would have needed; empty if they were not."""
-    if plan.scaled == 1.0:
+    if plan.speed_factor == 1.0:
         return ""
     name, limit, _, _ = joints.most_used
-    needed = plan.scaled ** (-1 if limit == "largest rate" else -2)
-    left = f"to {text.percent(plan.scaled)} of the speed, {plan.speed:.4g} m/s"
+    needed = plan.speed_factor ** (-1 if limit == "largest rate" else -2)
+    left = f"to {text.percent(plan.speed_factor)} of the speed, {plan.speed:.4g} m/s"
     return f"{left}: {name} would need {text.portion(needed)} its {limit}"
 
 
@@ -76,15 +76,15 @@ def limit_words(plan: PlannedPath, joints: PlannedJoints) -> str:
 def decisive_fact(plan: PlannedPath) -> Iterator[Fact]:
     """Yield the largest share of a limit that a plan uses; nothing where none is known, or it fails."""
     joints = plan.joints
-    if joints is not None and not plan.obstacles and joints.limited:
+    if joints is not None and not plan.infeasibilities and joints.limited:
         name, limit, share, _ = joints.most_used
         yield Fact(f"{limit.capitalize()}: {name}", _share(share), brief=False)
 
 
-def obstacle_words(one: Obstacle) -> str:
+def obstacle_words(one: Infeasibility) -> str:
     """Return an obstacle in words: its time to 1 ms, segment, row, and the joint unless the words name it."""
-    joint = f", joint {one.joint}" if one.joint and one.joint not in one.words else ""
-    return f"at t = {one.t:.3f} s (segment {one.segment + 1}, row {one.row}{joint}): {one.words}"
+    joint = f", joint {one.joint}" if one.joint and one.joint not in one.message else ""
+    return f"at t = {one.t:.3f} s (segment {one.segment + 1}, row {one.row}{joint}): {one.message}"
 
 
 def segments_table(plan: PlannedPath) -> Table:
@@ -139,8 +139,8 @@ def events(plan: PlannedPath) -> Iterator[Event]:
     for row, at in enumerate(passes_ns(plan)):
         stops = f"{'starts' if row == 0 else 'ends' if row == count - 1 else 'stops'} at row {row + 1}"
         yield Event(at, stops if plan.rows.radius[row] == 0.0 else f"passes row {row + 1}")
-    for one in plan.obstacles:
-        yield Event(round(one.t * 1e9), f"{one.kind}: {one.words}", "error")
+    for one in plan.infeasibilities:
+        yield Event(round(one.t * 1e9), f"{one.kind}: {one.message}", "error")
     for warning in plan.warnings:
         row = min(warning.row or 0, count)
         yield Event(passes_ns(plan)[row - 1] if row else None, warning, "warning")

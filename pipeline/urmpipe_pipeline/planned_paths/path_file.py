@@ -136,7 +136,7 @@ def _not_used(table: PoseTable) -> Iterator[LogWarning]:
     if others:
         words = f"{listed(others, most=8)} {'is' if len(others) == 1 else 'are'} not used"
         parts = "x, y, z, an orientation, r or corner_r, variant"
-        hint = Hint("", does=f"a path uses columns named {parts}")
+        hint = Hint("", effect=f"a path uses columns named {parts}")
         yield LogWarning("columns-not-used", words, hints=(hint,))
 
 

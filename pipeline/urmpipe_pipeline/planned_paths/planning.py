@@ -24,7 +24,7 @@ from urmpipe_models.planning.joints import (
 from urmpipe_models.planning.laws import PathMotion, TimeLaw, jerk_law, trapezoid_law
 from urmpipe_models.planning.path import EVEN_TURN_TOLERANCE, LineArcPath
 from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
-from urmpipe_pipeline.planned_paths.obstacles import WORTH_MOVING, Obstacle, obstacles_of, too_slow
+from urmpipe_pipeline.planned_paths.obstacles import WORTH_MOVING, Infeasibility, obstacles_of, too_slow
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints
 from urmpipe_pipeline.planned_paths.request import Request, Timing
@@ -94,9 +94,9 @@ def plan_path(
     return PlannedPath(
         name=given.name, robot=arm, rows=given.rows, law=timed.timing.law, arcs=timing.arcs,
         velocity=timed.timing.velocity_limit, acceleration=timed.timing.acceleration_limit, jerk=timing.jerk,
-        scaled=1.0 if timing.law == "limits" else timed.scaled, tsp=timing.tsp, duration=law.duration,
+        speed_factor=1.0 if timing.law == "limits" else timed.scaled, tsp=timing.tsp, duration=law.duration,
         t_ns=samples.t_ns, motion=samples.motion, segment_times=law.time_at(path.bounds),
-        row_times=law.time_at(path.at), joints=samples.joints, obstacles=timed.obstacles,
+        row_times=law.time_at(path.at), joints=samples.joints, infeasibilities=timed.obstacles,
         warnings=(*given.warnings, *_warnings(path, joints, timed), *_beyond_efforts(timed, samples)),
         provenance=build_provenance("plan", options, [given.file] if given.file else []),
     )  # fmt: skip
@@ -112,7 +112,7 @@ def _refuse_out_of_reach(given: GivenPath, path: LineArcPath, arm: Chain, start:
     near = solve(arm, targets.rows(out), start=start, search=SearchOptions(tolerance=ANYWHERE))
     faults = []
     for k, row in enumerate(out.tolist()):
-        gap = float(near.shortfall[k, 0])
+        gap = float(near.position_residual[k, 0])
         away = f"{gap:.3g} m out of reach of {arm.name}" if gap > 0.0 else f"{arm.name}: {found.reason(row)}"
         point = ", ".join(f"{value:.6g}" for value in np.round(targets.position[row], 9) + 0.0)
         faults.append(given.finding(row + 1, f"({point}) m, {away}", "a point that the arm reaches"))
@@ -134,7 +134,7 @@ class _Timed:
 
     timing: Timing
     law: TimeLaw
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Infeasibility, ...] = ()
     scaled: float = 1.0
 
 

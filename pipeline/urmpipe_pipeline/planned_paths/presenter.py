@@ -82,7 +82,7 @@ def present(plan: PlannedPath) -> Presentation:
                 "Law": plan.law,
                 "Length": Value(plan.path.total, "m"),
                 "Duration": Value(plan.duration, "s"),
-                "Speed left": Value(None if plan.obstacles else plan.scaled, "%"),
+                "Speed left": Value(None if plan.infeasibilities else plan.speed_factor, "%"),
                 "Warnings": Value(len(plan.warnings)),
             },
         ),
@@ -100,26 +100,31 @@ def headline(plan: PlannedPath) -> str:
     way = f"{plan.path.total:.4g} m in {plan.duration:.3f} s ({plan.law})"
     if plan.robot is None:
         return f"{plan.name}: {way}, without a robot"
-    if plan.obstacles:
-        first = plan.obstacles[0]
+    if plan.infeasibilities:
+        first = plan.infeasibilities[0]
         what = f"{first.kind} at t = {first.t:.3f} s (row {first.row})"
         return f"{plan.name}: {plan.robot.name} cannot run {way}: {what}"
     said = f"{plan.name}: {plan.robot.name} runs {way}"
-    if plan.scaled == 1.0 or plan.joints is None:
+    if plan.speed_factor == 1.0 or plan.joints is None:
         return said
-    return f"{said}, reduced to {text.percent(plan.scaled)} of the speed by {plan.joints.most_used[0]}"
+    return f"{said}, reduced to {text.percent(plan.speed_factor)} of the speed by {plan.joints.most_used[0]}"
 
 
 def _checks(plan: PlannedPath) -> Iterator[Check]:
     """Yield what the verdict rests on; nothing without an arm."""
     for kind, name in CHECKS.items() if plan.robot is not None else ():
-        found = [obstacle_words(one) for one in plan.obstacles if one.kind == kind]
+        found = [obstacle_words(one) for one in plan.infeasibilities if one.kind == kind]
         yield Check(name, "fail" if found else "pass", "; ".join(found[:1]), kind=kind)
 
 
 def _properties(plan: PlannedPath) -> dict[str, Any]:
     """Return the numbers that stand with the checks."""
-    return {"length": plan.path.total, "duration": plan.duration, "scaled": plan.scaled, "law": plan.law}
+    return {
+        "length": plan.path.total,
+        "duration": plan.duration,
+        "speed_factor": plan.speed_factor,
+        "law": plan.law,
+    }
 
 
 def _page(plan: PlannedPath) -> Iterator[Block]:

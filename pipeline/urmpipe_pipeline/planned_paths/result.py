@@ -18,7 +18,7 @@ from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
 from urmpipe_pipeline.planned_paths.motion import run_of_plan
-from urmpipe_pipeline.planned_paths.obstacles import Obstacle
+from urmpipe_pipeline.planned_paths.obstacles import Infeasibility
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.planned_paths.request import Law
 from urmpipe_pipeline.presentation.result import Result
@@ -42,7 +42,7 @@ class PlannedPath(Result):
         velocity: The largest speed that was asked for in [m/s]; None: only the joints limit it.
         acceleration: The largest acceleration likewise in [m/s2].
         jerk: The largest jerk likewise in [m/s3].
-        scaled: By which factor the law's speeds were reduced for the joints, 1 for not at all; of the law of
+        speed_factor: Factor of the law's speeds for the limits of the joints, 1 for none; of the law of
             limits always 1, since it is made from them.
         tsp: From sample to sample in [s].
         duration: From the first stop to the last one in [s]; the last sample may be later by less than tsp.
@@ -51,7 +51,7 @@ class PlannedPath(Result):
         segment_times: When each segment begins, and when the last one ends, in [s], shape (segments + 1,).
         row_times: When each row is passed in [s], shape (rows,).
         joints: The joints; None without a robot.
-        obstacles: Why the arm cannot move so; none of a plan that holds.
+        infeasibilities: Why the arm cannot move so; none of a plan that holds.
         warnings: What a person should know.
         provenance: How to repeat it.
         recording: Where it was written.
@@ -66,7 +66,7 @@ class PlannedPath(Result):
     velocity: float | None
     acceleration: float | None
     jerk: float | None
-    scaled: float
+    speed_factor: float
     tsp: float
     duration: float
     t_ns: IntArray
@@ -74,7 +74,7 @@ class PlannedPath(Result):
     segment_times: FloatArray
     row_times: FloatArray
     joints: PlannedJoints | None
-    obstacles: tuple[Obstacle, ...]
+    infeasibilities: tuple[Infeasibility, ...]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     recording: Path | None = field(default=None, metadata={"stored": False})
@@ -118,7 +118,7 @@ class PlannedPath(Result):
     @property
     def speed(self) -> float | None:
         """The speed that the path is to be run with in [m/s], after the joints' limits; None without one."""
-        return None if self.velocity is None else self.velocity * self.scaled
+        return None if self.velocity is None else self.velocity * self.speed_factor
 
     @property
     def corners(self) -> FloatArray:
@@ -135,7 +135,7 @@ class PlannedPath(Result):
         """Pass if the arm can move so; None without a robot."""
         if self.robot is None:
             return None
-        return "fail" if self.obstacles else "pass"
+        return "fail" if self.infeasibilities else "pass"
 
     @property
     def reached(self) -> BoolArray:
@@ -194,14 +194,14 @@ class PlannedPath(Result):
             "law": self.law,
             "velocity": self.velocity,
             "acceleration": self.acceleration,
-            "scaled": self.scaled,
+            "speed_factor": self.speed_factor,
             "segments": self.segments(),
             "limits": self.limits(),
             "singularity": self._singularity(),
-            "obstacles": [
+            "infeasibilities": [
                 {"kind": one.kind, "segment": one.segment, "row": one.row, "s": one.s, "t": one.t,
-                 "joint": one.joint or None, "message": one.words}
-                for one in self.obstacles
+                 "joint": one.joint or None, "message": one.message}
+                for one in self.infeasibilities
             ],
             "verdict": self.verdict,
             "warnings": [one.to_dict() for one in self.warnings],

@@ -40,7 +40,7 @@ def scene(plan: PlannedPath) -> Scene:
 
 def opening_ns(plan: PlannedPath) -> int:
     """Return when the viewer opens in [ns]: at the last sample before what is first in the way, else at 0."""
-    first = min((one.t for one in plan.obstacles), default=0.0)
+    first = min((one.t for one in plan.infeasibilities), default=0.0)
     return int(plan.t_ns[max(int(np.searchsorted(plan.t, first)) - 1, 0)])
 
 
@@ -126,7 +126,7 @@ def _row_spots(plan: PlannedPath) -> Iterator[Spot]:
 
 def _obstacle_spots(plan: PlannedPath) -> tuple[Spot, ...]:
     """Return where the arm cannot move as planned."""
-    shown = plan.obstacles[:NAMED]
+    shown = plan.infeasibilities[:NAMED]
     places = plan.path.points(np.array([one.s for one in shown])).position
     return tuple(
         Spot(spot_at(place), f"{one.kind}, row {one.row}", DEVIATION_COLOUR)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from rerun import ComponentColumn, TimeColumn
 
-LAYOUT_VERSION = 8  # raised when what is stored changes otherwise than by a field with a default
+LAYOUT_VERSION = 9  # raised when what is stored changes otherwise than by a field with a default
 
 PROPERTY = "urmpipe"  # name of the recording's property with the metadata
 SCALARS = "Scalars:scalars"  # component with the values of an array whose rows are stored one by one

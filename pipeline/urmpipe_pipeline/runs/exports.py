@@ -179,7 +179,7 @@ def run_poses(run: Run, rows: str) -> list[Poses]:
     """
     if run.robot is None or not run.log.joints:
         missing = "robot" if run.log.joints else "joints"
-        at_ingest = Hint("robot", does="gives it", call="ingest")
+        at_ingest = Hint("robot", effect="gives it", call="ingest")
         recorded = Hint("tcp", "recorded", "takes what the log recorded")
         raise _pose_error(run, f"no {missing}, so no pose", at_ingest, recorded)
     t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)

@@ -101,7 +101,7 @@ def inference_table(run: Run, *, brief: bool = False) -> Table:
     known = {one.what for one in run.log.inferences}
     if "robot" not in known and run.robot is not None:
         rows.append(("robot", run.robot.name, run.robot.description, Advice(hints=(Hint("robot"),))))
-    heads = {"what": "Subject", "found": "Found", "evidence": "Why", "otherwise": "Otherwise"}
+    heads = {"what": "Subject", "found": "Found", "evidence": "Why", "alternatives": "Otherwise"}
     table = table_of(f"What was inferred ({len(rows)})", heads, rows, brief=brief, folded=True)
     *others, last = table.columns
     return replace(table, columns=(*others, replace(last, brief=False)))
@@ -119,7 +119,7 @@ def torque_table(run: Run) -> Iterator[Table]:
         "rms": ("RMS", lambda j: Value(float(f"{found()[j].rms:.4g}"), found()[j].unit)),
         "effort": ("Effort limit", lambda j: Value(found()[j].effort, found()[j].unit, given=True)),
         "effort_share": ("Used", lambda j: Value(found()[j].effort_share, "%", limit=1.0)),
-        "share_out": ("Time beyond", lambda j: Value(found()[j].share_out, "%")),
+        "out_fraction": ("Time beyond", lambda j: Value(found()[j].out_fraction, "%")),
     }
     note = "The torque that the motion takes, by inverse dynamics, without friction and load at the tool."
     made, assumed = format_acceleration_source(run.derivative, len(run.t_ns)), run.log.period_assumed

@@ -65,13 +65,13 @@ class TorqueSummary:
         return None if self.effort is None or not self.samples else self.max / self.effort
 
     @property
-    def share_out(self) -> float | None:
+    def out_fraction(self) -> float | None:
         """Share of the samples beyond the limit, 0 to 1; None without limit or samples."""
         return None if self.effort is None or not self.samples else len(self.beyond) / self.samples
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe ingest --json` prints."""
-        keys = ("joint", "unit", "max", "t_max", "rms", "effort", "effort_share", "share_out")
+        keys = ("joint", "unit", "max", "t_max", "rms", "effort", "effort_share", "out_fraction")
         return {key: getattr(self, key) for key in keys}
 
 

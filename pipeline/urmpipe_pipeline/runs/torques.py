@@ -126,7 +126,7 @@ def effort_warning(
         row, worst_row = (round(index) + 1 for index in nearest)
         place = f"in row {worst_row}"
     message = f"{worst.joint} needs more than its effort of {worst.effort:.6g} {worst.unit} in"
-    message += f" {len(worst.beyond)} of {worst.samples} samples ({text.percent(worst.share_out or 0.0)}),"
+    message += f" {len(worst.beyond)} of {worst.samples} samples ({text.percent(worst.out_fraction or 0.0)}),"
     message += f" at worst {worst.max:.4g} {worst.unit} {place}"
     joints = [
         f"{summary.joint} ({text.counted(len(summary.beyond), 'sample')})"

@@ -23,21 +23,21 @@ class EnergyBalance:
 
     Attributes:
         supplied: Work done on the system from outside, at these blocks, in [J], shape (n,).
-        lost: Heat and damping in [J], shape (n,).
+        dissipated: Heat and damping in [J], shape (n,).
         stored: Change of the stored energy in [J], shape (n,).
-        at_first: Stored at the first sample in [J], the sizes of all blocks added up.
+        initial: Stored at the first sample in [J], the sizes of all blocks added up.
     """
 
     supplied: FloatArray
-    lost: FloatArray
+    dissipated: FloatArray
     stored: FloatArray
-    at_first: float
+    initial: float
 
     @property
     def residual(self) -> FloatArray:
         """What is not accounted for in [J], shape (n,): supplied - lost - stored."""
         with np.errstate(invalid="ignore"):
-            return self.supplied - self.lost - self.stored
+            return self.supplied - self.dissipated - self.stored
 
     @property
     def worst(self) -> int | None:
@@ -52,13 +52,18 @@ class EnergyBalance:
         What is stored at the first sample is among them: what a system
         that exchanges nothing gains is all residual.
         """
-        sizes = np.abs(np.concatenate((self.supplied, self.lost, self.stored, [self.at_first])))
+        sizes = np.abs(np.concatenate((self.supplied, self.dissipated, self.stored, [self.initial])))
         largest = float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
         return abs(residual) / largest if largest > 0.0 else 0.0
 
     def to_dict(self) -> dict[str, float | None]:
         """Return the energies and the residual at the last sample in [J]; None where there is no value."""
-        named = {"in": self.supplied, "lost": self.lost, "stored": self.stored, "residual": self.residual}
+        named = {
+            "supplied": self.supplied,
+            "dissipated": self.dissipated,
+            "stored": self.stored,
+            "residual": self.residual,
+        }
         ends = {key: float(values[-1]) if len(values) else np.nan for key, values in named.items()}
         return {key: value if np.isfinite(value) else None for key, value in ends.items()}
 

@@ -9,7 +9,7 @@ import numpy as np
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
-from urmpipe_pipeline.comparison.verdict import DeltaVerdict, allowed_for
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, allowed_for
 from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
@@ -68,8 +68,8 @@ def energy_figure(simulation: Simulation, balance: EnergyBalance) -> Iterator[Fi
     if not len(simulation.t_ns):
         return
     blocks = ", ".join(dict.fromkeys(one.block for one in simulation.signals if one.is_energy))
-    names = ("in", "lost", "change of stored")
-    energies = np.column_stack((balance.supplied, balance.lost, balance.stored))
+    names = ("supplied", "dissipated", "change of stored")
+    energies = np.column_stack((balance.supplied, balance.dissipated, balance.stored))
     line = Line(energies, names, JOINT_COLOURS[:3])
     rest = Line(balance.residual, ("residual",), (JOINT_COLOURS[3],))
     peaks = () if balance.worst is None else (balance.worst,)
@@ -77,7 +77,7 @@ def energy_figure(simulation: Simulation, balance: EnergyBalance) -> Iterator[Fi
     yield Figure(
         "Energies and residual",
         f"Sums over {blocks} since the first sample: work done on the system from outside, losses, and change"
-        " of the stored energy. Residual = in - lost - change of stored: what they do not account for"
+        " of the stored energy. Residual = supplied - dissipated - change of stored: what they do not account"
         f" ({RESIDUAL_CAUSES}). A diamond marks the largest.",
         f"Energies over time, at the end: {ends}, residual {balance.residual[-1]:.6g} J.",
         (
@@ -137,7 +137,7 @@ def _by_limit(signal: Signal, limits: Mapping[str, float]) -> dict[float | None,
     return found
 
 
-def _judged(simulation: Simulation, group: Group, verdict: DeltaVerdict) -> tuple[Panel, ...]:
+def _judged(simulation: Simulation, group: Group, verdict: DeltaMeterResult) -> tuple[Panel, ...]:
     """Return a panel a coordinate and one of the norm, each with its limit; none of another shape."""
     vectors = [one for one in group.signals if one.columns.shape[1] == 3]
     sizes = [one for one in group.signals if one.columns.shape[1] == 1]
@@ -155,7 +155,7 @@ def _judged(simulation: Simulation, group: Group, verdict: DeltaVerdict) -> tupl
     return tuple(panels)
 
 
-def _instants(simulation: Simulation, verdict: DeltaVerdict | None) -> dict[int, str]:
+def _instants(simulation: Simulation, verdict: DeltaMeterResult | None) -> dict[int, str]:
     """Return when a delta meter decided, and when the simulation failed."""
     found = {} if simulation.failed is None else {int(simulation.t_ns[-1]): "failed"}
     if verdict is not None:

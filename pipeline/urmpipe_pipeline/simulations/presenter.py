@@ -9,7 +9,7 @@ from itertools import groupby
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Verdict
-from urmpipe_pipeline.comparison.verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
 from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
 from urmpipe_pipeline.presentation.figure import Drawing, Text
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
@@ -80,7 +80,7 @@ def outcome_words(simulation: Simulation) -> str:
     if worst is None:
         return f"{simulation.name}: {text.counted(len(simulation.t_ns), 'sample')}"
     within = "out of" if worst.out_of_tolerance else "within"
-    doubted = ", but in doubt" if worst.doubts and not worst.out_of_tolerance else ""
+    doubted = ", but in doubt" if worst.caveats and not worst.out_of_tolerance else ""
     assumptions = format_assumptions(simulation.assumptions)
     return f"{worst.block} of {simulation.name} {within} tolerance{doubted}{assumptions}"
 
@@ -123,16 +123,16 @@ def _body(simulation: Simulation) -> Section:
     )
 
 
-def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
+def _meter_facts(one: DeltaMeterResult) -> Iterator[Fact]:
     """Yield what a delta meter found: how much, when, how often it was too much; what is to be doubted.
 
     A page has the numbers in its table of the delta meters.
     """
-    value = Value(one.worst, "m", one.allowed, one.verdict, one.used)
+    value = Value(one.worst, "m", one.allowed, one.verdict, one.utilisation)
     yield Fact(size_of(one), value, used_words(one), page=False)
     yield Fact("Time", Value(one.t, "s"), page=False)
     yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples), page=False)
-    yield Fact("In doubt", "; ".join(one.doubts))
+    yield Fact("In doubt", "; ".join(one.caveats))
 
 
 def _facts(simulation: Simulation) -> Iterator[Fact]:
@@ -163,7 +163,7 @@ def _energy_fact(simulation: Simulation, balance: EnergyBalance) -> Fact:
     blocks = text.counted(len({one.block for one in simulation.signals if one.is_energy}), "block")
     at, share = text.seconds(float(simulation.t[worst])), text.percent(balance.share(residual))
     words = f"not accounted for: at most {residual:.4g} J at t = {at} s, {share} of the largest energy"
-    return Fact(ENERGY, f"{blocks}; {words} in, lost or stored ({RESIDUAL_CAUSES})")
+    return Fact(ENERGY, f"{blocks}; {words} supplied, dissipated or stored ({RESIDUAL_CAUSES})")
 
 
 def _sections(simulation: Simulation) -> Iterator[Section]:
@@ -183,7 +183,12 @@ def _sections(simulation: Simulation) -> Iterator[Section]:
 
 
 def _section(
-    simulation: Simulation, block: str, groups: Sequence[Group], meter: DeltaVerdict | None, *, opened: bool
+    simulation: Simulation,
+    block: str,
+    groups: Sequence[Group],
+    meter: DeltaMeterResult | None,
+    *,
+    opened: bool,
 ) -> Section:
     """Return what a block, or several like ones, did."""
     figures = partial(signal_figures, simulation, groups)

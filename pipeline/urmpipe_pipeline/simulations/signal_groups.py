@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
@@ -42,7 +42,7 @@ class Group:
     block: str
     unit: str
     signals: tuple[Signal, ...]
-    verdict: DeltaVerdict | None = None
+    verdict: DeltaMeterResult | None = None
     family: bool = False
     wanted: int = 0
 

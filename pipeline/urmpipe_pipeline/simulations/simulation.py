@@ -16,7 +16,7 @@ from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import CosimulationError
 from urmpipe_pipeline.comparison.deviation import Verdict
-from urmpipe_pipeline.comparison.verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
 from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance, list_assumptions
@@ -103,14 +103,14 @@ class Setting:
         value: In `unit`.
         unit: As FMI spells it.
         causality: What FMI calls its part: parameter, input, output, local.
-        given: Whether the system gave it; else it is the block's own.
+        from_system: Whether the system gave it; else it is the block's own.
     """
 
     variable: str
     value: float
     unit: str = ""
     causality: str = "parameter"
-    given: bool = False
+    from_system: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ class SimulatedBlock:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Arm:
+class SimulatedArm:
     """The arm that a block of kinematics is, and how it moved.
 
     Attributes:
@@ -187,8 +187,8 @@ class Simulation(Result):
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     connections: Mapping[str, str] = field(default_factory=dict)
-    arms: tuple[Arm, ...] = ()
-    verdicts: tuple[DeltaVerdict, ...] = ()
+    arms: tuple[SimulatedArm, ...] = ()
+    verdicts: tuple[DeltaMeterResult, ...] = ()
     recording: Path | None = field(default=None, metadata={"stored": False})
     loop_seconds: float = field(default=0.0, metadata={"stored": False})
 
@@ -246,7 +246,7 @@ class Simulation(Result):
         )
 
     @property
-    def judged_worst(self) -> DeltaVerdict | None:
+    def judged_worst(self) -> DeltaMeterResult | None:
         """The worst verdict: one that failed, of these what uses up most or lacks a value; None without."""
         return max(self.verdicts, key=_severity, default=None)
 
@@ -305,9 +305,9 @@ class Simulation(Result):
         }
 
 
-def _severity(one: DeltaVerdict) -> tuple[bool, float]:
+def _severity(one: DeltaMeterResult) -> tuple[bool, float]:
     """Return how bad a verdict is, to be held against others."""
-    return one.verdict == "fail", math.inf if one.used is None else one.used
+    return one.verdict == "fail", math.inf if one.utilisation is None else one.utilisation
 
 
 def _scalars(signal: Signal, t: FloatArray) -> Iterator[dict[str, Any]]:

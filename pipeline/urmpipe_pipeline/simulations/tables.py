@@ -11,7 +11,7 @@ from typing import overload
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
 from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
 from urmpipe_pipeline.presentation.section import Cell, Judged, Ref, Table, Value
@@ -32,16 +32,16 @@ POINT = re.compile(r"p(\d+)")
 
 def meters_table(simulation: Simulation) -> Iterator[Table]:
     """Yield what each delta meter found, if there is one."""
-    heads: Heads[DeltaVerdict] = {
+    heads: Heads[DeltaMeterResult] = {
         "block": ("Delta meter", lambda one: Ref(one.block)),
         "verdict": ("Verdict", lambda one: Judged(one.verdict)),
         "quantity": ("of", lambda one: SYMBOLS[one.quantity]),
-        "worst": ("worst", lambda one: Value(one.worst, "m", one.allowed, one.verdict, one.used)),
+        "worst": ("worst", lambda one: Value(one.worst, "m", one.allowed, one.verdict, one.utilisation)),
         "allowed": ("allowed", lambda one: Value(one.allowed, "m", given=True)),
         "t": ("at t", lambda one: Value(one.t, "s")),
         "sample": ("sample", lambda one: Value(one.sample)),
         "out_of_tolerance": ("samples out", lambda one: Value(one.out_of_tolerance)),
-        "share_out": ("out", lambda one: Value(one.share_out, "%")),
+        "out_fraction": ("out", lambda one: Value(one.out_fraction, "%")),
         "samples": ("samples", lambda one: Value(one.samples)),
     }
     if simulation.verdicts:
@@ -68,7 +68,7 @@ def settings_table(simulation: Simulation) -> Table:
     """Return the parameters and start values of all blocks."""
     by = {True: "the system", False: "the block"}
     rows = [
-        (f"{block.name}.{one.variable}", one.causality, f"{one.value:.10g}", one.unit, by[one.given])
+        (f"{block.name}.{one.variable}", one.causality, f"{one.value:.10g}", one.unit, by[one.from_system])
         for block in simulation.blocks
         for one in block.settings
     ]

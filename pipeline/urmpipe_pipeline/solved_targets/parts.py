@@ -11,12 +11,12 @@ import numpy as np
 
 from urmpipe_models.ik.closed import format_method
 from urmpipe_models.ik.limits import TURN, joint_periods
-from urmpipe_models.ik.path import JointPath, Jump, SpeedViolation
+from urmpipe_models.ik.path import BranchJump, JointPath, SpeedViolation
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.palette import colour_name, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of
 from urmpipe_pipeline.presentation.section import Cell, Column, Event, Fact, Place, Table, Value
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import ghosts
 from urmpipe_pipeline.text import in_words, rows_text
 
@@ -27,7 +27,7 @@ NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
 """What may differ in reasons that are one."""
 
 
-def facts(one: SolvedTargets) -> Iterator[Fact]:
+def facts(one: IkResult) -> Iterator[Fact]:
     """Yield what was solved, how, and how much of it."""
     yield Fact("Targets", f"{int(one.reached.sum())} of {len(one)} with a solution", brief=False)
     yield Fact("Robot", one.robot.name, brief=False)
@@ -39,14 +39,14 @@ def facts(one: SolvedTargets) -> Iterator[Fact]:
     yield recording_fact(one.recording)
 
 
-def path_facts(one: SolvedTargets, path: JointPath) -> Iterator[Fact]:
+def path_facts(one: IkResult, path: JointPath) -> Iterator[Fact]:
     """Yield how the joints follow a path: a summary, not its samples; nothing where no target is reached."""
     nearest = path.nearest_singularity
     if nearest is None:
         return
     yield Fact("Branch", "; ".join(_capped(list(_branches(one)))))
     yield from (Fact("Jump", words) for words in _capped([jump_words(one, jump) for jump in path.jumps]))
-    fast = [fast_words(one, stretch) for stretch in path.too_fast]
+    fast = [fast_words(one, stretch) for stretch in path.speed_violations]
     yield from (Fact("Too fast", words) for words in _capped(fast))
     yield Fact(
         "Nearest to a singularity",
@@ -56,7 +56,7 @@ def path_facts(one: SolvedTargets, path: JointPath) -> Iterator[Fact]:
     yield Fact("Off by", _furthest(one), "how far the tool is from its targets, by forward kinematics")
 
 
-def jump_words(one: SolvedTargets, jump: Jump) -> str:
+def jump_words(one: IkResult, jump: BranchJump) -> str:
     """Return a jump with its time, its place and what moves."""
     steps = ", ".join(f"{step.joint} by {in_words(step.step, step.unit)}" for step in jump.joints)
     change = "" if jump.from_branch == jump.to_branch else f"{jump.from_branch} → {jump.to_branch}: "
@@ -64,7 +64,7 @@ def jump_words(one: SolvedTargets, jump: Jump) -> str:
     return f"{_at(one, jump.sample)}{since}, at ({text.point(jump.position)}) m: {change}{steps}"
 
 
-def fast_words(one: SolvedTargets, stretch: SpeedViolation) -> str:
+def fast_words(one: IkResult, stretch: SpeedViolation) -> str:
     """Return how fast a joint would have to be, how fast it may be, and where."""
     speed, allowed = (in_words(value, stretch.unit) for value in (stretch.speed, stretch.allowed))
     rows = f"{_at(one, stretch.first)} to row {one.row[stretch.last]}"
@@ -77,7 +77,7 @@ def _capped(lines: list[str]) -> list[str]:
     return [*lines[:MANY], f"and {more} more"] if more > 0 else lines
 
 
-def _branches(one: SolvedTargets) -> Iterator[str]:
+def _branches(one: IkResult) -> Iterator[str]:
     """Yield the branches in the order of the path, with their rows if there are several."""
     reached = np.flatnonzero(one.reached)
     stretches = [list(some) for _, some in groupby(reached.tolist(), one.branch.__getitem__)]
@@ -87,23 +87,23 @@ def _branches(one: SolvedTargets) -> Iterator[str]:
         yield str(one.branch[some[0]]) + (f" ({stretch})" if len(stretches) > 1 else "")
 
 
-def _furthest(one: SolvedTargets) -> str:
+def _furthest(one: IkResult) -> str:
     """Return how far the tool is from its targets at most, and where."""
-    miss = one.miss[:, 0]
+    miss = one.position_error[:, 0]
     said = text.quantity(float(np.nanmax(miss)), "m")
     if one.angle is not None:
         said += f" and {text.quantity(float(np.nanmax(one.angle)), 'rad')}"
     return f"{said} at most, {_at(one, int(np.nanargmax(miss)))}"
 
 
-def _at(one: SolvedTargets, sample: int) -> str:
+def _at(one: IkResult, sample: int) -> str:
     """Return when a sample is."""
     t = one.t
     row = f"row {one.row[sample]}"
     return f"at {row}" if t is None else f"at t = {text.seconds(t[sample])} s ({row})"
 
 
-def tables(one: SolvedTargets) -> Iterator[Table]:
+def tables(one: IkResult) -> Iterator[Table]:
     """Yield the solutions or how the joints move along the path, and which ghost is which branch."""
     if one.path is None:
         yield solutions_table(one)
@@ -119,11 +119,11 @@ def tables(one: SolvedTargets) -> Iterator[Table]:
         yield table_of("Branches", heads, [chosen, *others])
 
 
-def solutions_table(one: SolvedTargets) -> Table:
+def solutions_table(one: IkResult) -> Table:
     """Return the solutions nearest to the start, or every solution if all were requested: a row each."""
     targets = np.flatnonzero(one.reached)
-    places = np.nonzero(one.solutions.reached) if one.every else (targets, one.chosen[targets])
-    q, labels, miss, angle = one.solutions.q, one.solutions.labels, one.miss, one.angle
+    places = np.nonzero(one.solutions.reached) if one.all_solutions else (targets, one.chosen[targets])
+    q, labels, miss, angle = one.solutions.q, one.solutions.labels, one.position_error, one.angle
 
     def joint(j: int, unit: str) -> Callable[[tuple[int, int]], Cell]:
         return lambda at: _shown(q[*at, j], unit)
@@ -134,10 +134,10 @@ def solutions_table(one: SolvedTargets) -> Table:
     }
     for j, (name, unit) in enumerate(zip(one.robot.coordinates, one.joint_units, strict=True)):
         heads[name] = name, joint(j, unit)
-    heads["miss"] = "off by", lambda at: Value(float(miss[at]), "m")
+    heads["position_error"] = "off by", lambda at: Value(float(miss[at]), "m")
     if angle is not None:
         heads["angle"] = "turned by", lambda at: Value(float(angle[at]), "rad")
-    title = "Every solution" if one.every else "The solutions nearest to the start"
+    title = "Every solution" if one.all_solutions else "The solutions nearest to the start"
     rows, columns = (some.tolist() for some in places)
     made = columns_of(list(zip(rows, columns, strict=True)), heads)
     return Table(title, tuple(replace(one, brief=one.key != "angle") for one in made))
@@ -148,7 +148,7 @@ def _shown(value: float, unit: str) -> Value:
     return Value(round(float(value), 9) + 0.0, unit)
 
 
-def joints_table(one: SolvedTargets) -> Table:
+def joints_table(one: IkResult) -> Table:
     """Return how each joint moves along a path: where it starts and ends, and how fast it is at most."""
     joints, q = one.robot.moving, one.q[one.reached]
     units = one.joint_units
@@ -169,21 +169,21 @@ def joints_table(one: SolvedTargets) -> Table:
     return Table("Joints along the path", tuple(columns))
 
 
-def unreached(one: SolvedTargets) -> Iterator[str]:
+def unreached(one: IkResult) -> Iterator[str]:
     """Yield why rows have no solution; if all are requested also why branches of other rows have none."""
     for rows, why in _stretches(one):
         if why:
             yield f"{rows_text(one.row[rows])}: {why}"
-        elif one.every and one.method != "iterative":
+        elif one.all_solutions and one.method != "iterative":
             yield from _branches_unreached(one, rows)
 
 
-def unreached_facts(one: SolvedTargets) -> Iterator[Fact]:
+def unreached_facts(one: IkResult) -> Iterator[Fact]:
     """Yield what is not reached and why, as far as there is room."""
     yield from (Fact("Not reached", words) for words in _capped(list(unreached(one))))
 
 
-def _stretches(one: SolvedTargets) -> Iterator[tuple[list[int], str]]:
+def _stretches(one: IkResult) -> Iterator[tuple[list[int], str]]:
     """Yield stretches of rows, from 0, that have no solution for one reason but for its numbers, or have one.
 
     The reason is the first of the row in the middle where numbers differ; empty of rows with a solution.
@@ -196,7 +196,7 @@ def _stretches(one: SolvedTargets) -> Iterator[tuple[list[int], str]]:
         yield rows, reasons[middle] if alike else f"row {one.row[middle]}: {reasons[middle]}"
 
 
-def _branches_unreached(one: SolvedTargets, rows: Sequence[int]) -> Iterator[str]:
+def _branches_unreached(one: IkResult, rows: Sequence[int]) -> Iterator[str]:
     """Yield why branches of targets that others reach have no solution."""
     for index in rows:
         found: dict[str, list[str]] = {}
@@ -207,7 +207,7 @@ def _branches_unreached(one: SolvedTargets, rows: Sequence[int]) -> Iterator[str
             yield f"row {one.row[index]} by {'; '.join(branches)}: {reason}"
 
 
-def missed_table(one: SolvedTargets) -> Table:
+def missed_table(one: IkResult) -> Table:
     """Return every target without a solution, with its time, its place and all its reasons."""
     missed, t = np.flatnonzero(~one.reached).tolist(), one.t
     heads: dict[str, tuple[str, Callable[[int], Cell]]] = {
@@ -219,7 +219,7 @@ def missed_table(one: SolvedTargets) -> Table:
     return Table(f"Targets without a solution ({len(missed)})", columns_of(missed, heads), brief=False)
 
 
-def events(one: SolvedTargets) -> Iterator[Event]:
+def events(one: IkResult) -> Iterator[Event]:
     """Yield rows that are not reached, jumps, joints that are too fast, and warnings, each at its row."""
     for rows, why in _stretches(one):
         if why:
@@ -227,13 +227,13 @@ def events(one: SolvedTargets) -> Iterator[Event]:
     if one.path is not None:
         for jump in one.path.jumps:
             yield Event(_time(one, jump.sample), f"jump {jump_words(one, jump)}", "error")
-        for stretch in one.path.too_fast:
+        for stretch in one.path.speed_violations:
             yield Event(_time(one, stretch.first), f"too fast: {fast_words(one, stretch)}", "error")
     for warning in one.warnings:
         row = min(max((warning.row or 1) - 1, 0), len(one) - 1)
         yield Event(_time(one, row), f"{warning.kind}: {warning.sentence()}", "warning")
 
 
-def _time(one: SolvedTargets, row: int) -> int | None:
+def _time(one: IkResult, row: int) -> int | None:
     """Return the time of a row in [ns]; None without times."""
     return None if one.t_ns is None else int(one.t_ns[row])

@@ -25,12 +25,12 @@ from urmpipe_pipeline.solved_targets.parts import (
     unreached,
     unreached_facts,
 )
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import opening_row, scene
 from urmpipe_pipeline.text import counted, enumerated
 
 
-def present(one: SolvedTargets) -> Presentation:
+def present(one: IkResult) -> Presentation:
     """Return what solved targets show."""
     row, reached = opening_row(one), int(one.reached.sum())
     body = Section(
@@ -70,12 +70,12 @@ def present(one: SolvedTargets) -> Presentation:
     )
 
 
-def exports(one: SolvedTargets) -> Exports:
+def exports(one: IkResult) -> Exports:
     """Return what can leave of solved targets: that of the run of their chosen solutions."""
     return run_exports.exports(one.as_run())
 
 
-def headline(one: SolvedTargets) -> str:
+def headline(one: IkResult) -> str:
     """Return how many targets the arm reaches, how they were solved, and why it cannot follow a path."""
     found, wanted = int(one.reached.sum()), len(one)
     part = "" if found == wanted else f"{found} of "
@@ -83,12 +83,12 @@ def headline(one: SolvedTargets) -> str:
     said = f"{one.name}: {one.robot.name} reaches {part}{counted(wanted, 'target')} ({method})"
     if one.path is None:
         return said
-    jumps, fast = len(one.path.jumps), len({stretch.joint for stretch in one.path.too_fast})
+    jumps, fast = len(one.path.jumps), len({stretch.joint for stretch in one.path.speed_violations})
     others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
     return f"{said}, with {enumerated(others)}" if others else said
 
 
-def _checks(one: SolvedTargets) -> Iterator[Check]:
+def _checks(one: IkResult) -> Iterator[Check]:
     """Yield what the verdict rests on: every target is reached, without a jump or a joint too fast."""
     missed = len(one) - int(one.reached.sum())
     why = (
@@ -99,11 +99,11 @@ def _checks(one: SolvedTargets) -> Iterator[Check]:
         return
     jumps = [jump_words(one, jump) for jump in one.path.jumps]
     yield Check("no jump", "fail" if jumps else "pass", "; ".join(jumps[:1]), kind="jump")
-    fast = [fast_words(one, stretch) for stretch in one.path.too_fast]
+    fast = [fast_words(one, stretch) for stretch in one.path.speed_violations]
     yield Check("no joint too fast", "fail" if fast else "pass", "; ".join(fast[:1]), kind="joint-too-fast")
 
 
-def _figures(one: SolvedTargets) -> Iterator[Figure]:
+def _figures(one: IkResult) -> Iterator[Figure]:
     """Yield how the joints and the tool centre point move, or stand without times; a line at each jump."""
     run = one.as_run()
     first, *others = run_figures(run)
@@ -117,7 +117,7 @@ def _figures(one: SolvedTargets) -> Iterator[Figure]:
     yield from others
 
 
-def _page(one: SolvedTargets) -> Iterator[Block]:
+def _page(one: IkResult) -> Iterator[Block]:
     """Yield what only a page shows."""
     yield from path_figure(one.as_run())
     yield inputs_table("Input files", one.provenance.inputs)

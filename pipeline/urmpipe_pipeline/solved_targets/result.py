@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SolvedTargets(Result):
+class IkResult(Result):
     """The joint values that bring the tool centre point of an arm to n targets.
 
     Attributes:
@@ -43,10 +43,10 @@ class SolvedTargets(Result):
         targets: Where the tool shall be.
         solutions: All solutions that were found, k a target at most; along a path one.
         chosen: Column of the solution nearest to the start, shape (n,); it means nothing where there is none.
-        miss: How far the tool is from its target by forward kinematics, in [m], shape (n, k).
+        position_error: How far the tool is from its target by forward kinematics, in [m], shape (n, k).
         angle: By which angle it is turned away from it, in [rad], shape (n, k); None where any orientation
             will do.
-        every: Whether all solutions were requested: they are shown beside the chosen ones.
+        all_solutions: Whether all solutions were requested: they are shown beside the chosen ones.
         branches: Along a path all solutions of each target, if they were requested; else None.
         path: What is known of the way from target to target; None where each stands for itself.
         warnings: What a person should know.
@@ -66,9 +66,9 @@ class SolvedTargets(Result):
     targets: Targets
     solutions: Solutions
     chosen: IndexArray
-    miss: FloatArray
+    position_error: FloatArray
     angle: FloatArray | None
-    every: bool
+    all_solutions: bool
     branches: Solutions | None
     path: JointPath | None
     warnings: tuple[LogWarning, ...]
@@ -91,7 +91,7 @@ class SolvedTargets(Result):
             "positions": (self.targets.position, (n, 3)),
             "rotations": (self.targets.rotation, (n, 3, 3)),
             "chosen solutions": (self.chosen, (n,)),
-            "distances": (self.miss, (n, k)),
+            "distances": (self.position_error, (n, k)),
             "angles": (self.angle, (n, k)),
             "branches": (None if self.branches is None else self.branches.reached[:, 0], (n,)),
             "samples of the path": (None if self.path is None else self.path.q, (n, joints)),
@@ -148,7 +148,7 @@ class SolvedTargets(Result):
     @property
     def verdict(self) -> Verdict:
         """Pass if the arm reaches every target, along a path without a jump or a joint that is too fast."""
-        smooth = self.path is None or not (self.path.jumps or self.path.too_fast)
+        smooth = self.path is None or not (self.path.jumps or self.path.speed_violations)
         return "pass" if smooth and bool(self.reached.all()) else "fail"
 
     @property
@@ -157,9 +157,9 @@ class SolvedTargets(Result):
         return self.recording or self.joint_log
 
     @property
-    def beside(self) -> Solutions | None:
+    def other_branches(self) -> Solutions | None:
         """All solutions of each target, if they were requested; else None."""
-        if not self.every:
+        if not self.all_solutions:
             return None
         return self.solutions if self.path is None else self.branches
 
@@ -200,7 +200,7 @@ class SolvedTargets(Result):
         columns["branch"] = np.where(reached, self.solutions.labels[target, column], "")
         q = self.solutions.q[target, column]
         columns |= {name: q[:, j] for j, name in enumerate(self.robot.coordinates)}
-        columns["miss"] = self.miss[target, column]
+        columns["position_error"] = self.position_error[target, column]
         if self.angle is not None:
             columns["angle"] = self.angle[target, column]
         columns["nearest"] = reached & (self.chosen[target] == column)
@@ -248,7 +248,7 @@ class SolvedTargets(Result):
                 }
                 for one in path.jumps
             ],
-            "too_fast": [
+            "speed_violations": [
                 {
                     "joint": one.joint,
                     "row": int(self.row[one.first]),
@@ -257,7 +257,7 @@ class SolvedTargets(Result):
                     "speed": one.speed,
                     "allowed": one.allowed,
                 }
-                for one in path.too_fast
+                for one in path.speed_violations
             ],
         }
 
@@ -283,7 +283,7 @@ class SolvedTargets(Result):
         return {
             "q": self.solutions.q[index, column].tolist(),
             "branch": self.solutions.labels[index, column],
-            "miss": float(self.miss[index, column]),
+            "position_error": float(self.position_error[index, column]),
             "angle": None if self.angle is None else float(self.angle[index, column]),
         }
 

@@ -10,7 +10,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.presentation.palette import ghost_colour, run_colour
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Targets
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 
 SAME = 1e-9
 """Joint values nearer than this in [rad] or [m] are one solution: rounding, far below what two branches
@@ -30,14 +30,14 @@ class Ghost:
     q: FloatArray
 
 
-def ghosts(one: SolvedTargets) -> tuple[Ghost, ...]:
+def ghosts(one: IkResult) -> tuple[Ghost, ...]:
     """Return the further branches, if all solutions were requested: those with a solution of their own."""
-    if one.beside is None:
+    if one.other_branches is None:
         return ()
     turns = np.array([joint.kind == "revolute" for joint in one.robot.moving])
     found = []
-    for k, name in enumerate(one.beside.branches):
-        q = np.array(one.beside.q[:, k])
+    for k, name in enumerate(one.other_branches.branches):
+        q = np.array(one.other_branches.q[:, k])
         away = q - one.q
         away[:, turns] -= 2.0 * np.pi * np.round(away[:, turns] / (2.0 * np.pi))
         q[(np.abs(away) <= SAME).all(axis=1)] = np.nan  # where none is chosen, `away` is NaN: it stays
@@ -46,7 +46,7 @@ def ghosts(one: SolvedTargets) -> tuple[Ghost, ...]:
     return tuple(found)
 
 
-def opening_row(one: SolvedTargets) -> int:
+def opening_row(one: IkResult) -> int:
     """Return the first row, from 0, at which most branches are there, the chosen one among them."""
     there = one.reached.astype(np.int64)
     for ghost in ghosts(one):
@@ -54,7 +54,7 @@ def opening_row(one: SolvedTargets) -> int:
     return int(np.argmax(there))
 
 
-def scene(one: SolvedTargets) -> Scene:
+def scene(one: IkResult) -> Scene:
     """Return the arm in its chosen solutions, the other branches, the path of its tool, and the targets."""
     beside = ghosts(one)
     branch = tuple(f"chosen: {name}" if name else "" for name in one.branch) if beside else ""
@@ -66,7 +66,7 @@ def scene(one: SolvedTargets) -> Scene:
     return Scene("Arm and targets [m]", tuple(arms), _paths(one), targets=_targets(one))
 
 
-def _paths(one: SolvedTargets) -> tuple[Path, ...]:
+def _paths(one: IkResult) -> tuple[Path, ...]:
     """Return where the tool goes, of targets with times."""
     run = None if one.t_ns is None else one.as_run()
     if run is None or run.tcp is None:
@@ -74,7 +74,7 @@ def _paths(one: SolvedTargets) -> tuple[Path, ...]:
     return (Path(one.name, run.tcp.position, run.t_ns, run_colour(0), vanishes=True),)
 
 
-def _targets(one: SolvedTargets) -> Targets:
+def _targets(one: IkResult) -> Targets:
     """Return the targets, those that are not reached with the first reason why."""
     rotation = one.targets.rotation
     quat = None if rotation is None else to_quaternions(np.asarray(rotation).reshape(-1, 9), "matrix")

@@ -62,7 +62,7 @@ def near_singular_warnings(
     named = np.zeros_like(solutions.reached)
     for one in solutions.singular:
         named |= one.where
-    asked = listed & solutions.reached & ~named & (solutions.shortfall == 0.0)
+    asked = listed & solutions.reached & ~named & (solutions.position_residual == 0.0)
     smallest = np.full(asked.shape, np.inf)
     if asked.any():
         smallest[asked] = singularity_over_log(chain, solutions.q[asked], orientation=orientation).smallest
@@ -115,7 +115,7 @@ def within_pi_warnings(chain: Chain, q: FloatArray) -> Iterator[LogWarning]:
 
 def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarning]:
     """Yield a warning of the targets in data rows `row`, shape (n,), that the tool only comes near to."""
-    short = np.asarray(np.where(solutions.reached, solutions.shortfall, 0.0)).max(axis=1)
+    short = np.asarray(np.where(solutions.reached, solutions.position_residual, 0.0)).max(axis=1)
     if short.any():
         worst = int(np.argmax(short))
         said = (
@@ -163,10 +163,10 @@ def path_warnings(path: JointPath) -> Iterator[LogWarning]:
         first = path.jumps[0]
         steps = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in first.joints)
         yield LogWarning("jump", _first_of(len(path.jumps), "jump", steps), first.sample + 1)
-    if path.too_fast:
-        one = path.too_fast[0]
+    if path.speed_violations:
+        one = path.speed_violations[0]
         said = f"{one.joint} at {in_words(one.speed, one.unit)} of {in_words(one.allowed, one.unit)} allowed"
-        count = len({one.joint for one in path.too_fast})
+        count = len({one.joint for one in path.speed_violations})
         yield LogWarning("joint-too-fast", _first_of(count, "joint", said, " too fast"), one.first + 1)
 
 

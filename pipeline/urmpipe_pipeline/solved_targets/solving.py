@@ -15,7 +15,7 @@ from urmpipe_models.ik.solve import solve
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.solved_targets.request import Request
-from urmpipe_pipeline.solved_targets.result import SolvedTargets, missed_by
+from urmpipe_pipeline.solved_targets.result import IkResult, missed_by
 from urmpipe_pipeline.solved_targets.solution_warnings import (
     far_warnings,
     near_singular_warnings,
@@ -35,7 +35,7 @@ Progress = Callable[[float], None] | None
 """Called with the share that is done, 0..1."""
 
 
-def solve_targets(request: Request, progress: Progress = None) -> SolvedTargets:
+def solve_targets(request: Request, progress: Progress = None) -> IkResult:
     """Return the solutions of targets, each for itself or along a path, with all that a person should know.
 
     Args:
@@ -69,7 +69,7 @@ def _solutions(request: Request, *, every: bool, progress: Progress) -> Solution
     return concatenate_solutions(blocks)
 
 
-def _of_targets(request: Request, progress: Progress) -> SolvedTargets:
+def _of_targets(request: Request, progress: Progress) -> IkResult:
     """Return the solutions of targets that stand for themselves: all that a closed form has."""
     period = joint_periods(request.arm)
     every = request.every or request.form is not None
@@ -83,15 +83,15 @@ def _of_targets(request: Request, progress: Progress) -> SolvedTargets:
     return _result(request, solutions, chosen, listed)
 
 
-def _of_path(request: Request, t_ns: IntArray, progress: Progress) -> SolvedTargets:
+def _of_path(request: Request, t_ns: IntArray, progress: Progress) -> IkResult:
     """Return the solutions of a path, which follow each other, and beside them its branches if requested."""
     path = solve_path(
         request.arm, request.given.targets, t_ns, start=request.start, within_pi=request.within_pi,
         search=request.search, progress=progress,
     )  # fmt: skip
     solutions = Solutions(
-        path.q[:, None], ("path",), path.reasons[:, None], tuple(_families(path)), path.shortfall[:, None],
-        path.branch[:, None],
+        path.q[:, None], ("path",), path.reasons[:, None], tuple(_families(path)),
+        path.position_residual[:, None], path.branch[:, None],
     )  # fmt: skip
     chosen = np.zeros(len(request.given.row), dtype=np.intp)
     branches = _solutions(request, every=True, progress=progress) if request.every else None
@@ -114,7 +114,7 @@ def _result(
     listed: BoolArray,
     path: JointPath | None = None,
     branches: Solutions | None = None,
-) -> SolvedTargets:
+) -> IkResult:
     """Return solutions with how far they miss their targets, and with what a person should know.
 
     Args:
@@ -143,11 +143,12 @@ def _result(
         *_far(request, reached),
     )
     options = request.options | {"robot": request.arm.name}
-    return SolvedTargets(
+    return IkResult(
         name=given.name, robot=request.arm, method="iterative" if form is None else form.name, row=given.row,
         t_ns=given.t_ns, clock_start_ns=given.clock_start_ns, targets=given.targets, solutions=solutions,
-        chosen=chosen, miss=miss, angle=angle, every=request.every, branches=branches, path=path,
-        warnings=warnings, provenance=build_provenance("ik", options, [given.file] if given.file else []),
+        chosen=chosen, position_error=miss, angle=angle, all_solutions=request.every,
+        branches=branches, path=path, warnings=warnings,
+        provenance=build_provenance("ik", options, [given.file] if given.file else []),
     )  # fmt: skip
 
 

@@ -262,7 +262,7 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[Finding]:
     after, before = (f"{times[k] / one:.15g}" for k in (row + 1, row))
     said = f"found {after} after {before}, as a time of day hhmmss goes on, allowed: a clock of one unit"
     hints = (
-        Hint("", does="write it as hh:mm:ss"),
+        Hint("", effect="write it as hh:mm:ss"),
         *unit_hints(clock.columns[:1], clock.unit, "takes it as no time of day"),
         *OTHER_TIME,
     )
@@ -274,7 +274,7 @@ def _several_logs(rows: Sequence[int], name: str) -> Finding:
     begin = ", ".join(str(row + 1) for row in rows[:SHOWN_GAPS])
     more = ", ..." if len(rows) > SHOWN_GAPS else ""
     said = f"found {len(rows) + 1} logs in one file: the clock begins again in rows {begin}{more}"
-    hints = (Hint("", does=f"keep the rows of one, such as the first {rows[0]}"), *OTHER_TIME)
+    hints = (Hint("", effect=f"keep the rows of one, such as the first {rows[0]}"), *OTHER_TIME)
     return Finding(f"{said}, allowed: one log", row=rows[0] + 1, column=name, hints=hints)
 
 

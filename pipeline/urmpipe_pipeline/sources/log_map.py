@@ -137,13 +137,13 @@ def map_of(
     lines += ["", *CORRECTIONS] if log.joints else []
     for column, name in zip(_of(log, "joint"), log.joints, strict=True):
         said: dict[str, Any] = {"column": _called(log, column), "name": name}
-        said |= {} if column.doubt else {"unit": column.unit}
+        said |= {} if column.uncertainty else {"unit": column.unit}
         corrected = {"sign": column.sign, "offset": column.offset}
         said |= corrected if corrected != {"sign": 1, "offset": 0.0} else {}
         interval = intervals.get(name, intervals.get(""))
         said |= {"interval": list(interval)} if interval and column.unit in TURNING else {}
         lines += ["", "[[joints]]", *format_toml(said)]
-        lines += [_assumed("unit", column.unit, column.doubt)] if column.doubt else []
+        lines += [_assumed("unit", column.unit, column.uncertainty)] if column.uncertainty else []
     position, orientation = _of(log, "position"), _of(log, "rotation")
     if position:
         said = {"position": [_called(log, column) for column in position]}
@@ -151,11 +151,11 @@ def map_of(
         said |= turned if orientation else {}
         lines += ["", "[tcp]", *format_toml(said | ({"measured": True} if log.measured else {}))]
     measured = [column for column in (*position, *orientation) if column.unit != PURE.name]
-    units = {_called(log, column): column.unit for column in measured if not column.doubt}
+    units = {_called(log, column): column.unit for column in measured if not column.uncertainty}
     timed = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
     units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in timed}
     told = [f"{quote_toml(one)} = {quote_toml(unit)}" for one, unit in units.items()]
-    told += [_assumed(quote_toml(_called(log, c)), c.unit, c.doubt) for c in measured if c.doubt]
+    told += [_assumed(quote_toml(_called(log, c)), c.unit, c.uncertainty) for c in measured if c.uncertainty]
     lines += ["", "[units]", *told] if told else []
     return "\n".join(lines) + "\n"
 

@@ -202,7 +202,7 @@ def _by_names(
     if not options.joints:
         refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "selects them: give their numbers"))
     refuse_twins(
-        (*roles.position, *roles.rotation), columns, layouts, Hint("", does="rename or remove the others")
+        (*roles.position, *roles.rotation), columns, layouts, Hint("", effect="rename or remove the others")
     )
     return roles
 

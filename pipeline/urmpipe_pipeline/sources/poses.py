@@ -59,7 +59,7 @@ def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers
         return numbers
     clock = plan.clock.columns
     moving = Hint("time", clock[0].called) if clock else Hint("period")
-    hints = () if plan.poses else (replace(moving, does="reads them as a motion"),)
+    hints = () if plan.poses else (replace(moving, effect="reads them as a motion"),)
     found = Inference("rows", "still poses", why, hints=hints)
     return replace(numbers, clock=None, texts=(), still=True, inferences=(found,), warnings=())
 

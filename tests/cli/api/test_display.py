@@ -17,7 +17,7 @@ from flat_arm import lay_flat_arm
 from urmpipe_datasets import LOGS
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.display import Displayable
-from urmpipe_pipeline.comparison.comparison import Absent, BaselineComparison
+from urmpipe_pipeline.comparison.comparison import BaselineComparison, UnmatchedQuantity
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
@@ -124,7 +124,9 @@ def test_of_many_logs_the_worst_is_shown_first(results: dict[str, Any]) -> None:
     assert cells[-1] == ["&lt;run 7&gt;</td>", "FAIL</td>"]
     assert "75.80" in html
     assert "<p>8 of 10 rows</p>" in html
-    worse = replace(one, baseline=BaselineComparison("before", None, {}, (), (), (Absent("old"),), ()))
+    worse = replace(
+        one, baseline=BaselineComparison("before", None, {}, (), (), (UnmatchedQuantity("old"),), ())
+    )
     assert repr(worse).startswith(
         "<Comparison <b>&log-against-path: fail, worse than the baseline, on 1 assumption: <b>&log pass"
     )

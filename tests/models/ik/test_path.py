@@ -82,8 +82,8 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     path = follow(UR5E, q, targets, search=NEAR)
     assert path.reached.all()
     assert path.branch[-1] == "nearest point"
-    assert 0.0 < path.shortfall[-1] <= 0.002 + 1e-9  # m: the pose before the shift is that near
-    assert not path.shortfall[:-1].any()
+    assert 0.0 < path.position_residual[-1] <= 0.002 + 1e-9  # m: the pose before the shift is that near
+    assert not path.position_residual[:-1].any()
 
 
 def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:

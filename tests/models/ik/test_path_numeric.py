@@ -57,10 +57,10 @@ def assert_least_motion(path: JointPath, least_singular: float) -> None:
 
 def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(followed: JointPath) -> None:
     assert_met(followed, DEMO)
-    assert not (followed.jumps or followed.too_fast or followed.singular)
+    assert not (followed.jumps or followed.speed_violations or followed.singular)
     assert set(followed.branch) == {"1"}
     assert followed.method == "least motion"
-    assert not followed.shortfall.any()
+    assert not followed.position_residual.any()
     # rad a sample: 0.59 m/s are 3 mm, over singular values down to 0.07 m/rad and briefly less
     assert np.abs(np.diff(followed.q, axis=0)).max() < 0.015
     assert_least_motion(followed, 0.01)
@@ -180,7 +180,7 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     path = follow(ARM, np.array([[0.3, -0.5, 0.1]]), in_plane(reach), search=search)
     assert path.reached.all()
     # m: along x the arm reaches 3 m; the nearest point is found to 1e-6 rad about it, so much better
-    np.testing.assert_allclose(path.shortfall, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(path.position_residual, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
 
 
 def test_one_sample_and_equal_samples_are_paths_too() -> None:
@@ -210,7 +210,7 @@ def test_each_sample_of_a_path_without_solutions_has_a_reason(robot: str, place:
     assert not path.reached.any()
     assert all(reason in text for text in path.reasons)
     assert list(path.branch) == ["", "", ""]
-    assert not (path.jumps or path.too_fast or path.singular)
+    assert not (path.jumps or path.speed_violations or path.singular)
 
 
 def test_prismatic_joints_follow_too() -> None:

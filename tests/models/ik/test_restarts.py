@@ -172,7 +172,7 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
     targets = Targets(np.array([[0.903, 0.0, 0.0], [0.91, 0.0, 0.0], [0.5, 0.1, 0.0]]))
     found = solve_iteratively(ARM, targets, start=np.array([0.1, 0.2]), search=NEAR)
     assert found.reached[:, 0].tolist() == [True, False, True]
-    np.testing.assert_allclose(found.shortfall[:, 0], [0.003, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(found.position_residual[:, 0], [0.003, 0.0, 0.0], atol=1e-9)
     assert found.labels[:, 0].tolist() == [NEAREST_POINT, "1", "1"]
     np.testing.assert_allclose(found.q[0, 0], [0.0, 0.0], atol=1e-3)  # flat there: 1e-9 m is 1e-4 rad
     assert found.reason(0) is None

@@ -129,7 +129,7 @@ def test_a_bad_target_stops_no_other(name: str, every: bool) -> None:
     found, alone = (solve(chain, these, every=every, search=search) for these in (targets, good))
     np.testing.assert_allclose(found.q[[0, 3]], alone.q, atol=1e-9)
     assert found.reached.any(axis=1).tolist() == [True, False, False, True]
-    assert len(found) == 4 and found.shortfall.shape == found.labels.shape == found.reasons.shape
+    assert len(found) == 4 and found.position_residual.shape == found.labels.shape == found.reasons.shape
 
 
 @pytest.mark.parametrize("name", ["ur5e", "arm6", "urm6"])
@@ -171,8 +171,8 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
     assert found.labels[0, 0] == "nearest point"
     position, _ = pose_errors(UR5E, found.q[:1, 0], targets.rows(slice(0, 1)))
     assert np.abs(position).max() <= 0.0035
-    np.testing.assert_allclose(found.shortfall[0, 0], np.linalg.norm(position), rtol=1e-6)
-    assert found.shortfall[0, 0] > 1e-4 and found.shortfall[1, 0] == 0.0
+    np.testing.assert_allclose(found.position_residual[0, 0], np.linalg.norm(position), rtol=1e-6)
+    assert found.position_residual[0, 0] > 1e-4 and found.position_residual[1, 0] == 0.0
     assert "from axis" in there(found.reason(1))
     every = solve(UR5E, targets, start=q, every=True, search=SearchOptions(tolerance=0.0035))
     assert every.reached.sum(axis=1).tolist() == [1, 0]

@@ -193,7 +193,7 @@ def test_a_seed_gives_the_same_bits_another_the_same_assemblies_and_the_nearest_
     network = build(drive="s")
     first, again, other = (every(network, {"s": 0.05}, seed) for seed in (0, 0, 1))
     np.testing.assert_array_equal(first.x, again.x)
-    assert (first.tried, first.reason) == (again.tried, again.reason)
+    assert (first.start_count, first.reason) == (again.start_count, again.reason)
     for one, two in zip(first.assemblies, other.assemblies, strict=True):
         # 1e-9: gaps near 1e-14 times conditions below 1e4, and what spins idly is held by its start
         np.testing.assert_allclose(two.poses, one.poses, rtol=0.0, atol=1e-9)
@@ -291,8 +291,8 @@ def test_two_links_that_are_too_short_are_open_by_what_is_missing(
     length: float, seed: int, missing: float
 ) -> None:
     found = assemble(build_mechanism(two_links(length, (1.0 + missing) * length)), restarts=50, seed=seed)
-    assert (found.assemblies, found.tried) == ((), 51)
-    (gap,) = found.gaps
+    assert (found.assemblies, found.start_count) == ((), 51)
+    (gap,) = found.closure_errors
     assert gap.metres == pytest.approx(missing * length, rel=1e-9 if missing == 0.1 else 1e-5)
     assert gap.radians < 1e-6  # the least of the squares is flat: it ends at the root of rounding
     assert set(gap.loop) == {"A", "B", "C"} > {gap.name}
@@ -309,8 +309,8 @@ def test_an_angle_that_does_not_close_is_open_at_every_size(size: float) -> None
     joints = (*network.joints[:2], replace(last, frames=(last.frames[0], second)))
     found = assemble(build_mechanism(replace(network, joints=joints)), restarts=50)
     assert found.assemblies == ()
-    assert found.gaps[0].radians == pytest.approx(1e-5, rel=1e-4)
-    assert found.gaps[0].metres < 1e-6 * size
+    assert found.closure_errors[0].radians == pytest.approx(1e-5, rel=1e-4)
+    assert found.closure_errors[0].metres < 1e-6 * size
 
 
 # --- continua, doubles and edges
@@ -339,7 +339,7 @@ def test_pieces_of_a_rod_spin_apart() -> None:
     assert (len(found.assemblies), found.continuum) == (2, 0)
     moves = analyse_mobility(mechanism, found.x[:, 0])
     rods = next(one.bodies for one in mechanism.network.joints if one.name == "C")
-    assert sorted(moves.idle) == sorted(rods)
+    assert sorted(moves.passive) == sorted(rods)
     assert (moves.mobility, moves.kind) == (3, "mechanism")
     numbers = [k for k, name in enumerate(mechanism.network.body_names) if name not in rods]
     for one, other in zip(found.assemblies, whole.assemblies, strict=True):

@@ -93,9 +93,9 @@ def test_an_element_equals_its_joints_on_a_hundred_networks(kind: ElementKind, o
         rn.assert_close(rotation, np.array(of_element.poses(x.tolist())["platform"].rotation), CLOSES)
         one, other = analyse_mobility(of_element, x), analyse_mobility(of_joints, y)
         assert one.mobility == 5 - others
-        assert other.idle == built.idle
-        assert other.mobility - len(other.idle) == one.mobility
-        assert other.kutzbach - len(other.idle) == one.kutzbach
+        assert other.passive == built.idle
+        assert other.mobility - len(other.passive) == one.mobility
+        assert other.kutzbach - len(other.passive) == one.kutzbach
         assert one.redundant == other.redundant == ()
         space = rn.twist_space(of_element, x, "platform")
         assert space.shape == (6, 5 - others)

@@ -121,8 +121,8 @@ def test_joints_of_denavit_hartenberg_elements_and_of_arms_are_coupled() -> None
 def test_what_a_gear_is_off_by_is_an_angle() -> None:
     blocked = {**GEARED, "joints": {**GEARED["joints"], "B": shaft(("ground", "b"), 300, value=0)}}
     found = network_solve(blocked, controls={"turn": 20}, restarts=1)
-    assert [(one.name, one.metres) for one in found.gaps] == [("pair", 0.0)]
-    assert found.gaps[0].radians == pytest.approx(math.radians(20), abs=ROUNDING)
+    assert [(one.name, one.metres) for one in found.closure_errors] == [("pair", 0.0)]
+    assert found.closure_errors[0].radians == pytest.approx(math.radians(20), abs=ROUNDING)
 
 
 def test_a_driven_cam_moves_its_follower_with_the_derivatives_of_its_spline() -> None:

@@ -51,7 +51,7 @@ def facts_of(network: Network) -> Facts:
     redundant = len(found.redundant)
     assert redundant == mechanism.rows - found.rank == found.mobility - found.kutzbach
     return Facts(
-        found.mobility, found.nearby, found.kutzbach, redundant, found.idle, found.kind,
+        found.mobility, found.nearby, found.kutzbach, redundant, found.passive, found.kind,
         mechanism.graph.structure,
     )  # fmt: skip
 
@@ -182,7 +182,7 @@ def test_closed_poses_do_not_depend_on_how_a_network_is_written(name: str, seed:
     other = scaled(shuffled(rooted(reversed_joints(network, rng), ground), rng), factor)
     first, second = closed_poses(network, value), closed_poses(other, value)
     base = np.linalg.inv(first[ground])
-    for body in set(first) - set(start_mobility(network).idle) - {ground}:
+    for body in set(first) - set(start_mobility(network).passive) - {ground}:
         np.testing.assert_allclose(second[body], base @ first[body], rtol=0.0, atol=SAME_POSES)
 
 

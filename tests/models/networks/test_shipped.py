@@ -146,7 +146,7 @@ def test_bennett_obeys_its_relation_and_does_not_close_with_a_longer_link() -> N
         tables["dh"]["elements"][name]["a"] *= 1.05
     longer = assemble(build_mechanism(load_network(tables)), restarts=200)
     assert not longer.assemblies
-    assert max(longer.gaps[0].metres, longer.gaps[0].radians) > 1e-3
+    assert max(longer.closure_errors[0].metres, longer.closure_errors[0].radians) > 1e-3
 
 
 def test_the_platform_of_sarrus_rises_upright() -> None:

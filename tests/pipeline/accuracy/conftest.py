@@ -13,12 +13,12 @@ from asserting import there
 from made_plans import CONTOUR, planned
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.accuracy.driven_motion import Diverged, DrivenMotion
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.driven_motion import Divergence, DrivenMotion
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import build_provenance
 
-Make = Callable[..., Accuracy]
+Make = Callable[..., AccuracyResult]
 
 LIMIT = 0.4e-3
 """The largest error allowed in [m]."""
@@ -33,7 +33,7 @@ def plan_at(velocity: float) -> PlannedPath:
     return planned(load_robot("irb60"), CONTOUR, velocity=velocity, tsp=0.02)
 
 
-def motion(velocity: float, diverged: Diverged | None = None) -> DrivenMotion:
+def motion(velocity: float, diverged: Divergence | None = None) -> DrivenMotion:
     """Return a motion whose first joint lags by 3 mrad at 1 m/s, by the square of the velocity else.
 
     The second voltage is at its limit at every fourth sample, but not below 0.5 m/s.
@@ -58,7 +58,7 @@ def motion(velocity: float, diverged: Diverged | None = None) -> DrivenMotion:
         voltage=voltage,
         current=voltage / 10.0,
         limits=np.full(3, VOLTAGE),
-        corner_ns=plan.t_ns[[30, 60, 90]],
+        corner_times_ns=plan.t_ns[[30, 60, 90]],
         diverged=diverged,
     )
 
@@ -67,26 +67,26 @@ def motion(velocity: float, diverged: Diverged | None = None) -> DrivenMotion:
 def accuracy() -> Make:
     """Make an accuracy at some velocities in [m/s], with further fields."""
 
-    def make(*velocities: float, gone: float | None = None, **more: Any) -> Accuracy:
+    def make(*velocities: float, gone: float | None = None, **more: Any) -> AccuracyResult:
         """Return it; the motion of one velocity diverged."""
         motions = tuple(
-            motion(one, Diverged(float(plan_at(one).t[-1]), "theta2") if one == gone else None)
+            motion(one, Divergence(float(plan_at(one).t[-1]), "theta2") if one == gone else None)
             for one in velocities or (0.1, 0.5, 1.0)
         )
         fields: dict[str, Any] = {
             "name": "cube wall xy", "robot": plan_at(0.5).robot, "rows": CONTOUR, "law": "trapezoid",
             "acceleration": 6.0, "jerk": None, "period": 0.02, "force": (0.0, 0.0, 0.0), "motions": motions,
-            "tried": (), "running": None, "limit": None, "decides": "time", "loop_radius": 0.99,
+            "probed": (), "running": None, "limit": None, "limited_error": "time", "loop_radius": 0.99,
             "compiled": True, "warnings": (), "provenance": build_provenance("accuracy", {}, []),
         }  # fmt: skip
-        return Accuracy(**fields | more)
+        return AccuracyResult(**fields | more)
 
     return make
 
 
 @pytest.fixture
-def limited(accuracy: Make) -> Accuracy:
+def limited(accuracy: Make) -> AccuracyResult:
     """An accuracy with a limit, and the velocities run to find the running speed."""
     running = motion(0.2)
     tried = tuple(one.errors for one in (motion(0.1), running, motion(0.3)))
-    return accuracy(limit=LIMIT, running=running, tried=tried)
+    return accuracy(limit=LIMIT, running=running, probed=tried)

@@ -16,14 +16,14 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.figures import velocity_figure
 from urmpipe_pipeline.accuracy.published import FIG7
-from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.presentation.figure import Figure, Panel, SpaceFigure
 from urmpipe_pipeline.presentation.palette import REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.report.render import render_report
 from urmpipe_pipeline.results import present
 
-Make = Callable[..., Accuracy]
+Make = Callable[..., AccuracyResult]
 
 
 def mm(value: float | None) -> str:
@@ -38,22 +38,22 @@ def panels(figure: Figure) -> list[Panel]:
 
 
 @pytest.mark.slow
-def test_headline_with_a_limit(limited: Accuracy, accuracy: Make) -> None:
+def test_headline_with_a_limit(limited: AccuracyResult, accuracy: Make) -> None:
     shown = present(limited)
     assert shown.headline == "cube wall xy: irb60 runs up to 0.2 m/s within 0.4 mm (time)"
     assert (shown.verdict, shown.body.title) == ("fail", "Accuracy of irb60, cube wall xy")
-    none = present(accuracy(limit=1e-9, decides="path"))
+    none = present(accuracy(limit=1e-9, limited_error="path"))
     assert none.headline == "cube wall xy: irb60 runs at no velocity within 1e-06 mm (path)"
     assert facts(none.body)["Running speed"] == "none"
 
 
-@pytest.mark.parametrize("decides", ["time", "path"])
-def test_the_path_is_coloured_by_the_error_that_decides_with_its_limit(accuracy: Make, decides: str) -> None:
-    result = accuracy(0.5, limit=4e-4, decides=decides)
+@pytest.mark.parametrize("limited_error", ["time", "path"])
+def test_the_path_is_coloured_by_the_limited_error_with_its_limit(accuracy: Make, limited_error: str) -> None:
+    result = accuracy(0.5, limit=4e-4, limited_error=limited_error)
     (motion,) = result.motions
     (figure,) = (one for one in present(result).body.blocks() if isinstance(one, SpaceFigure))
     (real,) = (path for path in figure.paths if path.values is not None)
-    values = motion.delta[:, 3] if decides == "time" else motion.from_path
+    values = motion.delta[:, 3] if limited_error == "time" else motion.from_path
     np.testing.assert_array_equal(real.values, values)
     assert real.limit == 4e-4
 
@@ -93,13 +93,13 @@ def test_facts_say_how_it_was_run(accuracy: Make) -> None:
 
 
 @pytest.mark.slow
-def test_table_and_checks(limited: Accuracy) -> None:
+def test_table_and_checks(limited: AccuracyResult) -> None:
     asked, tried = present(limited).body.tables
     found = cells(asked)
     assert found["error"] == [one.error for one in limited.errors]
     assert found["path_error"] == [one.path_error for one in limited.errors]
-    assert found["saturated"] == [one.saturated for one in limited.errors]
-    assert (found["saturated"][0], tried.folded, tried.brief) == (0.0, True, False)
+    assert found["saturated_share"] == [one.saturated_share for one in limited.errors]
+    assert (found["saturated_share"][0], tried.folded, tried.brief) == (0.0, True, False)
     assert cells(tried)["velocity"] == ["0.1 m/s", "0.2 m/s", "0.3 m/s"]
     checks = present(limited).body.checks
     assert [(one.name, one.verdict) for one in checks] == [
@@ -111,7 +111,7 @@ def test_table_and_checks(limited: Accuracy) -> None:
 # --- plots -------------------------------------------------------------------------------------------
 
 
-def test_error_over_velocity(limited: Accuracy) -> None:
+def test_error_over_velocity(limited: AccuracyResult) -> None:
     figure = velocity_figure(limited)
     (panel,) = panels(figure)
     over = there(panel.over)
@@ -119,7 +119,7 @@ def test_error_over_velocity(limited: Accuracy) -> None:
     assert (panel.logarithmic, panel.limit) == (True, limited.limit)
     path, time, published = panel.lines
     assert [line.strong for line in panel.lines] == [False, True, False]
-    every = {one.velocity: one for one in (*limited.tried, *limited.errors)}
+    every = {one.velocity: one for one in (*limited.probed, *limited.errors)}
     assert time.values[:].tolist() == [every[v].error for v in over.values]
     assert path.values[:].tolist() == [every[v].path_error for v in over.values]
     assert published.values[:].tolist() == [one.error for one in FIG7]
@@ -136,14 +136,14 @@ def test_published_points_are_those_of_its_arm_and_contour(accuracy: Make) -> No
         assert "Iso9283" not in velocity_figure(other).caption
 
 
-@pytest.mark.parametrize("decides", ["time", "path"])
-def test_plots_of_a_motion(accuracy: Make, decides: str) -> None:
-    result = accuracy(0.5, limit=4e-4, decides=decides)
+@pytest.mark.parametrize("limited_error", ["time", "path"])
+def test_plots_of_a_motion(accuracy: Make, limited_error: str) -> None:
+    result = accuracy(0.5, limit=4e-4, limited_error=limited_error)
     (section,), (motion,) = present(result).body.sections, result.motions
     deviation, joints, drives = figures(section)
     limits = {panel.title: panel.limit for panel in panels(deviation)}
-    assert [limits["‖Δ‖"], limits["path"]] == ([4e-4, None] if decides == "time" else [None, 4e-4])
-    assert list(deviation.instants) == motion.corner_ns.tolist()
+    assert [limits["‖Δ‖"], limits["path"]] == ([4e-4, None] if limited_error == "time" else [None, 4e-4])
+    assert list(deviation.instants) == motion.corner_times_ns.tolist()
     for panel, real, asked in zip(
         panels(joints), (motion.q, motion.qd), (motion.set_q, motion.set_qd), strict=True
     ):
@@ -164,7 +164,7 @@ def test_drives_of_other_voltages_have_panels_of_their_own(accuracy: Make) -> No
     assert found == [(24.0, ("theta1", "theta3")), (36.0, ("theta2",))]
 
 
-def test_scene_shows_the_motion_nearest_to_half_a_metre_per_second(limited: Accuracy) -> None:
+def test_scene_shows_the_motion_nearest_to_half_a_metre_per_second(limited: AccuracyResult) -> None:
     shown, motion = present(limited), limited.motions[1]
     assert shown.opens_at_ns == motion.t_ns[motion.worst]
     assert [one.opened for one in shown.body.sections] == [False, True, False]
@@ -182,14 +182,14 @@ def test_scene_shows_the_motion_nearest_to_half_a_metre_per_second(limited: Accu
 # --- page --------------------------------------------------------------------------------------------
 
 
-def test_page_of_an_accuracy(limited: Accuracy) -> None:
+def test_page_of_an_accuracy(limited: AccuracyResult) -> None:
     page = render_report([present(limited)])
     for said in ("runs up to 0.2 m/s", "Error over velocity", "Arm on the path at 0.5 m/s", "Voltages"):
         assert said in page
     assert all(mm(one.error) in page and mm(one.path_error) in page for one in limited.errors)
 
 
-def test_two_arms_stand_side_by_side(limited: Accuracy) -> None:
+def test_two_arms_stand_side_by_side(limited: AccuracyResult) -> None:
     spring = replace(limited, robot=replace(limited.robot, name="irb60-spring"), running=None)
     first, second = (present(one).lines[0] for one in (limited, spring))
     assert list(first) == list(second)

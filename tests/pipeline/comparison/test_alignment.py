@@ -343,7 +343,9 @@ def test_the_base_and_the_tool_that_are_advised_give_the_same_deviation() -> Non
 def test_a_doubtful_recorded_orientation_is_asked_for_where_the_alignment_goes_by_it(
     align: AlignMode, asked: bool
 ) -> None:
-    doubt = LogWarning("form", "rx may be a rotation vector", assumption="so", role="rotation", asks=True)
+    doubt = LogWarning(
+        "form", "rx may be a rotation vector", assumption="so", role="rotation", blocks_verdict=True
+    )
     run = replace(measured_run(base=Transform()), warnings=(doubt,))
     options = CompareOptions(align=align)
     if asked:
@@ -388,7 +390,7 @@ def test_what_poses_do_not_tell_of_base_and_tool_is_said(turns: FloatArray, said
     assert result.runs[0].statistics["norm"].max < ROUNDING
     told = [(one.kind, str(one)) for one in result.warnings]
     assert told == [("frames-open", f"log: align (--align): the compared poses {said}")]
-    assert (result.runs[0].alignment.unobservable[0].seen < 1e-4) == ("do not" in said)
+    assert (result.runs[0].alignment.unobservable[0].sensitivity < 1e-4) == ("do not" in said)
 
 
 def test_samples_without_an_orientation_carry_no_tool_between_base_and_probe() -> None:

@@ -20,7 +20,7 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.math3d import translation
 from urmpipe_pipeline.comparison.baseline import DEFAULT_NOISE, against_baseline, complete_noise, parse_noise
 from urmpipe_pipeline.comparison.baseline_section import worse_words
-from urmpipe_pipeline.comparison.comparison import Absent, Comparison, Difference
+from urmpipe_pipeline.comparison.comparison import Comparison, SettingDifference, UnmatchedQuantity
 from urmpipe_pipeline.text import to_json_value
 from urmpipe_pipeline.trajectories import Sync
 
@@ -33,14 +33,20 @@ ROUNDING = 1e-15
 def test_the_same_comparison_did_not_change(arms: Compared) -> None:
     result = arms({"a": np.full((50, 6), 0.001)}, tolerance={"axis": 0.001, "angle": 0.001, "joint": 0.002})
     found = against_baseline(result, result, 0.0)
-    assert (found.verdict, found.worse, found.new, found.gone, found.differences) == ("pass", (), (), (), ())
+    assert (found.verdict, found.worse, found.new, found.missing, found.differences) == (
+        "pass",
+        (),
+        (),
+        (),
+        (),
+    )
     assert [change.now.quantity for change in found.changes] == [
         "x", "y", "z", "norm", "path", "angle", "q1", "q2", "q3", "q4", "q5", "q6",
     ]  # fmt: skip
     assert not any(change.changed or change.better for change in found.changes)
-    assert {(change.largest, change.t_largest, change.samples_shared) for change in found.changes} == {
-        (0.0, 0.0, 50)
-    }
+    assert {
+        (change.largest_change, change.t_largest_change, change.samples_shared) for change in found.changes
+    } == {(0.0, 0.0, 50)}
 
 
 def test_what_changed_is_said_by_digits_that_differ(paths: Compared) -> None:
@@ -63,7 +69,7 @@ def test_shares_differ_by_a_digit_where_they_count_as_changed(paths: Compared) -
     more = out.copy()
     more[24_750, 0] = 0.005
     x = against_baseline(paths({"a": more}), paths({"a": out})).changes[0]
-    assert x.worse == ("share_out",)
+    assert x.worse == ("out_fraction",)
     assert worse_words(x) == "out 99 % → 99.004 %"
     one = out.copy()
     one[24_750, 0] = 0.0035000005  # out by less than the noise
@@ -75,8 +81,8 @@ def test_what_grew_by_more_than_the_noise_is_worse(paths: Compared) -> None:
     x = against_baseline(now, before).changes[0]
     assert (x.worse, x.better, x.changed) == (("max", "rms"), (), True)
     assert (x.before, x.now) == (before.runs[0].statistics["x"], now.runs[0].statistics["x"])
-    assert x.largest == pytest.approx(0.0002, abs=ROUNDING)
-    assert x.t_largest == 0.495
+    assert x.largest_change == pytest.approx(0.0002, abs=ROUNDING)
+    assert x.t_largest_change == 0.495
     assert against_baseline(now, before).verdict == "fail"
     back = against_baseline(before, now)
     assert (back.changes[0].worse, back.changes[0].better, back.verdict) == ((), ("max", "rms"), "pass")
@@ -95,7 +101,7 @@ def test_a_change_that_statistics_do_not_show_is_seen_at_its_sample(paths: Compa
     before, now = (paths({"a": one}) for one in aside)
     y = against_baseline(now, before).changes[1]
     assert (y.worse, y.better, y.changed) == ((), (), True)
-    assert y.largest == pytest.approx(0.002, abs=ROUNDING)
+    assert y.largest_change == pytest.approx(0.002, abs=ROUNDING)
     assert against_baseline(now, before).verdict == "pass"
 
 
@@ -108,18 +114,18 @@ def test_more_samples_out_are_worse_unless_the_noise_put_them_there(paths: Compa
     moved[10:13, 0] = 0.0038
     before = paths({"a": steps})
     x = against_baseline(paths({"a": nudged}), before).changes[0]
-    assert (x.before.share_out, x.now.share_out, x.worse) == (0.1, 0.5, ())
+    assert (x.before.out_fraction, x.now.out_fraction, x.worse) == (0.1, 0.5, ())
     x = against_baseline(paths({"a": moved}), before, {"x": 0.000_29}).changes[0]
-    assert (x.now.share_out, x.worse) == (0.13, ("share_out",))
+    assert (x.now.out_fraction, x.worse) == (0.13, ("out_fraction",))
 
 
 def test_shares_of_different_tolerances_do_not_compare(paths: Compared) -> None:
     before = paths({"a": off(0.003)})
     now = paths({"a": off(0.003)}, tolerance={"axis": 0.001})
     found = against_baseline(now, before)
-    assert (found.changes[0].share_noise, found.changes[0].worse, found.verdict) == (None, (), "pass")
+    assert (found.changes[0].out_fraction_noise, found.changes[0].worse, found.verdict) == (None, (), "pass")
     assert found.changes[0].changed  # the verdict did
-    assert found.differences == (Difference("tolerance", {"axis": 0.0035}, {"axis": 0.001}),)
+    assert found.differences == (SettingDifference("tolerance", {"axis": 0.0035}, {"axis": 0.001}),)
 
 
 def test_a_diagnosis_is_no_difference_since_it_changes_no_figure(paths: Compared) -> None:
@@ -151,28 +157,28 @@ def test_times_that_both_have_are_compared(paths: Compared) -> None:
     found = against_baseline(now, before)
     x = found.changes[0]
     assert x.samples_shared == 60
-    assert x.t_largest == 0.295
-    assert Difference("samples of a", 100, 60) in found.differences
+    assert x.t_largest_change == 0.295
+    assert SettingDifference("samples of a", 100, 60) in found.differences
 
 
 def test_logs_and_quantities_that_only_one_has_are_told(paths: Compared, arms: Compared) -> None:
     before, now = paths({"a": off(0.0), "old": off(0.0)}), paths({"new": off(0.0), "a": off(0.0)})
     found = against_baseline(now, before)
-    assert (found.new, found.gone) == ((Absent("new"),), (Absent("old"),))
+    assert (found.new, found.missing) == ((UnmatchedQuantity("new"),), (UnmatchedQuantity("old"),))
     assert (found.verdict, found.worse) == ("fail", ())
     with_joints = arms({"a": np.zeros((100, 6))})
-    assert [str(one) for one in against_baseline(paths({"a": off(0.0)}), with_joints).gone] == [
+    assert [str(one) for one in against_baseline(paths({"a": off(0.0)}), with_joints).missing] == [
         f"{name} of a" for name in ("angle", "q1", "q2", "q3", "q4", "q5", "q6")
     ]
-    assert against_baseline(with_joints, paths({"a": off(0.0)})).gone == ()
+    assert against_baseline(with_joints, paths({"a": off(0.0)})).missing == ()
 
 
 def test_the_only_logs_of_both_are_a_pair_whatever_they_are_called(paths: Compared) -> None:
     found = against_baseline(paths({"today": off(0.001)}), paths({"released": off(0.001)}))
-    assert (found.verdict, found.new, found.gone) == ("pass", (), ())
-    assert found.differences == (Difference("log of today", "released", "today"),)
+    assert (found.verdict, found.new, found.missing) == ("pass", (), ())
+    assert found.differences == (SettingDifference("log of today", "released", "today"),)
     several = against_baseline(paths({"a": off(0.0), "b": off(0.0)}), paths({"c": off(0.0)}))
-    assert (several.verdict, several.gone) == ("fail", (Absent("c"),))
+    assert (several.verdict, several.missing) == ("fail", (UnmatchedQuantity("c"),))
 
 
 @pytest.mark.parametrize(("samples", "verdict"), [(90, "pass"), (89, "fail")])
@@ -198,7 +204,7 @@ def test_samples_count_by_the_time_that_they_stand_for(paths: Compared, samples:
 def test_samples_left_out_between_others_are_lost_time(paths: Compared) -> None:
     before = paths({"a": off(0.0)})
     run = before.runs[0]
-    kept = {name: getattr(run, name)[::2] for name in ("sample", "t_ns", "delta", "path", "outside")}
+    kept = {name: getattr(run, name)[::2] for name in ("sample", "t_ns", "delta", "path", "out_of_tolerance")}
     statistics = {name: replace(one, samples=50) for name, one in run.statistics.items()}
     now = replace(before, runs=(replace(run, **kept, statistics=statistics),))
     assert {change.worse for change in against_baseline(now, before).changes} == {("samples",)}
@@ -210,8 +216,8 @@ def test_another_base_and_another_tool_are_told(arms: Compared) -> None:
     robot = there(run.run.robot).placed(base=translation(0.0, 0.0, 1.0), tool=translation(0.0, 0.0, 0.12))
     now = replace(before, runs=(replace(run, run=replace(run.run, robot=robot)),))
     assert against_baseline(now, before).differences == (
-        Difference("base of a", [0.0] * 6, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
-        Difference("robot tool of a", [0.0] * 6, [0.0, 0.0, 0.12, 0.0, 0.0, 0.0]),
+        SettingDifference("base of a", [0.0] * 6, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        SettingDifference("robot tool of a", [0.0] * 6, [0.0, 0.0, 0.12, 0.0, 0.0, 0.0]),
     )
 
 
@@ -225,10 +231,10 @@ def test_what_was_made_otherwise_is_told(paths: Compared) -> None:
     )
     now = replace(before, runs=(run,), provenance=made, reference=replace(before.reference, name="other"))
     assert against_baseline(now, before).differences == (
-        Difference("reference", "path", "other"),
-        Difference("align", "none", "rigid"),
-        Difference("version of numpy", before.provenance.versions["numpy"], "1.0"),
-        Difference("sync_offset of a", 0.0, 0.25),
+        SettingDifference("reference", "path", "other"),
+        SettingDifference("align", "none", "rigid"),
+        SettingDifference("version of numpy", before.provenance.versions["numpy"], "1.0"),
+        SettingDifference("sync_offset of a", 0.0, 0.25),
     )
 
 
@@ -241,7 +247,7 @@ def test_the_result_is_json_in_the_comparison(paths: Compared) -> None:
     told = json.loads(json.dumps(to_json_value(held.to_dict())))["baseline"]
     assert (told["name"], told["recording"], told["verdict"]) == ("against-path", "old.rrd", "fail")
     assert told["noise"] == DEFAULT_NOISE
-    assert told["gone"] == [{"run": "old", "quantity": None}]
+    assert told["missing"] == [{"run": "old", "quantity": None}]
     x = told["changes"][0]
     assert (x["run"], x["quantity"], x["unit"], x["worse"]) == ("a", "x", "m", ["max", "rms"])
     assert x["max"] == {

@@ -66,8 +66,8 @@ def test_the_tolerance_decides_axis_by_axis(q: FloatArray) -> None:
     verdicts = {axis: one.verdict for axis, one in deviation.statistics.items()}
     assert verdicts == {"x": "pass", "y": "pass", "z": "fail", "norm": None, "path": None}
     assert (result.verdict, deviation.verdict) == ("fail", "fail")
-    assert np.flatnonzero(deviation.outside).tolist() == list(range(100, 110))
-    assert deviation.share_out == 10 / 500
+    assert np.flatnonzero(deviation.out_of_tolerance).tolist() == list(range(100, 110))
+    assert deviation.out_fraction == 10 / 500
     assert compare_runs(path_run(wanted), [run_of(q)], CompareOptions({"axis": 0.0037})).verdict == "pass"
 
 
@@ -100,8 +100,12 @@ def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: 
     assert late.statistics["norm"].max < 1e-12  # the same samples
     assert (late.left_out, late.reference_left_out) == (51, 100)
     coverage, judged = late.shares.values()
-    assert (coverage.samples, coverage.of, coverage.verdict) == (349, 450, "fail")  # it moves elsewhere, too
-    assert (judged.samples, judged.of, judged.verdict) == (349, 399, "pass")
+    assert (coverage.samples, coverage.total, coverage.verdict) == (
+        349,
+        450,
+        "fail",
+    )  # it moves elsewhere, too
+    assert (judged.samples, judged.total, judged.verdict) == (349, 399, "pass")
     assert result.warnings == (
         LogWarning("left-out", "1 of 400 samples have no reference or no value", about="log"),
     )
@@ -216,15 +220,15 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
     assert as_dict["tolerance"] == {"axis": 0.0035, "coverage": 0.9, "judged": 0.5}
     one = as_dict["runs"][0]
     assert set(one) >= {"name", "samples", "left_out", "duration", "sync_offset", "delta", "worst",
-                        "out_of_tolerance", "share_out", "verdict", "warnings"}  # fmt: skip
+                        "out_of_tolerance", "out_fraction", "verdict", "warnings"}  # fmt: skip
     assert [one[name] for name in ("coverage", "judged")] == [
         asdict(share) for share in result.runs[0].shares.values()
     ]
     assert set(one["delta"]["x"]) == {
         "unit", "max", "rms", "mean", "std", "p95", "t_max", "sample_max", "tolerance", "out_of_tolerance",
-        "share_out", "verdict", "samples", "missing",
+        "out_fraction", "verdict", "samples", "missing",
     }  # fmt: skip
-    assert one["share_out"] == 1.0
+    assert one["out_fraction"] == 1.0
 
 
 def test_an_unknown_tool_centre_point_is_refused() -> None:

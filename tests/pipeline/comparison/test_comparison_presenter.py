@@ -59,7 +59,7 @@ def test_the_properties_and_rows_are_the_statistics(arms: Compared) -> None:
             prefix = f"joint {held.quantity}" if held.kind == "joint" else held.quantity
             for field, value in held.fields().items():
                 assert properties[f"{prefix}.{field}"] is value or properties[f"{prefix}.{field}"] == value
-        assert properties["share_out"] == one.share_out
+        assert properties["out_fraction"] == one.out_fraction
         assert properties["speed_correlation"] == one.speed_correlation
     rows = there(present(result).rows)
     table = cells(rows())
@@ -81,17 +81,17 @@ def test_the_first_fact_is_what_decided(arms: Compared) -> None:
     result = arms({"a": noisy(1), "b": noisy(2, 0.01)}, tolerance={"joint": 0.002})
     for one in result.runs:
         section = log_section(result, one.name)
-        held, value = one.furthest, cast("Any", section.facts[0].value)
+        held, value = one.worst_statistics, cast("Any", section.facts[0].value)
         assert (value.number, value.unit, value.limit) == (held.max, held.unit, held.tolerance)
-        assert (value.used, value.verdict) == (held.used, held.verdict)
+        assert (value.used, value.verdict) == (held.utilisation, held.verdict)
         found = facts(section)
         assert found["Time"] == held.t_max
-        assert found["Position"] == Place(tuple(one.actual[one.furthest_at].tolist()))
+        assert found["Position"] == Place(tuple(one.actual[one.worst_statistics_index].tolist()))
         assert found["r(‖Δ‖, speed)"] == one.speed_correlation
     shown = present(result)
     worst = result.worst
     assert shown.facts[0].value == Ref(worst.name, run_colour(result.runs.index(worst)))
-    assert shown.opens_at_ns == worst.t_ns[worst.furthest_at]
+    assert shown.opens_at_ns == worst.t_ns[worst.worst_statistics_index]
 
 
 def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
@@ -100,12 +100,12 @@ def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
     lengths, angles, shares = (cells(table) for table in log_section(result, "a").tables)
     for table, unit in ((lengths, "m"), (angles, "rad")):
         own = [held for held in one.all_statistics if held.unit == unit]
-        for key in ("tolerance", "max", "t_max", "rms", "p95", "mean", "std", "share_out"):
+        for key in ("tolerance", "max", "t_max", "rms", "p95", "mean", "std", "out_fraction"):
             assert table[key] == [getattr(held, key) for held in own], key
     assert lengths["start"] == [*one.start, one.path[0]]
     joint_delta, angle = np.asarray(one.joint_delta), np.asarray(one.angle)
     assert angles["start"] == [angle[0], *joint_delta[0].tolist()]
-    for key in ("quantity", "tolerance", "value", "samples", "of"):
+    for key in ("quantity", "tolerance", "value", "samples", "total"):
         assert shares[key] == [getattr(held, key) for held in one.shares.values()], key
 
 
@@ -127,8 +127,8 @@ def test_many_logs_are_ranked_and_keep_their_colours(paths: Compared) -> None:
     far, conditions = (cells(table) for table in shown.body.tables)
     assert far["run"] == [Ref(o.name, run_colour(result.runs.index(o))) for o in result.ranking]
     assert far["max_x"] == [one.statistics["x"].max for one in result.ranking]
-    assert far["share_out"] == [one.share_out for one in result.ranking]
-    assert conditions["t"] == [one.furthest.t_max for one in result.ranking]
+    assert far["out_fraction"] == [one.out_fraction for one in result.ranking]
+    assert conditions["t"] == [one.worst_statistics.t_max for one in result.ranking]
     assert [line["Log"] for line in shown.lines] == far["run"]
     (overview,) = [one for one in shown.body.blocks() if isinstance(one, Figure)]
     for line, one in zip(overview.views[0].panels[0].lines, result.ranking, strict=True):
@@ -153,7 +153,7 @@ def test_what_changed_since_the_baseline_is_a_section(paths: Compared) -> None:
     table = cells(section.tables[0])
     assert table["max_before"] == [one.before.max for one in changed]
     assert table["max_now"] == [one.now.max for one in changed]
-    assert table["largest_change"] == [one.largest for one in changed]
+    assert table["largest_change"] == [one.largest_change for one in changed]
     (gone,) = section.sections
     assert gone.checks == (
         Check(
@@ -182,7 +182,7 @@ def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> Non
     assert path.panels[0].lines[0].values is one.path
     assert angle.panels[0].lines[0].values is one.angle
     np.testing.assert_array_equal(joints.views[0].panels[0].lines[0].values, np.asarray(one.joint_delta))
-    assert list(deviation.instants) == [one.t_ns[one.furthest_at]]
+    assert list(deviation.instants) == [one.t_ns[one.worst_statistics_index]]
 
 
 @pytest.mark.parametrize(("kind", "view"), [("axis", 0), ("path", 1), ("angle", 2)])
@@ -211,7 +211,7 @@ def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -
     assert (whole.t_ns, moving.line) == (None, False)
     assert moving.position is worst.reference
     assert [path.position for path in (a, b)] == [one.actual for one in result.runs]
-    assert scene.spots[0].position == tuple(worst.actual[worst.furthest_at].tolist())
+    assert scene.spots[0].position == tuple(worst.actual[worst.worst_statistics_index].tolist())
     factor = int(larger.name.removeprefix("deviation x"))
     np.testing.assert_array_equal(
         larger.position, worst.reference + factor * (worst.actual - worst.reference)
@@ -273,10 +273,10 @@ def test_each_warning_stands_once(arms: Compared) -> None:
 def test_events_tell_when_what_happened(paths: Compared) -> None:
     result = paths({"a": off(0.004)}, tolerance={"axis": 0.0035})
     one = result.runs[0]
-    longest = there(one.longest_out)
+    longest = there(one.longest_out_interval)
     found = {event.t_ns: event.level for event in log_section(result, "a").events()}
     assert found[round(there(longest.t) * 1e9)] == "error"
-    assert found[int(one.t_ns[one.furthest_at])] == "error"
+    assert found[int(one.t_ns[one.worst_statistics_index])] == "error"
 
 
 def test_no_array_of_a_motion_is_looked_into_before_it_is_shown(arms: Compared) -> None:

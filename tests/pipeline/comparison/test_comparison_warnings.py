@@ -76,7 +76,7 @@ def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArra
         == above + len(rows)
         == int(np.count_nonzero(measured.out_of_tolerance({"angle": 1.0})))
     )
-    assert round(there(one.share_out) * len(values)) == one.out_of_tolerance
+    assert round(there(one.out_fraction) * len(values)) == one.out_of_tolerance
     assert one.verdict == ("fail" if above or rows else "pass")
     free = compute_statistics(measured, t, count, {"axis": 1.0})
     assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))

@@ -27,7 +27,7 @@ def test_the_component_that_uses_up_most_is_the_worst() -> None:
     found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 0.0035}))
     assert (found.quantity, found.worst, found.t, found.sample) == ("y", 4e-3, 0.005, 1)
     assert (found.samples, found.out_of_tolerance, found.verdict) == (3, 1, "fail")  # what is allowed passes
-    assert (found.used, found.share_out) == (4e-3 / 0.0035, 1 / 3)
+    assert (found.utilisation, found.out_fraction) == (4e-3 / 0.0035, 1 / 3)
     assert meter_words(found) == (
         "|Δy| = 4.000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.005 s; out of tolerance: 1"
         " of 3 samples (33.3 %)"
@@ -48,7 +48,7 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
     lacking = DELTA.copy()
     lacking[0, 2] = np.nan
     found = there(delta_verdict("meter", T_NS, lacking, {"axis": 1.0}))
-    assert (found.sample, found.out_of_tolerance, found.verdict, found.used) == (0, 1, "fail", None)
+    assert (found.sample, found.out_of_tolerance, found.verdict, found.utilisation) == (0, 1, "fail", None)
     assert math.isnan(found.worst) and found.to_dict()["worst"] is None
     assert (found.missing, found.coverage) == (1, 1.0 - 1.0 / len(lacking))
     assert meter_words(found) == (
@@ -59,8 +59,8 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
 
 def test_a_doubt_keeps_it_from_passing_and_is_told() -> None:
     found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 1.0}, ("a.y was nan", "it ended early")))
-    assert (found.out_of_tolerance, found.verdict, found.used) == (0, "fail", 4e-3)
-    assert found.to_dict()["doubts"] == ["a.y was nan", "it ended early"]
+    assert (found.out_of_tolerance, found.verdict, found.utilisation) == (0, "fail", 4e-3)
+    assert found.to_dict()["caveats"] == ["a.y was nan", "it ended early"]
     assert meter_words(found) == (
         "|Δy| = 4.000 mm of 1000 mm allowed (0.4 % of the tolerance) at t = 0.005 s; out of tolerance: 0 of"
         " 3 samples (0 %); a.y was nan; it ended early"
@@ -78,9 +78,9 @@ def test_nothing_allowed_is_a_tolerance() -> None:
     found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0})
     still = delta_verdict("meter", T_NS, np.zeros((3, 3)), {"axis": 0.0})
     assert found is not None and still is not None
-    assert (found.out_of_tolerance, found.verdict, found.used) == (3, "fail", math.inf)
+    assert (found.out_of_tolerance, found.verdict, found.utilisation) == (3, "fail", math.inf)
     assert (found.quantity, found.worst, found.sample) == ("y", 4e-3, 1)  # not the first that is out
-    assert (still.out_of_tolerance, still.verdict, still.used) == (0, "pass", 0.0)
+    assert (still.out_of_tolerance, still.verdict, still.utilisation) == (0, "pass", 0.0)
 
 
 def test_without_a_sample_there_is_no_verdict() -> None:
@@ -116,9 +116,9 @@ def test_it_passes_if_and_only_if_every_quantity_of_every_sample_is_allowed(
     out = (np.abs(delta) > axis).any(axis=1) | (length(delta) > norm)
     assert found.out_of_tolerance == np.count_nonzero(out)
     assert (found.verdict == "pass") == (not out.any())
-    assert found.used is not None
+    assert found.utilisation is not None
     # a size above what is allowed by its last bit may have a share that rounds to 1
-    assert found.used >= 1.0 if out.any() else found.used <= 1.0
+    assert found.utilisation >= 1.0 if out.any() else found.utilisation <= 1.0
 
 
 @given(
@@ -143,7 +143,7 @@ def test_it_is_the_verdict_of_compare(delta: FloatArray, which: list[str], row: 
     assert found.verdict == combine_verdicts(one.verdict for one in every)
     outside = np.any([one.out_of_tolerance(tolerance) for one in measured], axis=0)
     assert found.out_of_tolerance == np.count_nonzero(outside)
-    worst = max((one for one in every if one.used is not None), key=lambda one: one.used or 0.0)
-    assert found.used == worst.used
-    if math.isfinite(worst.used or 0.0):
+    worst = max((one for one in every if one.utilisation is not None), key=lambda one: one.utilisation or 0.0)
+    assert found.utilisation == worst.utilisation
+    if math.isfinite(worst.utilisation or 0.0):
         assert (found.quantity, found.worst, found.sample) == (worst.quantity, worst.max, worst.sample_max)

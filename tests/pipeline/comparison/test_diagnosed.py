@@ -34,7 +34,7 @@ def test_its_cause_stands_under_the_verdict(paths: Compared) -> None:
     result = diagnosed(paths({"log": off(0.5)}))
     shown = present(result)
     (section,) = shown.body.sections
-    said = there(result.runs[0].diagnosis).sentence
+    said = there(result.runs[0].diagnosis).summary
     assert [fact.name for fact in shown.facts][:2] == ["Cause", "Furthest out"]
     assert shown.facts[0].value == facts(section)["Cause"] == section.properties["cause"] == said
 
@@ -67,15 +67,15 @@ def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_
         "value": ["", "+1.2 mm"],
         "interval": ["", "+1.1 to +1.3 mm"],
         "from_row": [None, 4],
-        "twins": ["", "d_5, tool shift z"],
+        "equivalents": ["", "d_5, tool shift z"],
         "rms_before": [SIGN.rms_before, LENGTH.rms_before],
         "rms_after": [SIGN.rms_after, LENGTH.rms_after],
         "rms_alone": [SIGN.rms_alone, LENGTH.rms_alone],
-        "few_twins": ["", "d_5, tool shift z"],
-        "breaks_tolerance": ["yes", "no"],
+        "few_equivalents": ["", "d_5, tool shift z"],
+        "exceeds_tolerance": ["yes", "no"],
     }
     undecided = cells(tables["Undecided between"])
-    assert undecided["needs"] == ["phi5", "phi5"]
+    assert undecided["discriminating_joint"] == ["phi5", "phi5"]
     assert undecided["interval"][1] == "0.1089 to 0.1203 deg too low"
 
 
@@ -89,7 +89,7 @@ def test_what_stays_is_said_only_beside_a_cause(paths: Compared) -> None:
     found = diagnosis_of(paths({"log": off(0.01)}).runs[0])
     said = {fact.name: fact.value for fact in diagnosis_facts(found)}
     assert said["Remaining deviation"] == "rms 0.0574 mm: the digits of the log"
-    empty = replace(found, causes=(), undecided=(), refused=())
+    empty = replace(found, causes=(), undecided=(), unidentifiable=())
     nothing = {fact.name: fact.value for fact in diagnosis_facts(empty)}
     assert nothing["Remaining deviation"] == ""
     assert str(nothing["Cause"]).startswith("no cause found: rms ")
@@ -115,7 +115,7 @@ def test_joints_alone_are_drawn_one_by_one_beside_their_deviation(arms: Compared
     result = arms({"log": off_by}, tolerance={"joint": 0.002})
     one = replace(result.runs[0], statistics={})
     joints = there(one.joint_delta)
-    found = replace(diagnosis_of(one), unit="rad", sample=one.sample, mended=joints / 10.0)
+    found = replace(diagnosis_of(one), unit="rad", sample=one.sample, residual=joints / 10.0)
     result = replace(result, runs=(replace(one, diagnosis=found),))
     deviation, mended, *_ = figures(present(result).body.sections[0])
     assert (deviation.title, mended.beside) == ("Deviation of joints", True)

@@ -81,7 +81,7 @@ def test_the_log_s_own_spike_fails_where_the_grid_would_lose_half_of_it() -> Non
     done[250, 1] += 0.01  # about 6 mm at the tool
     result = compare_runs(joint_log(t, true, "asked"), [joint_log(t, done)])
     one = result.runs[0]
-    assert one.verdict == "fail" and int(np.count_nonzero(one.outside)) == 1
+    assert one.verdict == "fail" and int(np.count_nonzero(one.out_of_tolerance)) == 1
     there = np.linalg.norm(positions_over_log(UR5E, true[[250]]) - positions_over_log(UR5E, done[[250]]))
     assert one.statistics["norm"].max == pytest.approx(there, rel=1e-12)  # FK of one row and of many
     run = one.run
@@ -122,8 +122,8 @@ def test_nothing_is_interpolated_across_gaps_and_steps_of_the_reference() -> Non
     np.testing.assert_array_equal(lost, [*range(19, 30), 49])
     at = 49  # a point on the straight line across the step: no way leads through it
     wanted = trajectory(reference)
-    assert wanted.broken is not None
-    row = int(wanted.broken[0])
+    assert wanted.discontinuities is not None
+    row = int(wanted.discontinuities[0])
     point = wanted.position[row : row + 2].mean(axis=0)
     there = np.where(np.arange(99)[:, np.newaxis] == at - 1, point, positions_over_log(UR5E, motion(between)))
     one = compare_runs(reference, [path(between, there)], CompareOptions({"axis": 9.0})).runs[0]
@@ -172,7 +172,7 @@ def test_a_recording_that_was_judged_on_the_grid_names_the_row_of_the_log() -> N
     (one,) = compare_runs(path(on_grid.t, wanted), [on_grid]).runs
     earlier = replace(one, run=replace(run, rows=None))
     nearest = int(np.argmin(np.abs(run.log.t_ns - run.t_ns[150])))
-    assert earlier.row(one.furthest) == nearest + 1 != 151
+    assert earlier.row(one.worst_statistics) == nearest + 1 != 151
 
 
 def before_rows(result: Comparison) -> Comparison:

@@ -96,9 +96,9 @@ def test_the_properties_are_the_statistics_bit_for_bit(arms: Compared, tmp_path:
         for field, value in one.fields().items():
             text = told[f"{prefix}.{field}"]
             assert text == "" if value is None else type(value)(text) == value, (prefix, field)
-    assert float(told["share_out"]) == run.share_out
+    assert float(told["out_fraction"]) == run.out_fraction
     assert float(told["speed_correlation"]) == run.speed_correlation
-    assert float(told["longest_out"]) == there(run.longest_out).duration
+    assert float(told["longest_out_interval"]) == there(run.longest_out_interval).duration
 
 
 def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(
     before, now = arms({"monday": np.zeros((100, 6))}), paths({"tuesday": off(0.0)})
     result = replace(now, baseline=against_baseline(now, before))
     gone = ["angle", *(f"q{number}" for number in range(1, 7))]
-    assert [str(one) for one in there(result.baseline).gone] == [f"{name} of tuesday" for name in gone]
+    assert [str(one) for one in there(result.baseline).missing] == [f"{name} of tuesday" for name in gone]
     root = written(result, tmp_path / "verdict.xml")
     assert (result.verdict, root.get("failures")) == ("fail", "7")
     failed = [(case.get("classname"), case.get("name")) for case in root.iter("testcase") if len(case)]

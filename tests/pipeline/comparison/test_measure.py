@@ -98,7 +98,7 @@ def test_a_turn_lost_on_the_way_stays_a_deviation_where_it_happens() -> None:
     q[100:, 0] += TURN
     found = held(arm_run(q, NAMES), arm_run(joints(), NAMES), joint=0.1)
     assert (found.joint_turns, found.verdict) == ((0, 0, 0), "fail")
-    assert np.flatnonzero(found.outside)[0] == 100
+    assert np.flatnonzero(found.out_of_tolerance)[0] == 100
     assert found.joint_statistics["a"].max == pytest.approx(TURN, abs=1e-14)
 
 
@@ -107,7 +107,7 @@ def test_a_wild_first_sample_does_not_put_the_others_a_turn_out() -> None:
     q[0, 0] += TURN
     found = held(arm_run(q, NAMES), arm_run(joints(), NAMES), joint=0.1)
     assert found.joint_turns == (0, 0, 0)
-    assert np.flatnonzero(found.outside).tolist() == [0]
+    assert np.flatnonzero(found.out_of_tolerance).tolist() == [0]
 
 
 def test_joints_that_slide_have_no_turns() -> None:
@@ -223,7 +223,7 @@ def test_missing_orientations_leave_the_angle_open_between_their_neighbours() ->
     assert len(found.sample) == 39
     angle = found.statistics["angle"]
     assert (angle.verdict, angle.samples, angle.missing, angle.out_of_tolerance) == ("fail", 36, 3, 3)
-    assert found.outside[[9, 10, 11]].all()
+    assert found.out_of_tolerance[[9, 10, 11]].all()
     assert np.isfinite(found.statistics["angle"].rms)
 
 
@@ -321,7 +321,7 @@ def test_no_size_of_the_blocks_changes_a_bit(kind: str, block_rows: int) -> None
         "poses": tuple(path_run(position, quat, tsp=tsp, name=name) for tsp, name in TWO),
         "path": tuple(path_run(position, tsp=tsp, name=name) for tsp, name in TWO),
     }[kind]
-    reference, log = (replace(trajectory(run), broken=np.array([40, 41])) for run in runs)
+    reference, log = (replace(trajectory(run), discontinuities=np.array([40, 41])) for run in runs)
     late = np.where(np.arange(300) < 200, 0, 300_000_000)
     reference, log = (replace(side, t_ns=side.t_ns + late) for side in (reference, log))
     missing = log.position.copy()

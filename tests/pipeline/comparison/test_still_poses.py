@@ -109,7 +109,7 @@ def test_one_log_is_held_against_its_record_row_by_row(found: Comparison) -> Non
     }  # fmt: skip
     assert (told["delta"]["x"]["t_max"], told["delta"]["x"]["sample_max"]) == (None, WORST)
     assert told["worst"] == {"t": None, "sample": WORST, "norm": pytest.approx(OFF, abs=1e-9)}
-    assert told["longest_out"] == {"samples": 1, "sample": WORST, "t": None, "duration": None}
+    assert told["longest_out_interval"] == {"samples": 1, "sample": WORST, "t": None, "duration": None}
     assert one.to_frame()["row"].tolist() == [*range(1, ROWS + 1)]
     assert {row["t_max"] for row in found.rows()} == {None}
 
@@ -142,7 +142,7 @@ def test_a_change_since_a_baseline_of_poses_has_no_time(tmp_path: Path, log: Pat
     asked = write(tmp_path / "asked.csv")
     before, now = (urmpipe.compare(asked, one, tcp="recorded") for one in (asked, log))
     found = urmpipe.compare(now, baseline=before).baseline
-    assert found is not None and [one.largest for one in found.worse] == [pytest.approx(OFF)] * 3
+    assert found is not None and [one.largest_change for one in found.worse] == [pytest.approx(OFF)] * 3
     assert {one.to_dict()["t_largest_change"] for one in found.changes} == {None}
 
 

@@ -61,7 +61,7 @@ def test_what_is_not_known_is_not_explained_by_what_no_arm_has(arm: Chain) -> No
     meant = q.copy()
     meant[:, 1] += q[:, 1] ** 2
     found = diagnosed(arm, poses_over_log(arm, meant)[0] + white(0, 600, 5e-5), q)
-    (refused,) = [one for one in found.refused if one.reason == "more than any arm differs by"]
+    (refused,) = [one for one in found.unidentifiable if one.reason == "more than any arm differs by"]
     assert any(is_too_large(cause) for cause in refused.causes)
     assert not any(is_too_large(cause) for cause in found.causes)
 
@@ -76,7 +76,7 @@ def test_causes_that_each_make_the_rms_more_than_three_times_as_large_are_refuse
     meant[:, 1] += 0.004 * (torque - torque.mean())
     path = poses_over_log(arm, meant)[0] + white(0, 600, 5e-5)
     found = diagnosed(arm, path, q)
-    (refused,) = [one for one in found.refused if one.reason == "they cancel each other"]
+    (refused,) = [one for one in found.unidentifiable if one.reason == "they cancel each other"]
     (zero,) = [cause for cause in refused.causes if cause.kind == "joint_offset"]
     alone = q.copy()
     alone[:, int(zero.name[1:]) - 1] += zero.value[0]
@@ -99,7 +99,9 @@ def test_what_changes_during_the_log_is_no_constant_cause(arm: Chain, fault: str
     found = diagnosed(arm, position + white(0, 600, 5e-5), q)
     assert (found.causes, found.undecided) == ((), ())
     if fault == "drifting base":
-        changing = [one for one in found.refused if one.reason == "what would fit changes during the log"]
+        changing = [
+            one for one in found.unidentifiable if one.reason == "what would fit changes during the log"
+        ]
         (shift,) = [cause for one in changing for cause in one.causes if cause.kind == "base_shift"]
         assert 1e-4 < shift.rms_after < shift.rms_before == found.rms
 
@@ -122,7 +124,7 @@ def test_a_joint_whose_rows_do_not_show_its_acceleration_is_not_asked_for_compli
 ) -> None:
     q = joints(300) if motion == "waves" else np.random.default_rng(5).uniform(-0.3, 0.3, (300, 3))
     found = diagnosed(arm, poses_over_log(arm, q)[0] + white(6, 300, 5e-5), q)
-    reasons = [one.reason for one in found.not_looked_for if "compliance" in one.kinds]
+    reasons = [one.reason for one in found.untested if "compliance" in one.kinds]
     assert reasons == ([] if motion == "waves" else ["the rows do not show how q1, q2 and q3 accelerate"])
 
 

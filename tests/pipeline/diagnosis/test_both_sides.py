@@ -143,13 +143,13 @@ def test_the_side_that_disagrees_with_its_tool_centre_point_has_the_causes(
         if q is not None and tcp is not None:
             apart[name] = np.linalg.norm(place(q) - tcp, axis=1)
     found = diagnosed(sides[0], sides[1])
-    assert {one.name: one.agrees for one in found.own_tcp} == agree
-    for one in found.own_tcp:
+    assert {one.name: one.agrees for one in found.recorded_tcp} == agree
+    for one in found.recorded_tcp:
         assert one.rms == pytest.approx(np.sqrt((apart[one.name] ** 2).mean()), rel=1e-9)
-        assert one.largest == pytest.approx(apart[one.name].max(), rel=1e-9)
+        assert one.max == pytest.approx(apart[one.name].max(), rel=1e-9)
     assert found.origin == origin
-    assert found.sentence.endswith(f"that is in {origin}") is bool(origin)
-    reasons = [one.reason for one in found.not_looked_for if "link_length" in one.kinds]
+    assert found.summary.endswith(f"that is in {origin}") is bool(origin)
+    reasons = [one.reason for one in found.untested if "link_length" in one.kinds]
     assert [reason in one for one in reasons] == ([True] if reason else [])
 
 
@@ -159,7 +159,7 @@ def test_a_joint_that_turns_about_the_tool_centre_point_is_named_apart(write: Wr
     off = np.radians([0.0, 0.0, elbow, 0.0, 0.0, 1.0])
     found = diagnosed(write("one", T, Q), write("two", T, Q + off), "axis=3.5mm,joint=0.6deg")
     assert {cause.name for cause in found.causes} == {*["elbow_joint"] * (elbow > 0.0), "wrist_3_joint"}
-    chain, _, apart = found.sentence.rpartition("wrist_3_joint")
+    chain, _, apart = found.summary.rpartition("wrist_3_joint")
     assert apart == " reads 1 deg too high (this turns the TCP, but does not move it)"
     assert ("elbow_joint reads 0.5 deg too high: rms" in chain) is (elbow > 0.0)
     assert found.verdict == "fail"
@@ -171,7 +171,7 @@ def test_joints_that_agree_do_not_where_the_robots_differ() -> None:
     asked, done = (urmpipe.ingest(name="side", t=T, q=Q, unit="rad", robot=robot) for robot in (longer, UR5E))
     found = urmpipe.diagnose(asked, done)
     reason = "no change of joints or clock makes the tool centre points agree"
-    assert found.sentence == f"no cause found: rms 100 mm remains ({reason})"
+    assert found.summary == f"no cause found: rms 100 mm remains ({reason})"
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_a_cause_breaks_the_tolerance_of_its_own_axis(write: Write, allowed: str
     found = diagnosed(
         write("path", T, tcp=place(Q) + np.array([0.005, 0.0, 0.0])), write("log", T, Q), allowed
     )
-    ((kind, broken),) = [(cause.kind, cause.breaks) for cause in found.causes]
+    ((kind, broken),) = [(cause.kind, cause.exceeds_tolerance) for cause in found.causes]
     assert (kind, broken, found.verdict) == ("base_shift", breaks, "fail" if breaks else "pass")
 
 
@@ -190,12 +190,12 @@ def test_rows_without_all_joints_are_no_samples(write: Write) -> None:
     few[np.arange(len(T)) % (len(T) // 5) != 0, 5] = np.nan
     found = diagnosed(write("path", T, tcp=place(Q) + np.array([0.0, 0.0, 0.005])), write("log", T, few))
     assert found.causes == ()
-    assert found.remainder.words.endswith(" samples with all values: fewer than 10")
+    assert found.unexplained.interpretation.endswith(" samples with all values: fewer than 10")
 
 
 def test_it_is_the_reference_that_rests(write: Write) -> None:
     found = diagnosed(write("still", T, np.tile(Q[0], (len(T), 1))), write("path", T, tcp=place(Q)))
-    assert found.remainder.words == "the reference is at rest: one pose"
+    assert found.unexplained.interpretation == "the reference is at rest: one pose"
 
 
 @pytest.mark.parametrize("turn", [-np.pi, np.pi])
@@ -208,8 +208,8 @@ def test_of_joints_on_both_sides_half_a_turn_has_a_sense(write: Write, turn: flo
 
 def test_a_path_in_mm_is_read_so_and_has_no_exponent(write: Write) -> None:
     found = diagnosed(write("path", T, tcp=1000.0 * place(Q)), write("log", T, Q))
-    assert "in mm, read as m: rms " in found.sentence
-    assert "e+" not in found.sentence
+    assert "in mm, read as m: rms " in found.summary
+    assert "e+" not in found.summary
 
 
 def test_all_joints_in_degrees_are_corrected_at_once(write: Write) -> None:

@@ -131,9 +131,11 @@ def test_the_remainder_is_what_the_mended_log_leaves() -> None:
     q = joints()
     q[:, 1] += 0.01
     found = against_path(q)
-    known = np.isfinite(found.mended).all(axis=1)
-    assert found.remainder.rms == pytest.approx(float(np.sqrt((found.mended[known] ** 2).sum(axis=1).mean())))
-    assert found.causes[-1].rms_after == pytest.approx(found.remainder.rms)
+    known = np.isfinite(found.residual).all(axis=1)
+    assert found.unexplained.rms == pytest.approx(
+        float(np.sqrt((found.residual[known] ** 2).sum(axis=1).mean()))
+    )
+    assert found.causes[-1].rms_after == pytest.approx(found.unexplained.rms)
 
 
 @pytest.mark.parametrize(("samples", "words"), [(1, "1 sample"), (9, "9 samples")])
@@ -143,9 +145,9 @@ def test_of_fewer_than_ten_samples_nothing_is_named(samples: int, words: str) ->
     found = diagnosed(path_run(position + 0.1, tsp=PERIOD), run_of(q, URM6, tsp=PERIOD))
     assert not found.causes
     assert not found.undecided
-    assert found.not_looked_for[0].reason == f"{words}: fewer than 10"
+    assert found.untested[0].reason == f"{words}: fewer than 10"
     assert found.rms == pytest.approx(0.1 * np.sqrt(3.0))
-    assert found.remainder.rms == found.rms
+    assert found.unexplained.rms == found.rms
 
 
 def test_of_a_log_at_rest_nothing_is_named() -> None:
@@ -154,7 +156,7 @@ def test_of_a_log_at_rest_nothing_is_named() -> None:
     found = diagnosed(path_run(position + 0.1, tsp=PERIOD), run_of(q, URM6, tsp=PERIOD))
     assert not found.causes
     assert not found.undecided
-    assert found.not_looked_for[0].reason == "the log is at rest: one pose"
+    assert found.untested[0].reason == "the log is at rest: one pose"
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -203,15 +205,15 @@ def test_of_twins_that_of_full_size_is_named(tmp_path: Path) -> None:
     found = diagnosed(path_run(position.T, tsp=2.0 * PERIOD), run_of(q, scara, tsp=2.0 * PERIOD))
     assert answer(found) == [("joint_offset", ("q2",), None)]
     # what shifts the forearm sideways by 5.8 mm leaves less than the floor; a tilt does not
-    assert found.causes[0].twins == ("segment 2 sideways y", "segment 3 sideways y")
+    assert found.causes[0].equivalents == ("segment 2 sideways y", "segment 3 sideways y")
     assert found.causes[0].value[0] == pytest.approx(np.radians(1.2), abs=1e-5)  # noise is 1e-5 a sample
 
 
 def test_motions_that_have_nothing_in_common_are_different() -> None:
     one, other = (rich_motion(URM6, seed)(times(100)) for seed in (1, 2))
     found = diagnosed(run_of(np.asarray(one), URM6), run_of(np.asarray(other), URM6))
-    assert found.remainder.different
-    assert found.sentence.startswith("probably different motions: rms ")
+    assert found.unexplained.is_unrelated_motion
+    assert found.summary.startswith("probably different motions: rms ")
 
 
 def test_in_one_pose_the_tool_that_a_recorded_position_lacks_is_a_hypothesis() -> None:
@@ -224,8 +226,8 @@ def test_in_one_pose_the_tool_that_a_recorded_position_lacks_is_a_hypothesis() -
     kinds = [[cause.kind for cause in one.causes] for one in found.undecided]
     assert kinds == [["tool_shift"], ["base_shift"], []]
     assert found.undecided[0].causes[0].value == pytest.approx(tool, abs=1e-12)
-    assert found.remainder.words == "the log is at rest: one pose"
-    assert found.remainder.rms < 1e-12
+    assert found.unexplained.interpretation == "the log is at rest: one pose"
+    assert found.unexplained.rms < 1e-12
     near = diagnosed_record(run_of(q, URM6, recorded - 0.99 * (rotation @ tool)))
     assert near.undecided == ()  # 1.5 mm are within the tolerance
 

@@ -24,10 +24,10 @@ from urmpipe_pipeline.diagnosis.causes import (
     Alternative,
     Cause,
     Kind,
-    NotLookedFor,
-    OwnTcp,
-    Refused,
-    Remainder,
+    RecordedTcpCheck,
+    Unexplained,
+    UnidentifiableCauses,
+    UntestedCauses,
 )
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, present
 from urmpipe_pipeline.diagnosis.result import Diagnosis
@@ -156,7 +156,7 @@ def chain(*causes: Cause, last: float = 0.0002, **fields: Any) -> Diagnosis:
         replace(cause, rms_before=before, rms_after=after)
         for cause, before, after in zip(causes, left, left[1:], strict=False)
     )
-    stays = fields.pop("remainder", Remainder(last))
+    stays = fields.pop("unexplained", Unexplained(last))
     verdict = fields.pop("verdict", "fail")
     undecided = fields.pop("undecided", ())
     return Diagnosis(
@@ -182,14 +182,17 @@ def off_by(*left: float, **fields: Any) -> Diagnosis:
     return replace(chain(last=left[-1], **fields), causes=tuple(causes))
 
 
-LATE = number("time_lag", "clock", -1.35, unit="s", breaks=True)
+LATE = number("time_lag", "clock", -1.35, unit="s", exceeds_tolerance=True)
 DRIFT = number("clock_drift", "clock", 1e-4, unit="s/s")
 WRONG_ROWS = number("outliers", "rows", 0.245, rows=(1, 2))
 UNDECIDED = tuple(Alternative((cause,), "phi5") for cause in (BASE, OFFSET, LENGTH))
-DIFFERENT = Remainder(0.19238, "more than half", different=True)
+DIFFERENT = Unexplained(0.19238, "more than half", is_unrelated_motion=True)
 HIGH = [of_joint("joint_offset", f"q{k}", -k * DEG, unit="rad") for k in range(1, 7)]
-BREAKING = [replace(cause, breaks=k in (0, 3, 4, 5)) for k, cause in enumerate(HIGH)]
-BOTH_TCP = (OwnTcp("robot", 5e-5, 1e-4, agrees=True), OwnTcp("sim", 0.01, 0.02, agrees=False))
+BREAKING = [replace(cause, exceeds_tolerance=k in (0, 3, 4, 5)) for k, cause in enumerate(HIGH)]
+BOTH_TCP = (
+    RecordedTcpCheck("robot", 5e-5, 1e-4, agrees=True),
+    RecordedTcpCheck("sim", 0.01, 0.02, agrees=False),
+)
 
 SENTENCES: Sequence[tuple[Callable[[], Diagnosis], str]] = [
     (lambda: chain(SIGN), "module 3 (phi3) counter-rotates: rms 300 mm -> 0.2 mm"),
@@ -204,8 +207,8 @@ SENTENCES: Sequence[tuple[Callable[[], Diagnosis], str]] = [
     (lambda: chain(OFFSET, WRONG_ROWS, last=0.003), "module 1 (phi1) reads 0.1146 deg too low: rms 300 -> 30 mm; then rows 2 and 3 are off by 245 mm; the other 38 agree within 3 mm rms"),
     (lambda: chain(OFFSET, last=0.21), "explains little: module 1 (phi1) reads 0.1146 deg too low: rms 300 mm -> 210 mm"),
     (lambda: chain(OFFSET, last=0.19), "module 1 (phi1) reads 0.1146 deg too low: rms 300 mm -> 190 mm"),
-    (lambda: chain(OFFSET, own_tcp=BOTH_TCP, origin="sim"), "module 1 (phi1) reads 0.1146 deg too low: rms 300 mm -> 0.2 mm; robot agrees with its own TCP within 0.1 mm, so that is in sim"),
-    (lambda: chain(OFFSET, own_tcp=BOTH_TCP), "module 1 (phi1) reads 0.1146 deg too low: rms 300 mm -> 0.2 mm"),
+    (lambda: chain(OFFSET, recorded_tcp=BOTH_TCP, origin="sim"), "module 1 (phi1) reads 0.1146 deg too low: rms 300 mm -> 0.2 mm; robot agrees with its own TCP within 0.1 mm, so that is in sim"),
+    (lambda: chain(OFFSET, recorded_tcp=BOTH_TCP), "module 1 (phi1) reads 0.1146 deg too low: rms 300 mm -> 0.2 mm"),
     (lambda: chain(OFFSET, verdict="pass", last=0.1), "passes; 200 mm of 300 mm rms would go if module 1 (phi1) were corrected by +0.1146 deg"),
     (lambda: chain(*HIGH[:4], verdict="pass"), "passes; 299.8 mm of 300 mm rms would go if joint q1 were corrected by -1 deg, joint q2 were corrected by -2 deg and joint q3 were corrected by -3 deg; 1 more in the table"),
     (lambda: chain(verdict="pass", undecided=UNDECIDED[:2], last=0.1), "passes; 200 mm of 300 mm rms is explained: either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low (more motion of phi5 would decide)"),
@@ -217,29 +220,29 @@ SENTENCES: Sequence[tuple[Callable[[], Diagnosis], str]] = [
     (lambda: off_by(0.3, 0.15, 0.16, undecided=UNDECIDED[:2]), "joint q1 reads 1 deg too high and joint q2 reads 2 deg too high: rms 300 -> 160 mm; then either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low (more motion of phi5 would decide); rms 160 mm remains"),
     (lambda: chain(undecided=(Alternative(tuple(HIGH[:3])), Alternative(tuple(HIGH[2:5]))), last=0.1), "either joint q1 reads 1 deg too high, joint q2 reads 2 deg too high and joint q3 reads 3 deg too high or another (this log cannot decide): rms 300 mm -> 100 mm"),
     (lambda: chain(verdict="pass", last=0.3), "no cause found: rms 300 mm remains"),
-    (lambda: chain(last=0.3, remainder=Remainder(0.3, "the log is at rest")), "no cause found: rms 300 mm remains (the log is at rest)"),
-    (lambda: chain(last=0.3, refused=(Refused((LENGTH,), "it changes", "phi5"),)), "not determined by this motion: r_4 needs +1.2 mm from row 4 on (it changes); more motion of phi5 would determine it; rms 300 mm remains"),
-    (lambda: chain(last=0.3, refused=(Refused((LENGTH,), "it changes"),)), "not determined by this motion: r_4 needs +1.2 mm from row 4 on (it changes); rms 300 mm remains"),
+    (lambda: chain(last=0.3, unexplained=Unexplained(0.3, "the log is at rest")), "no cause found: rms 300 mm remains (the log is at rest)"),
+    (lambda: chain(last=0.3, unidentifiable=(UnidentifiableCauses((LENGTH,), "it changes", "phi5"),)), "not determined by this motion: r_4 needs +1.2 mm from row 4 on (it changes); more motion of phi5 would determine it; rms 300 mm remains"),
+    (lambda: chain(last=0.3, unidentifiable=(UnidentifiableCauses((LENGTH,), "it changes"),)), "not determined by this motion: r_4 needs +1.2 mm from row 4 on (it changes); rms 300 mm remains"),
     (lambda: chain(undecided=UNDECIDED, last=0.1), "either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low or another (more motion of phi5 would decide): rms 300 mm -> 100 mm"),
     (lambda: chain(undecided=(Alternative((OFFSET,)), Alternative(())), last=0.1), "either module 1 (phi1) reads 0.1146 deg too low or none of these (this log cannot decide): rms 300 mm -> 100 mm"),
     (lambda: chain(SIGN, undecided=UNDECIDED[:2]), "module 3 (phi3) counter-rotates: rms 300 -> 0.2 mm; then either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low (more motion of phi5 would decide); rms 0.2 mm remains"),
-    (lambda: chain(SIGN, remainder=DIFFERENT), "probably different motions: rms 300 mm, the causes found leave 192.38 mm of it"),
-    (lambda: chain(remainder=DIFFERENT), "probably different motions: rms 300 mm, no cause found"),
+    (lambda: chain(SIGN, unexplained=DIFFERENT), "probably different motions: rms 300 mm, the causes found leave 192.38 mm of it"),
+    (lambda: chain(unexplained=DIFFERENT), "probably different motions: rms 300 mm, no cause found"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("build", "sentence"), SENTENCES)
 def test_the_answer_is_one_sentence(build: Callable[[], Diagnosis], sentence: str) -> None:
-    assert build().sentence == sentence
+    assert build().summary == sentence
 
 
-def test_a_line_names_three_twins_and_three_kinds_that_were_not_tested() -> None:
+def test_a_line_names_three_equivalent_causes_and_three_kinds_that_were_not_tested() -> None:
     kinds = ("time_lag", "clock_drift", "servo_lag", "joint_lag", "backlash")
     found = replace(
-        chain(replace(LENGTH, twins=tuple("abcde"))), not_looked_for=(NotLookedFor(kinds, "why"),)
+        chain(replace(LENGTH, equivalents=tuple("abcde"))), untested=(UntestedCauses(kinds, "why"),)
     )
     lines = {fact.name: fact.value for fact in present(found).body.facts}
-    assert lines["Twins"] == "r_4 or a or b or c or 2 more"
+    assert lines["Equivalent causes"] == "r_4 or a or b or c or 2 more"
     few = "offset of the clock, drift of the clock, lag of all joints"
     assert lines["Not tested"] == f"{few} and 2 more (why)"
     page = {fact.name: fact.value for fact in diagnosis_facts(found)}
@@ -253,5 +256,5 @@ def test_the_meaning_says_what_to_do_and_a_place_once() -> None:
         "count module 3 (phi3) the other way (in the log or in the robot: positions do not show which);"
         f" correct joint q1 by -1 deg; correct joint q2 by -2 deg {place}"
     )
-    nothing = (chain(last=0.3), chain(undecided=UNDECIDED), chain(SIGN, remainder=DIFFERENT))
+    nothing = (chain(last=0.3), chain(undecided=UNDECIDED), chain(SIGN, unexplained=DIFFERENT))
     assert [diagnosis_facts(diagnosis)[1].value for diagnosis in nothing] == [None] * 3

@@ -121,7 +121,7 @@ def test_equivalent_causes_are_named_by_the_first_of_them() -> None:
     search, result, _ = searched(numbers_of(joint_offset__phi1=RIGHT))
     (cause,), _ = causes_of(search, result)
     assert (cause.kind, cause.axis) == ("base_rotation", (0.0, 0.0, 1.0))  # setup comes before structure
-    assert "offset of phi1" in cause.twins
+    assert "offset of phi1" in cause.equivalents
 
 
 def test_a_joint_at_rest_has_an_offset_and_no_separate_scale() -> None:
@@ -134,7 +134,7 @@ def test_a_joint_at_rest_has_an_offset_and_no_separate_scale() -> None:
     search = search_of(noisy(clean, np.random.default_rng(0), uniform, data))
     causes, undecided = causes_of(search, search.find())
     assert {"phi3"} == {cause.name for one in (Alternative(causes), *undecided) for cause in one.causes}
-    assert undecided or "scale of phi3" in causes[0].twins
+    assert undecided or "scale of phi3" in causes[0].equivalents
 
 
 @pytest.mark.parametrize(

@@ -145,8 +145,8 @@ def test_each_number_of_a_sentence_is_that_of_the_files(tmp_path: Path, case: st
     named = found.undecided[0].causes if found.undecided else found.causes
     assert {(one.kind, one.name) for one in named} == {(one.kind, one.name) for one in CASES[case]}
     assert bool(found.undecided) == (case == "undecided")
-    printed, right = [float(one) for one in NUMBER.findall(found.sentence)], expected(tmp_path, found)
+    printed, right = [float(one) for one in NUMBER.findall(found.summary)], expected(tmp_path, found)
     # five digits, at most four of them decimals
     half = [0.501 * 10.0 ** -min(4, 4 - int(np.floor(np.log10(abs(one))))) for one in right]
-    assert len(printed) == len(right), found.sentence
+    assert len(printed) == len(right), found.summary
     assert all(abs(p - r) <= h for p, r, h in zip(printed, right, half, strict=True)), (printed, right)

@@ -31,7 +31,7 @@ def drawn(seed: int) -> tuple[np.random.Generator, FloatArray, FloatArray, Float
 
 def is_of(cause: Cause, name: str) -> bool:
     """Return whether a cause is the zero of a joint, or moves the tool centre point in the very same way."""
-    return (cause.kind == "joint_offset" and cause.name == name) or f"offset of {name}" in cause.twins
+    return (cause.kind == "joint_offset" and cause.name == name) or f"offset of {name}" in cause.equivalents
 
 
 def missing(found: Diagnosis, names: list[str]) -> list[str]:
@@ -49,7 +49,7 @@ def test_of_joints_on_both_sides(seed: int) -> None:
     asked, log = (urmpipe.ingest(q=values, t=t, unit="rad", names=NAMES) for values in (reference, q))
     found = urmpipe.diagnose(asked, log, tolerance={"joint": float(np.radians(0.5))})
     large = [name for name, size in zip(NAMES, off, strict=True) if abs(size) > np.radians(0.5)]
-    assert [name for name in large if name not in found.sentence] == [], found.sentence
+    assert [name for name in large if name not in found.summary] == [], found.summary
 
 
 @pytest.mark.slow
@@ -62,4 +62,4 @@ def test_of_a_path_against_joints(seed: int) -> None:
     before = poses_over_log(ARM, q)[0]
     moved = [np.abs(poses_over_log(ARM, q + one)[0] - before).max() for one in np.diag(off)]
     large = [name for name, size in zip(NAMES, moved, strict=True) if size > DEFAULT_TOLERANCE]
-    assert missing(found, large) == [], found.sentence
+    assert missing(found, large) == [], found.summary

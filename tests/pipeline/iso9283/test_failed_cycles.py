@@ -190,7 +190,7 @@ def test_a_cycle_that_failed_since_the_baseline_is_worse(tmp_path: Path) -> None
     baseline = urmpipe.compare(reference, before, iso=True)
     now = urmpipe.compare(reference, [*before[:2], tmp_path / "off.csv"], iso=True, baseline=baseline)
     assert now.verdict == "fail"
-    assert [str(one) for one in there(now.baseline).gone] == [f"off of {now.name}"]
+    assert [str(one) for one in there(now.baseline).missing] == [f"off of {now.name}"]
 
 
 @pytest.mark.parametrize(

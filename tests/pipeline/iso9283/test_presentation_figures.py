@@ -149,7 +149,7 @@ def test_corners_show_their_lengths(iso: IsoTest, path: CutPath) -> None:
         normal /= np.linalg.norm(normal)
         seen = [
             np.linalg.norm(np.cross(normal, end))
-            for end in (one.nearest - one.point, there(one.beyond) - there(one.foot))
+            for end in (one.nearest - one.point, there(one.overshoot_point) - there(one.nearest_on_leg))
         ]
         assert rounding[k] / beyond[k] == pytest.approx(seen[0] / seen[1], abs=0.02)
         assert f"CR {1e3 * one.rounding:.4f} mm, CO {1e3 * overshoot:.4f} mm" in drawing.svg
@@ -160,7 +160,7 @@ def test_a_corner_that_turns_back_has_a_plane(iso: IsoTest, path: CutPath) -> No
     back = replace(
         one, point=np.zeros(3), command=np.array([[-0.1, 0, 0], [0, 0, 0], [-0.1, 0, 0]]),
         mean=np.array([[-0.1, 0, 0], [-1e-4, 0, 0], [-0.1, 0, 0]]), nearest=np.array([-1e-4, 0, 0]),
-        rounding=1e-4, beyond=None, foot=None, overshoot=0.0,
+        rounding=1e-4, overshoot_point=None, nearest_on_leg=None, overshoot=0.0,
     )  # fmt: skip
     root = ET.fromstring(corner_drawing(replace(path, corners=(back,))).svg)
     assert len(list(lengths(root, "CR"))) == 1 and not list(lengths(root, "CO"))
@@ -169,7 +169,7 @@ def test_a_corner_that_turns_back_has_a_plane(iso: IsoTest, path: CutPath) -> No
 def test_a_small_overshoot_far_from_its_corner_is_told_and_not_drawn(iso: IsoTest, path: CutPath) -> None:
     one = path.corners[0]
     far = one.point + 0.08 * (one.command[-1] - one.point) / np.linalg.norm(one.command[-1] - one.point)
-    aside = replace(one, beyond=far + np.array([1e-5, 0.0, 0.0]), foot=far, overshoot=1e-5)
+    aside = replace(one, overshoot_point=far + np.array([1e-5, 0.0, 0.0]), nearest_on_leg=far, overshoot=1e-5)
     drawing = corner_drawing(replace(path, corners=(aside,)))
     assert not list(lengths(ET.fromstring(drawing.svg), "CO"))
     assert "CO: 80.00 mm from the corner" in drawing.svg and "CO 0.01000 mm" in drawing.alt

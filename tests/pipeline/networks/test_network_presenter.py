@@ -12,7 +12,7 @@ import pytest
 from asserting import there
 from made_networks import NAMES, found
 from presented import cells, facts
-from urmpipe_models.networks.assembly import Gap
+from urmpipe_models.networks.assembly import ClosureError
 from urmpipe_models.networks.mobility import Mobility
 from urmpipe_pipeline.networks.parts import gap_words
 from urmpipe_pipeline.presentation.figure import Drawing
@@ -49,19 +49,22 @@ def test_one_that_does_not_close_says_what_and_by_how_much() -> None:
     (check,) = shown.body.checks
     assert (check.verdict, check.kind) == ("fail", "not-assembled")
     table = cells(tables("too long")["What does not close"])
-    assert table["metres"] == [one.metres for one in result.gaps]
+    assert table["metres"] == [one.metres for one in result.closure_errors]
 
 
 @pytest.mark.parametrize(
     ("gap", "words"),
     [
-        (Gap("C", ("A", "B", "C"), 0.0123, math.radians(1.2)), "loop A, B, C is 12.3 mm and 1.2 deg apart"),
-        (Gap("C", ("A", "C"), 0.0, math.radians(1.2)), "loop A, C is 1.2 deg apart"),
-        (Gap("C", ("A", "C"), 0.002, 1e-9), "loop A, C is 2 mm apart"),
-        (Gap("rod", ("rod",), 0.003, 0.0), "element rod is 3 mm off its length"),
+        (
+            ClosureError("C", ("A", "B", "C"), 0.0123, math.radians(1.2)),
+            "loop A, B, C is 12.3 mm and 1.2 deg apart",
+        ),
+        (ClosureError("C", ("A", "C"), 0.0, math.radians(1.2)), "loop A, C is 1.2 deg apart"),
+        (ClosureError("C", ("A", "C"), 0.002, 1e-9), "loop A, C is 2 mm apart"),
+        (ClosureError("rod", ("rod",), 0.003, 0.0), "element rod is 3 mm off its length"),
     ],
 )
-def test_a_gap_in_words(gap: Gap, words: str) -> None:
+def test_a_gap_in_words(gap: ClosureError, words: str) -> None:
     assert gap_words(gap) == words
 
 
@@ -82,7 +85,7 @@ def test_the_facts_tell_how_it_was_assembled() -> None:
     assert said["Controls"] == "s = -0.8"
     assert said["Assemblies"] == result.reason == "the start closes"
     every = found("bars", every=True)
-    assert facts(present(every).body)["Assemblies"] == f"{every.reason} ({every.tried} starts in all)"
+    assert facts(present(every).body)["Assemblies"] == f"{every.reason} ({every.start_count} starts in all)"
 
 
 def test_the_mobility_is_what_its_table_adds_up_to() -> None:

@@ -103,7 +103,9 @@ def test_symbols_stand_on_the_axes_of_their_joints(name: str) -> None:
         n = at.axes(joint.bodies[0], joint.frames[0])[:, 1]
         stands = second if joint.kind in ("prismatic", "cylindrical", "helical", "user") else first
         np.testing.assert_allclose(middle, stands, rtol=0, atol=ROUNDING)
-        if joint.kind not in ("user", "global") and joint.name not in [one.name for one in result.gaps]:
+        if joint.kind not in ("user", "global") and joint.name not in [
+            one.name for one in result.closure_errors
+        ]:
             away = middle - first
             np.testing.assert_allclose(away - (away @ n) * n, 0.0, rtol=0, atol=1e-9)  # as far as it closes
 
@@ -160,7 +162,7 @@ def test_what_does_not_close_is_shown_where_it_comes_nearest() -> None:
     shown = scene_of(present(result))
     assert "nearest to closing" in shown.title
     gap = {one.name: one for one in shown.solids}["C"].lines[0]
-    assert np.linalg.norm(gap[1] - gap[0]) == pytest.approx(result.gaps[0].metres, rel=1e-9)
+    assert np.linalg.norm(gap[1] - gap[0]) == pytest.approx(result.closure_errors[0].metres, rel=1e-9)
 
 
 @pytest.mark.slow

@@ -38,8 +38,8 @@ def values(panel: Panel) -> FloatArray:
 
 
 def test_the_law_is_drawn_with_its_limits_as_they_were_reduced(slowed: PlannedPath) -> None:
-    assert 0.1 < slowed.scaled < 0.9
-    shown, k = panels(drawn(slowed)[LAW]), slowed.scaled
+    assert 0.1 < slowed.speed_factor < 0.9
+    shown, k = panels(drawn(slowed)[LAW]), slowed.speed_factor
     limits: dict[str, float | None] = {"s": None, "s′": 0.5 * k, "s″": 6.0 * k**2, "s‴": 100.0 * k**3}
     found = {title: panel.limit for title, panel in shown.items()}
     assert found.pop("s") is limits.pop("s")
@@ -91,7 +91,7 @@ def test_many_stops_have_no_lines_and_what_is_in_the_way_has() -> None:
     corners = np.array([[0.1 * k, 0.05 * (k % 2), 0.0] for k in range(MARKED + 3)])
     assert drawn(planned(None, PathRows(corners)))[LAW].instants == {}
     plan = FAILED["unreachable"]()
-    (one,) = plan.obstacles
+    (one,) = plan.infeasibilities
     assert drawn(plan)[JOINTS].instants == {round(1e9 * one.t): "unreachable, row 1"}
 
 
@@ -145,7 +145,9 @@ def test_the_distance_from_singular_poses_is_that_of_the_plan(slowed: PlannedPat
 def test_the_determinant_passes_through_zero_where_the_pose_is_singular() -> None:
     plan = over_its_axis()
     signs = np.sign(values(panels(drawn(plan)[SINGULAR])["det J"]))
-    before, after = (signs[side] for side in (plan.t < plan.obstacles[0].t, plan.t > plan.obstacles[0].t))
+    before, after = (
+        signs[side] for side in (plan.t < plan.infeasibilities[0].t, plan.t > plan.infeasibilities[0].t)
+    )
     assert {*before} == {-after[0]}
     assert {*after} == {after[0]}
 

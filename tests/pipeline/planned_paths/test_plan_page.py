@@ -76,11 +76,11 @@ def test_every_plan_has_a_page(name: str) -> None:
     assert page.banner.state == (plan.verdict or "plain")
     drawings = [block for block in page.parts[0].blocks if isinstance(block, Drawing)]
     assert len(drawings) == (plan.robot is not None)
-    if plan.obstacles:
+    if plan.infeasibilities:
         assert "In the way" in [fact.name for fact in page.banner.facts]
         joints = next(one for _, one in page.figures if one.title == "Joints over time")
         lines = [one["label"]["text"] for one in joints.spec["layout"]["shapes"] if one["yref"] == "paper"]
-        wanted = [f"{one.kind}, row {one.row}" for one in plan.obstacles]
+        wanted = [f"{one.kind}, row {one.row}" for one in plan.infeasibilities]
         assert lines[-len(wanted) :] == wanted  # behind those of stops
 
 
@@ -92,7 +92,7 @@ def test_plans_stand_side_by_side(slowed: PlannedPath) -> None:
     heads = [head for head, _ in beside.heads]
     assert heads[:5] == ["Plan", "Verdict", "Robot", "Law", "Length [mm]"]
     first = beside.rows[0][heads.index("Speed left")]
-    assert first.text == f"{100 * slowed.scaled:.1f} %"
+    assert first.text == f"{100 * slowed.speed_factor:.1f} %"
 
 
 @pytest.mark.slow

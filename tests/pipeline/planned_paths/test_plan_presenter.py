@@ -66,14 +66,14 @@ def test_headline_and_facts_of_a_plan_that_holds(contour: PlannedPath) -> None:
 
 def test_headline_and_facts_of_a_plan_that_a_joint_slows_down(slowed: PlannedPath) -> None:
     joints = there(slowed.joints)
-    share = f"{100 * slowed.scaled:.1f} %"
+    share = f"{100 * slowed.speed_factor:.1f} %"
     assert present(slowed).headline == (
         f"path: ur5e runs 1.148 m in {slowed.duration:.3f} s (jerk), reduced to {share} of the speed"
         " by shoulder_pan_joint"
     )
     told = brief(slowed)
     fastest = int(np.abs(joints.qd[:, 0]).argmax())
-    unreduced = np.abs(joints.qd[:, 0]).max() / slowed.scaled / 0.5
+    unreduced = np.abs(joints.qd[:, 0]).max() / slowed.speed_factor / 0.5
     assert told["Law"] == "jerk, up to 0.5 m/s, 6 m/s² and 100 m/s³ along the path"
     assert told["Reduced"] == (
         f"to {share} of the speed, {slowed.speed:.4g} m/s:"
@@ -146,25 +146,25 @@ def test_the_law_of_limits_tells_what_was_asked_beside_them() -> None:
 def test_what_is_in_the_way_is_headline_fact_check_and_event(kind: ObstacleKind, tmp_path: Path) -> None:
     plan = FAILED[kind]()
     shown = present(plan)
-    words = [obstacle_words(one) for one in plan.obstacles]
+    words = [obstacle_words(one) for one in plan.infeasibilities]
     way = f"{plan.path.total:.4g} m in {plan.duration:.3f} s (trapezoid)"
     cannot = f"path: {there(plan.robot).name} cannot run {way}"
-    first = plan.obstacles[0]
+    first = plan.infeasibilities[0]
     assert shown.headline == f"{cannot}: {first.kind} at t = {first.t:.3f} s (row {first.row})"
     assert [fact.value for fact in shown.facts if fact.name == "In the way"] == words
     assert not {fact.name for fact in shown.body.facts} & {"Limits", "Reduced"}  # of speeds that are not run
     assert not any(isinstance(fact.value, Value) and fact.value.limit for fact in shown.body.facts)
     found: dict[str, str] = {}
-    for one in plan.obstacles:
+    for one in plan.infeasibilities:
         joint = f", joint {one.joint}" if one.kind == "singular" else ""
         place = f"at t = {one.t:.3f} s (segment {one.segment + 1}, row {one.row}{joint})"
-        found.setdefault(one.kind, f"{place}: {one.words}")
+        found.setdefault(one.kind, f"{place}: {one.message}")
     assert kind in found
     assert [(check.kind, check.verdict, check.words) for check in shown.body.checks] == [
         (key, "fail" if key in found else "pass", found.get(key, "")) for key in CHECKS
     ]
     errors = [(event.t_ns, event.words) for event in shown.body.events() if event.level == "error"]
-    assert errors == [(round(one.t * 1e9), f"{one.kind}: {one.words}") for one in plan.obstacles]
+    assert errors == [(round(one.t * 1e9), f"{one.kind}: {one.message}") for one in plan.infeasibilities]
     with safe_output(tmp_path / "plan.xml", [], "junit") as part:
         write_junit(shown, part, tmp_path / "plan.xml")
     root = ET.parse(tmp_path / "plan.xml").getroot()
@@ -177,7 +177,7 @@ def test_what_is_in_the_way_is_headline_fact_check_and_event(kind: ObstacleKind,
 
 def test_of_many_things_in_the_way_the_rest_is_counted() -> None:
     plan = FAILED["unreachable"]()
-    plan = replace(plan, obstacles=plan.obstacles[:1] * (MANY + 3))
+    plan = replace(plan, infeasibilities=plan.infeasibilities[:1] * (MANY + 3))
     told = [fact.value for fact in present(plan).facts if fact.name == "In the way"]
     assert (len(told), told[-1]) == (MANY + 1, "and 3 more")
 
@@ -190,7 +190,7 @@ def test_the_viewer_opens_before_what_is_in_the_way(kind: ObstacleKind) -> None:
     opens = present(plan).opens_at_ns
     (at,) = np.flatnonzero(plan.t_ns == opens)
     assert plan.reached[at]
-    first = min(one.t for one in plan.obstacles)
+    first = min(one.t for one in plan.infeasibilities)
     assert plan.t[at] < first <= plan.t[at + 1]
 
 
@@ -198,7 +198,7 @@ def test_the_checks_of_a_plan_that_holds_all_pass(contour: PlannedPath) -> None:
     body = present(contour).body
     assert [(check.verdict, check.words) for check in body.checks] == [("pass", "")] * 4
     assert body.properties == {
-        "length": contour.path.total, "duration": contour.duration, "scaled": 1.0, "law": "trapezoid",
+        "length": contour.path.total, "duration": contour.duration, "speed_factor": 1.0, "law": "trapezoid",
     }  # fmt: skip
 
 

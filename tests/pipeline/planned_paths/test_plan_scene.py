@@ -210,7 +210,7 @@ def test_what_is_in_the_way_is_marked(kind: ObstacleKind) -> None:
     plan = FAILED[kind]()
     wanted = [
         (f"{one.kind}, row {one.row}", tuple(plan.path.points(np.array([one.s])).position[0]))
-        for one in plan.obstacles
+        for one in plan.infeasibilities
     ]
     shown = [(spot.words, spot.position) for spot in scene_of(present(plan)).spots]
     assert shown[-len(wanted) :] == wanted

@@ -57,7 +57,7 @@ def test_the_papers_contour_by_its_arm() -> None:
     plan = planned(load_robot("irb60"), CONTOUR)
     assert plan.verdict == "pass"
     assert plan.duration == pytest.approx(4.780324, abs=1e-6)
-    assert (len(plan), plan.scaled, plan.speed) == (958, 1.0, 0.5)
+    assert (len(plan), plan.speed_factor, plan.speed) == (958, 1.0, 0.5)
     joints = joints_of(plan)
     np.testing.assert_array_equal(joints.q[:, 3], 0.0)
     miss = pose_errors(load_robot("irb60"), joints.q, Targets(plan.position))[0]
@@ -102,8 +102,8 @@ def test_a_joint_that_is_twice_too_fast_halves_the_speed(law: dict[str, Any]) ->
     velocity[2] = 0.5 * most[2]
     plan = planned(limited("ur5e", velocity=velocity), SMALL, **law)
     assert plan.verdict == "pass"
-    assert plan.scaled == pytest.approx(0.5, rel=1e-3)
-    assert plan.duration == pytest.approx(free.duration / plan.scaled, rel=1e-12)
+    assert plan.speed_factor == pytest.approx(0.5, rel=1e-3)
+    assert plan.duration == pytest.approx(free.duration / plan.speed_factor, rel=1e-12)
     assert plan.speed == pytest.approx(0.25, rel=1e-3)
     assert joints_of(plan).velocity_share.max() <= KEPT
 
@@ -115,7 +115,7 @@ def test_a_joint_that_accelerates_four_times_too_much_halves_the_speed() -> None
     plan = planned(
         limited("ur5e", velocity=math.inf, acceleration=[0.25 * one + 1e-9 for one in most]), SMALL
     )
-    assert plan.scaled == pytest.approx(0.5, rel=1e-3)
+    assert plan.speed_factor == pytest.approx(0.5, rel=1e-3)
     assert joints_of(plan).acceleration_share.max() <= KEPT
 
 
@@ -135,7 +135,7 @@ def test_the_period_changes_no_speed(limits: dict[str, float], law: dict[str, An
     for tsp in (0.0007, 0.5):
         other = planned(arm, SMALL, tsp=tsp, **law)
         # samples beside the grid: 1e-4 once more
-        assert other.scaled == pytest.approx(plan.scaled, rel=2e-4), tsp
+        assert other.speed_factor == pytest.approx(plan.speed_factor, rel=2e-4), tsp
         assert other.duration == pytest.approx(plan.duration, rel=2e-4), tsp
 
 
@@ -145,8 +145,8 @@ def test_arcs_shorter_than_a_period_count() -> None:
     rows = cube_rows("wall", 0.1, 0.0005, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
     plan = planned(limited("ur5e", velocity=math.inf, acceleration=15.0), rows)
     fine = planned(limited("ur5e", velocity=math.inf, acceleration=15.0), rows, tsp=0.0005)
-    assert plan.scaled < 0.2
-    assert fine.scaled == pytest.approx(plan.scaled, rel=2e-4)
+    assert plan.speed_factor < 0.2
+    assert fine.speed_factor == pytest.approx(plan.speed_factor, rel=2e-4)
     assert joints_of(fine).acceleration_share.max() == pytest.approx(1.0, abs=0.01)  # 30 samples an arc
 
 
@@ -154,12 +154,12 @@ def test_arcs_shorter_than_a_period_count() -> None:
 @pytest.mark.parametrize("tsp", [0.005, 7.0])
 def test_the_period_hides_no_obstacle(tsp: float) -> None:
     singular = np.array([[0.6, 0.0, 1.6], [0.3, 0.0, 1.6], [-0.3, 0.0, 1.6]])
-    assert [one.kind for one in planned(load_robot("irb60"), PathRows(singular), tsp=tsp).obstacles] == [
-        "singular"
-    ]
+    assert [
+        one.kind for one in planned(load_robot("irb60"), PathRows(singular), tsp=tsp).infeasibilities
+    ] == ["singular"]
     points = np.array([[0.3, 0.3, 0.3], [-0.3, -0.3, 0.3]])
     plan = planned(load_robot("ur5e"), PathRows(points, rotation=DOWN), tsp=tsp)
-    assert [one.kind for one in plan.obstacles] == ["unreachable"]
+    assert [one.kind for one in plan.infeasibilities] == ["unreachable"]
 
 
 @pytest.mark.slow
@@ -169,10 +169,10 @@ def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
     velocity = [math.inf] * 6
     velocity[0] = most[0] / 250.0
     plan = planned(limited("ur5e", velocity=velocity), SMALL)
-    (obstacle,) = plan.obstacles
-    assert (plan.verdict, plan.scaled, plan.duration) == ("fail", 1.0, free.duration)
+    (obstacle,) = plan.infeasibilities
+    assert (plan.verdict, plan.speed_factor, plan.duration) == ("fail", 1.0, free.duration)
     assert (obstacle.kind, obstacle.joint) == ("too-slow", "shoulder_pan_joint")
-    assert obstacle.words == "shoulder_pan_joint allows 0.4 % of the speed, allowed: 1 % or more"
+    assert obstacle.message == "shoulder_pan_joint allows 0.4 % of the speed, allowed: 1 % or more"
     sample = int(np.abs(joints_of(free).qd[:, 0]).argmax())
     assert obstacle.t == pytest.approx(free.t[sample], abs=free.tsp)
     assert obstacle.row == free.row[sample]
@@ -189,10 +189,10 @@ def test_past_the_axis_the_first_joint_takes_the_speed(y: float) -> None:
     share = 6.0 * y / 0.5
     if share > 0.01:
         assert plan.verdict == "pass"
-        assert plan.scaled == pytest.approx(share, rel=2e-3)
+        assert plan.speed_factor == pytest.approx(share, rel=2e-3)
     else:
-        assert [one.kind for one in plan.obstacles] == ["too-slow"]
-        assert plan.obstacles[0].t == pytest.approx(0.5 * plan.duration, abs=0.01)
+        assert [one.kind for one in plan.infeasibilities] == ["too-slow"]
+        assert plan.infeasibilities[0].t == pytest.approx(0.5 * plan.duration, abs=0.01)
 
 
 @pytest.mark.slow
@@ -215,9 +215,9 @@ def test_the_law_of_limits_turns_the_arm_near_its_axis(y: float) -> None:
 @pytest.mark.slow
 def test_a_determinant_that_passes_through_zero_is_no_plan() -> None:
     plan = over_its_axis()
-    (obstacle,) = plan.obstacles
+    (obstacle,) = plan.infeasibilities
     assert (obstacle.kind, obstacle.segment, obstacle.row) == ("singular", 1, 2)
-    assert obstacle.words == "the arm passes a singular pose"
+    assert obstacle.message == "the arm passes a singular pose"
     at = np.interp(obstacle.t, plan.t, plan.position[:, 0])
     assert at == pytest.approx(0.0, abs=2.0 * plan.path.total / 4000)  # found by the step of the grid
 
@@ -225,16 +225,16 @@ def test_a_determinant_that_passes_through_zero_is_no_plan() -> None:
 @pytest.mark.slow
 def test_a_jump_is_no_plan() -> None:
     plan = behind_the_arm()
-    jumps = [one for one in plan.obstacles if one.kind == "jump"]
+    jumps = [one for one in plan.infeasibilities if one.kind == "jump"]
     assert (plan.verdict, jumps[0].row, jumps[0].joint) == ("fail", 1, "theta1")
 
 
 def test_samples_out_of_reach_between_rows_are_told() -> None:
     plan = across_the_base()
-    (obstacle,) = plan.obstacles
+    (obstacle,) = plan.infeasibilities
     assert (obstacle.kind, obstacle.row, obstacle.joint) == ("unreachable", 1, "")
     away = "the wrist is 0.1332 m from axis 1, allowed: at least 0.1333 m"
-    assert obstacle.words == f"{away}; so it is along 0.266 m"
+    assert obstacle.message == f"{away}; so it is along 0.266 m"
     s = plan.motion.s[~plan.reached]
     assert s[-1] - s[0] == pytest.approx(0.266, abs=2 * 0.5 * plan.tsp)  # a sample at each end
 
@@ -262,7 +262,7 @@ def test_the_law_of_limits_keeps_them(robot: str, rows: PathRows) -> None:
     plan = planned(limited(robot, velocity=1.5, acceleration=8.0), rows, law="limits")
     joints = joints_of(plan)
     assert plan.verdict == "pass"
-    assert (plan.velocity, plan.acceleration, plan.speed, plan.scaled) == (None, None, None, 1.0)
+    assert (plan.velocity, plan.acceleration, plan.speed, plan.speed_factor) == (None, None, None, 1.0)
     assert joints.velocity_share.max() <= KEPT
     assert joints.acceleration_share.max() <= KEPT
     slower = planned(limited(robot, velocity=1.5, acceleration=8.0), rows)
@@ -272,7 +272,7 @@ def test_the_law_of_limits_keeps_them(robot: str, rows: PathRows) -> None:
 def test_the_law_of_limits_without_reach_tells_where() -> None:
     points = np.array([[0.3, 0.3, 0.3], [-0.3, -0.3, 0.3]])
     plan = planned(limited("ur5e", acceleration=5.0), PathRows(points, rotation=DOWN), law="limits")
-    assert [one.kind for one in plan.obstacles] == ["unreachable"]
+    assert [one.kind for one in plan.infeasibilities] == ["unreachable"]
     assert (plan.law, plan.velocity, plan.acceleration) == ("trapezoid", 0.5, 6.0)  # what its times are of
 
 
@@ -366,7 +366,7 @@ def test_what_is_needed_to_repeat_it_is_kept() -> None:
 
 def test_without_a_robot_it_is_path_and_time() -> None:
     plan = planned(None, CONTOUR)
-    assert (plan.verdict, plan.joints, plan.obstacles) == (None, None, ())
+    assert (plan.verdict, plan.joints, plan.infeasibilities) == (None, None, ())
     assert plan.duration == pytest.approx(4.780324, abs=1e-6)
     assert plan.as_run().log.joints == ()
     np.testing.assert_array_equal(plan.as_run().log.tcp_position, plan.position)

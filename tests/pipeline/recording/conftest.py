@@ -23,7 +23,7 @@ from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarnin
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.repolarization.audit import AuditEntry
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)
@@ -31,7 +31,7 @@ PERIOD_NS = 5_000_000
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
-MakeSolved = Callable[..., SolvedTargets]
+MakeSolved = Callable[..., IkResult]
 
 
 def arm() -> Chain:
@@ -116,7 +116,7 @@ def slow_motion(rows: int) -> FloatArray:
 
 def build_solved(
     rows: int = 40, timed: bool = True, names: tuple[str, ...] = BRANCHES, robot: Chain | None = None
-) -> SolvedTargets:
+) -> IkResult:
     """Return solved targets: rows 5 to 8 out of reach; ghost k is there from row 2 k on, but for 20 to 29."""
     chain, q = robot or load_robot("ur5e"), slow_motion(rows)
     targets = forward_targets(chain, q)

@@ -136,7 +136,7 @@ def test_a_grid_without_any_value_comes_back_as_it_was(make_run: MakeRun, tmp_pa
 def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_path: Path) -> None:
     comparison = make_comparison(("coppeliasim", "matlab", "solidworks"))
     assert [one.verdict for one in comparison.runs] == ["pass", "pass", "fail"]
-    assert comparison.runs[2].outside.any()
+    assert comparison.runs[2].out_of_tolerance.any()
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
@@ -148,7 +148,7 @@ def test_what_changed_since_a_baseline_comes_back_as_it_was(
     before = make_comparison(("matlab", "old"))
     before = replace(before, tolerance={"axis": 0.002}, recording=Path("before.rrd"))
     found = against_baseline(now, before, {"axis": 1e-5})
-    assert found.changes and found.new and found.gone and found.differences
+    assert found.changes and found.new and found.missing and found.differences
     held = replace(now, baseline=found)
     assert_same(round_trip(held, tmp_path), held)
 

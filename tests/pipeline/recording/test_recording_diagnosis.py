@@ -55,7 +55,7 @@ def test_its_answer_stands_in_the_summary_and_mended_deviations_in_a_tab(
 ) -> None:
     path = write_recording(diagnosed, tmp_path / "run.rrd")
     (text,) = static(path, "/shown/summary", "TextDocument:text")
-    said = there(diagnosed.runs[0].diagnosis).sentence
+    said = there(diagnosed.runs[0].diagnosis).summary
     assert "Diagnosis: **passes; " in text.replace("\\", "")
     assert said in text.replace("\\", "")
     tabs = views(path)["ViewBlueprint:display_name"]

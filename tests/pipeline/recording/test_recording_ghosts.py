@@ -42,10 +42,10 @@ from urmpipe_pipeline.recording.views.label_places import name_places
 from urmpipe_pipeline.recording.views.scene_drawing import AXIS, LINK, OPACITY, THIN, capsules
 from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH
 from urmpipe_pipeline.results import present, read_recording, write_recording
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import ghosts, scene
 
-MakeSolved = Callable[..., SolvedTargets]
+MakeSolved = Callable[..., IkResult]
 
 STEP_NS = 20_000_000  # of the motion that make_solved makes
 SCENE = "/shown/scene"
@@ -66,7 +66,7 @@ def test_positions_alone_and_targets_that_are_none_come_back(make_solved: MakeSo
     one = make_solved(timed=False)
     position = one.targets.position.copy()
     position[5] = np.nan
-    one = replace(one, targets=Targets(position), angle=None, every=False)
+    one = replace(one, targets=Targets(position), angle=None, all_solutions=False)
     assert_same(read_recording(write_recording(one, tmp_path / "solved.rrd")), one)
 
 
@@ -271,7 +271,7 @@ def test_the_name_of_the_branch_chosen_stands_at_the_arm(make_solved: MakeSolved
 def test_the_branch_chosen_has_a_name_only_beside_others(make_solved: MakeSolved) -> None:
     one = make_solved()
     assert [bool(arm.label) for arm in scene(one).arms] == [True] * 3
-    assert [bool(arm.label) for arm in scene(replace(one, every=False)).arms] == [False]
+    assert [bool(arm.label) for arm in scene(replace(one, all_solutions=False)).arms] == [False]
 
 
 def test_along_a_motion_a_new_branch_is_told_at_its_row(make_solved: MakeSolved) -> None:

@@ -154,7 +154,7 @@ def test_results_open_where_their_verdict_was_decided(
 ) -> None:
     comparison = make_comparison(("solidworks", "coppeliasim"))
     path = write_recording(comparison, tmp_path / "both.rrd")
-    assert openings([path])[path].at / 1e9 == comparison.worst.furthest.t_max > 0
+    assert openings([path])[path].at / 1e9 == comparison.worst.worst_statistics.t_max > 0
     path = write_recording(make_simulation(), tmp_path / "simulation.rrd")
     assert openings([path])[path].at == 1_250_000_000
 

@@ -36,11 +36,11 @@ from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW
 from urmpipe_pipeline.results import present, write_recording
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
-MakeSolved = Callable[..., SolvedTargets]
+MakeSolved = Callable[..., IkResult]
 Picture = NDArray[np.uint8]
 Eye = tuple[FloatArray, FloatArray]
 
@@ -328,7 +328,7 @@ def test_view_opens_where_the_verdict_was_decided_and_at_a_row_where_there_are_n
     make_comparison: MakeComparison, make_solved: MakeSolved, tmp_path: Path
 ) -> None:
     comparison = make_comparison()
-    decided = round(comparison.worst.furthest.t_max * 1e9)
+    decided = round(comparison.worst.worst_statistics.t_max * 1e9)
     for result, wanted in ((comparison, ("t", decided)), (make_solved(timed=False), ("row", 3))):
         path = write_recording(result, tmp_path / "opened.rrd")
         with open_window(path, openings([path])[path], headless=True) as (process, client):

@@ -18,7 +18,7 @@ from asserting import refusal
 from recorded import columns
 from same_results import assert_same
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_pipeline.comparison.verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.provenance import Provenance
@@ -161,7 +161,7 @@ def simulations(draw: st.DrawFn) -> Simulation:
         for block, variable in names
     ]  # fmt: skip
     every = [name for one in signals for name in {one.name, *one.names}]
-    verdict = DeltaVerdict(
+    verdict = DeltaMeterResult(
         draw(NAMES), tuple(draw(st.lists(NAMES, max_size=2))), {"axis": draw(st.floats(0.0, 1e300))}, "x",
         draw(st.floats()), 0.0, 0, 3, 1, "fail",
     )  # fmt: skip

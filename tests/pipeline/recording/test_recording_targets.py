@@ -18,15 +18,15 @@ from urmpipe_pipeline.presentation import scene as presentation
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.recording.views.geometry import NEAR, ball, drawn_arm, drawn_targets, extent
 from urmpipe_pipeline.results import present, write_recording
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import scene
 
-MakeSolved = Callable[..., SolvedTargets]
+MakeSolved = Callable[..., IkResult]
 
 ROOT = "/shown/scene/targets"
 
 
-def shown_targets(one: SolvedTargets) -> presentation.Targets:
+def shown_targets(one: IkResult) -> presentation.Targets:
     """Return the targets of a scene."""
     found = scene(one).targets
     assert found is not None
@@ -79,14 +79,14 @@ def test_of_many_targets_that_are_missed_none_has_a_label(tmp_path: Path) -> Non
     assert static(path, f"{ROOT}/missed", "Points3D:labels") == [f"row {row}: a" for row in range(1, 10)]
 
 
-def solved_at(position: FloatArray, missed: list[bool], why: str = "far") -> SolvedTargets:
+def solved_at(position: FloatArray, missed: list[bool], why: str = "far") -> IkResult:
     """Return targets at some places; the arm has a pose where they are not missed."""
     q = np.where(np.array(missed)[:, None], np.nan, [[0.1, -1.2, 1.3, -0.4, 0.7, 0.3]])
     reasons = tuple(why if one else "" for one in missed)
     return solved("targets", load_robot("ur5e"), q, reasons=reasons, targets=Targets(position))
 
 
-def in_view(one: SolvedTargets) -> FloatArray:
+def in_view(one: IkResult) -> FloatArray:
     """Return every point that is in view in [m], shape (n, 3)."""
     shown = scene(one)
     return extent(drawn_arm(shown.arms[0]), (), (), drawn_targets(shown_targets(one)))

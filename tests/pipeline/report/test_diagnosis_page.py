@@ -17,7 +17,7 @@ def test_its_parts_stand_where_they_are_read_first(comparison: Comparison) -> No
     runs = [replace(one, diagnosis=diagnosis_of(one)) for one in comparison.runs]
     result = replace(comparison, runs=tuple(runs))
     page = lay_out([present(result)])
-    said = there(result.worst.diagnosis).sentence
+    said = there(result.worst.diagnosis).summary
     assert [fact.value for fact in page.banner.facts if fact.leads] == [said]  # seen without scrolling
     (part,) = (one for one in page.parts[0].parts if one.title == result.worst.name)
     assert (part.facts[0].name, part.facts[0].value.split(" (")[0]) == ("Meaning", "count module 3")
@@ -39,9 +39,9 @@ def test_its_parts_stand_where_they_are_read_first(comparison: Comparison) -> No
 
 def test_a_log_that_passes_has_no_cause_in_the_banner(comparison: Comparison) -> None:
     passed = replace(next(one for one in comparison.runs if one.verdict == "pass"))
-    diagnosis = replace(diagnosis_of(passed), own_tcp=(), origin="")
+    diagnosis = replace(diagnosis_of(passed), recorded_tcp=(), origin="")
     page = lay_out([present(replace(comparison, runs=(replace(passed, diagnosis=diagnosis),)))])
     assert not [fact for fact in page.banner.facts if fact.leads]
     (part,) = page.parts[0].parts
-    assert part.facts[0].value == diagnosis.sentence
-    assert diagnosis.sentence.startswith("passes; ")
+    assert part.facts[0].value == diagnosis.summary
+    assert diagnosis.summary.startswith("passes; ")

@@ -132,7 +132,7 @@ def test_numbers_are_those_of_the_json_and_the_recording(everything: Comparison,
                     assert cell == printed_again(cell, one[key], factor)
                 assert row["at t [s]"] == text.seconds(one["t_max"])
                 assert row["samples out"] == str(one["out_of_tolerance"])
-                assert row["out"] == text.percent(one["share_out"])
+                assert row["out"] == text.percent(one["out_fraction"])
                 assert row["Verdict"] == one["verdict"].upper()
 
 

@@ -214,6 +214,6 @@ def test_a_joint_without_a_torque_has_no_share(tmp_path: Path) -> None:
     run = replace(run, tau=tau)
     told = run.to_dict()["torques"][2]
     assert np.isnan(told["max"]) and told["effort"] == UR10.moving[2].effort
-    assert (told["effort_share"], told["share_out"]) == (None, None)
+    assert (told["effort_share"], told["out_fraction"]) == (None, None)
     (table,) = torque_table(run)
-    assert (cells(table)["effort_share"][2], cells(table)["share_out"][2]) == (None, None)
+    assert (cells(table)["effort_share"][2], cells(table)["out_fraction"][2]) == (None, None)

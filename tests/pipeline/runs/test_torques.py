@@ -175,7 +175,7 @@ def test_json_has_the_largest_torque_of_each_joint(run: Run) -> None:
         assert one["rms"] == np.sqrt(np.mean(size**2))
         assert (one["effort"], one["unit"]) == (joint.effort, "N.m")
         assert one["effort_share"] == size.max() / joint.effort
-        assert one["share_out"] == np.mean(size > joint.effort)
+        assert one["out_fraction"] == np.mean(size > joint.effort)
     json.dumps(to_json_value(torques), allow_nan=False)
 
 
@@ -277,7 +277,7 @@ def test_no_limit_is_applied_where_the_period_of_the_rows_is_assumed(moved: bool
     assert [one for one in run.warnings if one.kind == "effort-limit"] == []
     (torque,) = run.to_dict()["torques"]
     assert torque["max"] == largest
-    assert [torque[key] for key in ("effort", "effort_share", "share_out")] == [None] * 3
+    assert [torque[key] for key in ("effort", "effort_share", "out_fraction")] == [None] * 3
     table = next(one for one in present(run).body.tables if one.title == "Joint torques")
     assert "period of the rows is assumed" in table.note
     shown = figure(run, "Joint torques")
@@ -351,7 +351,7 @@ def test_a_plan_within_its_efforts_or_in_the_way_of_something_has_no_such_warnin
     weak = limited("ur10", effort=1.0)
     points = np.array([[0.5, 0.5, 0.3], [-0.5, -0.5, 0.3]])
     failed = planned(weak, PathRows(points, rotation=DOWN))
-    assert failed.obstacles != ()
+    assert failed.infeasibilities != ()
     for plan in (planned(load_robot("ur10"), SMALL), failed):
         for warnings in (plan.warnings, plan.as_run().warnings):
             assert [one for one in warnings if one.kind == "effort-limit"] == []
@@ -428,7 +428,7 @@ def test_the_table_has_each_joint_with_its_limit(run: Run) -> None:
     table = next(one for one in present(run).body.tables if one.title == "Joint torques")
     found, told = cells(table), run.to_dict()["torques"]
     assert found["joint"] == list(run.log.joints)
-    for key in ("t_max", "effort", "effort_share", "share_out"):
+    for key in ("t_max", "effort", "effort_share", "out_fraction"):
         assert found[key] == [one[key] for one in told]
     assert found["max"] == [float(f"{one['max']:.4g}") for one in told]
 

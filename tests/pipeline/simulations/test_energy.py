@@ -39,18 +39,23 @@ def swinging(make_simulation: MakeSimulation) -> Simulation:
 def test_energies_of_all_blocks_count_from_the_first_sample(swinging: Simulation) -> None:
     balance = there(swinging.energy)
     np.testing.assert_array_equal(balance.supplied, [0.0, 4.0, 10.0])
-    np.testing.assert_array_equal(balance.lost, [0.0, 2.0, 6.0])
+    np.testing.assert_array_equal(balance.dissipated, [0.0, 2.0, 6.0])
     np.testing.assert_array_equal(balance.stored, [0.0, 1.5, 4.0])
     np.testing.assert_array_equal(balance.residual, [0.0, 0.5, 0.0])
     assert (balance.worst, balance.share(-0.5)) == (1, 0.05)
-    assert swinging.to_dict()["energy"] == {"in": 10.0, "lost": 6.0, "stored": 4.0, "residual": 0.0}
+    assert swinging.to_dict()["energy"] == {
+        "supplied": 10.0,
+        "dissipated": 6.0,
+        "stored": 4.0,
+        "residual": 0.0,
+    }
 
 
 def test_the_share_of_a_system_that_exchanges_nothing_is_of_what_it_stores() -> None:
     kinetic, potential = np.array([0.0, 3.0, 5.0]), np.array([5.0, 2.0, 1e-6])
     stored = np.column_stack((kinetic + potential, [-3.0, -3.0, -3.0]))
     balance = there(energy_balance([("energy_stored", stored)]))
-    assert balance.at_first == 8.0
+    assert balance.initial == 8.0
     assert balance.share(balance.residual[2]) == pytest.approx(1e-6 / 8.0)
 
 
@@ -67,7 +72,7 @@ def test_the_balance_stands_before_the_blocks_and_only_there(swinging: Simulatio
     fact = facts(body)["Energy balance"]
     assert fact == (
         "2 blocks; not accounted for: at most 0.5 J at t = 0.005 s, 5.0 % of the largest energy"
-        " in, lost or stored (coupling of the blocks, or a block without energies)"
+        " supplied, dissipated or stored (coupling of the blocks, or a block without energies)"
     )
     assert "(coupling of the blocks, or a block without energies)" in figure.caption
 

@@ -14,14 +14,14 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.simulations.motion import moving_blocks, run_of_block
-from urmpipe_pipeline.simulations.simulation import Arm, Signal, Simulation
+from urmpipe_pipeline.simulations.simulation import Signal, SimulatedArm, Simulation
 
 MakeSimulation = Callable[..., Simulation]
 
 SLIDES = Chain("slides", (Joint("turn"), Joint("way", kind="prismatic"), Joint("twist")))
 
 
-def with_signals(simulation: Simulation, *signals: Signal, arms: tuple[Arm, ...] = ()) -> Simulation:
+def with_signals(simulation: Simulation, *signals: Signal, arms: tuple[SimulatedArm, ...] = ()) -> Simulation:
     return replace(simulation, signals=signals, arms=arms, verdicts=())
 
 

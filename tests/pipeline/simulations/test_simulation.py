@@ -11,7 +11,7 @@ import pytest
 
 from asserting import refusal
 from urmpipe_models.errors import CosimulationError
-from urmpipe_pipeline.simulations.simulation import Arm, Signal, Simulation, extremes
+from urmpipe_pipeline.simulations.simulation import Signal, SimulatedArm, Simulation, extremes
 
 MakeSimulation = Callable[..., Simulation]
 
@@ -43,7 +43,7 @@ def test_its_json_has_the_extremes_of_every_scalar_and_when_they_stand(
     }  # fmt: skip
     assert said["verdicts"][0] == {
         "block": "meter", "tolerance": {"axis": 0.0035}, "quantity": "y", "worst": 4e-3, "t": 1.25,
-        "sample": 250, "samples": 600, "missing": 0, "coverage": 1.0, "verdict": "fail", "doubts": [],
+        "sample": 250, "samples": 600, "missing": 0, "coverage": 1.0, "verdict": "fail", "caveats": [],
         "out_of_tolerance": np.count_nonzero(np.abs(values) > 0.0035),
     }  # fmt: skip
     assert (said["verdict"], said["failed"], said["recording"]) == ("fail", None, None)
@@ -89,7 +89,7 @@ def test_what_does_not_fit_together_is_refused_all_at_once(make_simulation: Make
     with pytest.raises(CosimulationError) as caught:
         replace(
             simulation, verdicts=(late,), t_ns=np.array([0, 5, 5]), signals=signals,
-            arms=(Arm("chain", simulation.arms[0].chain, np.zeros((3, 5))),),
+            arms=(SimulatedArm("chain", simulation.arms[0].chain, np.zeros((3, 5))),),
         )  # fmt: skip
     assert str(caught.value).splitlines() == [
         "simulation log-to-delta: found times that do not rise, allowed: rising times",

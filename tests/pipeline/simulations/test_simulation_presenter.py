@@ -34,9 +34,9 @@ def test_a_delta_meter_is_a_check_and_a_judged_section(make_simulation: MakeSimu
     assert (check.name, check.verdict, check.about) == ("within tolerance", "fail", "meter")
     assert f"{meter.out_of_tolerance} of {meter.samples}" in check.words
     value = cast("Value", section.facts[0].value)
-    assert (value.number, value.limit, value.used) == (meter.worst, meter.allowed, meter.used)
+    assert (value.number, value.limit, value.used) == (meter.worst, meter.allowed, meter.utilisation)
     table = cells(shown.body.tables[0])
-    for key in ("worst", "allowed", "t", "sample", "samples", "out_of_tolerance", "share_out"):
+    for key in ("worst", "allowed", "t", "sample", "samples", "out_of_tolerance", "out_fraction"):
         assert table[key] == [getattr(meter, key)]
     assert (shown.verdict, shown.opens_at_ns) == ("fail", simulation.t_ns[meter.sample])
 
@@ -44,7 +44,7 @@ def test_a_delta_meter_is_a_check_and_a_judged_section(make_simulation: MakeSimu
 def test_a_meter_in_doubt_says_so_where_its_verdict_stands(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation()
     (meter,) = simulation.verdicts
-    doubted = replace(meter, worst=1e-3, out_of_tolerance=0, doubts=("log.q was nan", "it ended early"))
+    doubted = replace(meter, worst=1e-3, out_of_tolerance=0, caveats=("log.q was nan", "it ended early"))
     shown = present(replace(simulation, verdicts=(doubted,)))
     assert shown.verdict == "fail"
     assert shown.headline == f"meter of {simulation.name} within tolerance, but in doubt"

@@ -22,7 +22,7 @@ from urmpipe_pipeline.solved_targets.given_targets import given_targets
 from urmpipe_pipeline.solved_targets.parts import unreached
 from urmpipe_pipeline.solved_targets.presenter import headline
 from urmpipe_pipeline.solved_targets.request import Request
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import ghosts, opening_row, scene
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 
@@ -37,7 +37,7 @@ def way(rows: int) -> FloatArray:
 
 
 @pytest.fixture(scope="module")
-def path() -> SolvedTargets:
+def path() -> IkResult:
     """A path of arm6 of which some rows are out of reach, with every branch beside it."""
     targets = forward_targets(ARM6, way(40))
     targets.position[17:20, 2] = 3.0
@@ -67,11 +67,11 @@ def test_a_joint_that_is_too_fast_twice_is_one_joint() -> None:
     q[:, 0] += np.cumsum(np.where((np.arange(40) // 10) % 2, 0.05, 0.001))
     found = urmpipe.ik(forward_targets(arm, q), arm, tsp=0.01, start=q[0].tolist())
     assert found.path is not None
-    assert [one.joint for one in found.path.too_fast] == ["shoulder_pan_joint"] * 2
+    assert [one.joint for one in found.path.speed_violations] == ["shoulder_pan_joint"] * 2
     assert headline(found).endswith(" (closed form: three parallel axes), with 1 joint too fast")
 
 
-def test_every_ghost_brings_the_tool_to_the_targets_as_the_chosen_solution_does(path: SolvedTargets) -> None:
+def test_every_ghost_brings_the_tool_to_the_targets_as_the_chosen_solution_does(path: IkResult) -> None:
     shown = scene(path)
     chosen, *others = shown.arms
     assert shown.targets is not None and shown.targets.quat_xyzw is not None and path.t_ns is not None
@@ -114,7 +114,7 @@ def test_a_ghost_is_where_another_solution_is() -> None:
     assert ghost.name == "b"
     assert np.flatnonzero(np.isfinite(ghost.q).all(axis=1)).tolist() == [0, 3]
     assert np.array_equal(ghost.q[[0, 3]], other[[0, 3]])
-    assert ghosts(replace(found, every=False)) == ()
+    assert ghosts(replace(found, all_solutions=False)) == ()
 
 
 def test_a_turn_of_a_sliding_joint_is_another_solution() -> None:
@@ -136,7 +136,7 @@ def panels(shown: Presentation) -> list[tuple[bool, bool]]:
     ]
 
 
-def test_targets_without_times_show_no_time(path: SolvedTargets) -> None:
+def test_targets_without_times_show_no_time(path: IkResult) -> None:
     q = way(5)
     q[0] = np.nan
     poses = solved(
@@ -153,7 +153,7 @@ def test_targets_without_times_show_no_time(path: SolvedTargets) -> None:
     assert (present(path).opens_at_ns, present(path).opens_at_row) == (0, None)
 
 
-def test_the_checks_are_the_verdict(path: SolvedTargets) -> None:
+def test_the_checks_are_the_verdict(path: IkResult) -> None:
     q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (30, 1))
     q[:, 0] += 0.05 * np.arange(30)  # 5 rad/s
     fast = urmpipe.ik(forward_targets(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
@@ -164,19 +164,19 @@ def test_the_checks_are_the_verdict(path: SolvedTargets) -> None:
         assert shown.verdict == shown.body.verdict == one.verdict == ("fail" if failed else "pass")
 
 
-def solutions(one: SolvedTargets) -> Table:
+def solutions(one: IkResult) -> Table:
     """The first table that is not about targets without a solution."""
     return next(table for table in present(one).body.tables if "without a solution" not in table.title)
 
 
-def test_the_table_has_the_solutions_of_the_result(path: SolvedTargets) -> None:
+def test_the_table_has_the_solutions_of_the_result(path: IkResult) -> None:
     every = urmpipe.ik(forward_targets(ARM6, way(2)), ARM6, every=True)
-    for one, rows in ((every, int(every.solutions.reached.sum())), (replace(every, every=False), 2)):
+    for one, rows in ((every, int(every.solutions.reached.sum())), (replace(every, all_solutions=False), 2)):
         table = solutions(one)
         columns = {column.key: list(column.cells) for column in table.columns}
         assert len(columns["row"]) == rows
-        frame = one.to_frame() if one.every else one.to_frame().query("nearest")
-        for key in ("miss", *ARM6.coordinates):
+        frame = one.to_frame() if one.all_solutions else one.to_frame().query("nearest")
+        for key in ("position_error", *ARM6.coordinates):
             told = [cell.number for cell in columns[key] if isinstance(cell, Value)]
             assert told == pytest.approx(frame[key].tolist(), abs=5.1e-10)  # joints are rounded to 1e-9
     joints = {column.key: list(column.cells) for column in solutions(path).columns}

@@ -26,7 +26,7 @@ def test_the_verdict_is_that_of_the_data() -> None:
     fast = urmpipe.ik(forward_targets(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
     assert fast.path is not None
     assert (fast.verdict, bool(fast.reached.all()), len(fast.path.jumps)) == ("fail", True, 0)
-    assert replace(fast, path=replace(fast.path, too_fast=())).verdict == "pass"
+    assert replace(fast, path=replace(fast.path, speed_violations=())).verdict == "pass"
     assert replace(calm, path=fast.path).verdict == "fail"
     missed = replace(calm.solutions, q=np.where(np.arange(30)[:, None, None] == 7, np.nan, calm.solutions.q))
     assert replace(calm, solutions=missed).verdict == "fail"
@@ -36,7 +36,7 @@ def test_the_verdict_is_that_of_the_data() -> None:
 def test_all_that_does_not_fit_together_is_told_at_once() -> None:
     good = solved("path", UR5E, np.tile(Q, (3, 1)), np.array([0, 5, 7]))
     with pytest.raises(LogError) as error:
-        replace(good, t_ns=np.array([0, 5, 5]), row=np.arange(2), miss=np.zeros((3, 2)))
+        replace(good, t_ns=np.array([0, 5, 5]), row=np.arange(2), position_error=np.zeros((3, 2)))
     assert {one.file for one in error.value.findings} == {"path"}
     assert [str(one) for one in error.value.findings] == [
         "path: found rows of shape (2,), allowed: (3,)",

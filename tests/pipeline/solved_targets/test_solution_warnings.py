@@ -143,7 +143,7 @@ def test_a_wrist_that_is_aligned_but_for_the_digits_of_a_file_is_told_of() -> No
     assert said.message.startswith("row 3: singular or nearly so: smallest singular value ")
     assert " in row " not in said.message
     assert not list(near_singular_warnings(arm, found, row, every, orientation=False))
-    approached = replace(found, shortfall=np.full((5, 1), 1e-3))
+    approached = replace(found, position_residual=np.full((5, 1), 1e-3))
     assert not list(near_singular_warnings(arm, approached, row, every, orientation=True))
 
 

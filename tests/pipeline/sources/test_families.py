@@ -125,7 +125,7 @@ def test_a_row_a_joint_is_told_with_the_command_that_makes_a_row_a_sample(
     path = write("\n".join([f"time{sign}joint{sign}position", *rows]))
     with pytest.raises(LogError, match="found one row per joint: joint goes round 3 names") as refused:
         read_log([path])
-    command = refused.value.findings[0].hints[0].does
+    command = refused.value.findings[0].hints[0].effect
     monkeypatch.chdir(tmp_path)
     subprocess.run([sys.executable, *shlex.split(command)[1:]], check=True)
     log = read_log([tmp_path / "table.csv"], ReadOptions(joints=names))

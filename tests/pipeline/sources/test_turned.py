@@ -87,7 +87,7 @@ def test_rows_that_begin_with_a_name_are_joints(names: list[str], head: str, rea
     np.testing.assert_array_equal(log.q, q)
     assert log.period == 0.02
     (found,) = [one for one in log.inferences if one.what == "layout"]
-    assert (found.value, found.otherwise()) == (
+    assert (found.value, found.alternatives()) == (
         "transposed", '--layout table takes each row as a sample',
     )  # fmt: skip
 

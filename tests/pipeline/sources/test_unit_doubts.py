@@ -54,7 +54,7 @@ def joints(unit: str = "", count: int = 6) -> list[str]:
 
 
 def assumed(log: JointLog) -> list[tuple[str, str | None, bool]]:
-    return [(one.assumption, one.role, one.asks) for one in log.warnings if one.assumption]
+    return [(one.assumption, one.role, one.blocks_verdict) for one in log.warnings if one.assumption]
 
 
 def follow_hints(read: Callable[..., JointLog], log: JointLog) -> None:
@@ -273,7 +273,7 @@ def test_a_rotation_vector_that_flips_tells_its_unit(read: Read) -> None:
         assert (log.units["rotvec_x"], log.warnings) == (unit, ())
         lying = [f"{name} [{'deg' if unit == 'rad' else 'rad'}]" for name in names[-3:]]
         (doubted,) = read(csv([*names[:-3], *lying], Q, FLANGE, values)).warnings
-        assert (doubted.role, doubted.asks) == ("rotation", True)
+        assert (doubted.role, doubted.blocks_verdict) == ("rotation", True)
 
 
 @pytest.mark.slow
@@ -355,8 +355,8 @@ def test_a_map_gives_nothing_that_is_only_assumed(table: str, write: Write) -> N
     assert [str(one) for one in again.warnings] == [str(one) for one in log.warnings]
     assert (again.units, again.columns) == (log.units, log.columns)
     for column in log.columns:
-        if column.doubt:
-            assert f'= "{column.unit}"  # {column.doubt}' in written
+        if column.uncertainty:
+            assert f'= "{column.unit}"  # {column.uncertainty}' in written
 
 
 def test_joints_turn_by_their_own_columns(write: Write) -> None:

@@ -212,7 +212,7 @@ def test_positions_are_not_rescaled_because_they_look_too_far(read: Read) -> Non
     assert log.tcp_position is not None
     np.testing.assert_array_equal(log.tcp_position[0], [350, -659, 625])
     (warning,) = [one for one in log.warnings if one.role == "position"]
-    assert (warning.kind, warning.assumption, warning.asks) == (
+    assert (warning.kind, warning.assumption, warning.blocks_verdict) == (
         "assumed-unit",
         "the positions are in m",
         True,
@@ -233,7 +233,7 @@ def test_a_spike_among_positions_changes_no_unit(read: Read) -> None:
     log = read(f"t,x,y,z\n{rows}")
     assert log.tcp_position is not None
     assert log.tcp_position[0].tolist() == [0.1, 0.2, 0.3]
-    assert [one.asks for one in log.warnings] == [False]
+    assert [one.blocks_verdict for one in log.warnings] == [False]
 
 
 def test_positions_in_mm_by_their_names(read: Read) -> None:

@@ -185,7 +185,7 @@ def test_a_comparison_is_one_table(comparison: Comparison, tmp_path: Path) -> No
         for what, axes in (("delta", ("x", "y", "z", "norm")), ("reference", "xyz"), ("actual", "xyz")):
             names = [f"{what}_{axis} [m]" for axis in axes]
             np.testing.assert_array_equal(own[names].to_numpy(), getattr(run, what))
-        assert own["out_of_tolerance"].tolist() == run.outside.tolist()
+        assert own["out_of_tolerance"].tolist() == run.out_of_tolerance.tolist()
     again = pd.read_parquet(write(comparison, tmp_path / "a.parquet", "parquet"))
     pd.testing.assert_frame_equal(
         again.drop(columns="clock [ns]"), frame, check_dtype=False, check_exact=True
@@ -200,7 +200,7 @@ def test_a_comparison_is_a_struct_with_a_cell_a_log(comparison: Comparison, tmp_
     for found, run in zip(struct["runs"], comparison.runs, strict=True):
         assert found["name"] == run.name
         np.testing.assert_array_equal(found["delta"], run.delta)
-        np.testing.assert_array_equal(found["out_of_tolerance"], run.outside)
+        np.testing.assert_array_equal(found["out_of_tolerance"], run.out_of_tolerance)
 
 
 def test_a_comparison_is_two_trajectories_a_log(comparison: Comparison, tmp_path: Path) -> None:

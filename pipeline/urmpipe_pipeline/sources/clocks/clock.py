@@ -211,7 +211,7 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
             hint = Hint("unit", {time.called: "ns"}, "applies this")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
-                hint = Hint("", does="a date is read if it is written as 2021-04-11 22:27:21.5")
+                hint = Hint("", effect="a date is read if it is written as 2021-04-11 22:27:21.5")
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
             raise layout.error(message, time.header, hint, *OTHER_TIME)
 

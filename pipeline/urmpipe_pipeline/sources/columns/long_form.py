@@ -33,7 +33,7 @@ def refuse_long_form(
     if not names:
         return
     found = f"one row per joint: {names[0].header} goes round {len(set(layout.cells(names[0].index)))} names"
-    hints = () if len(clock) != 1 else (Hint("", does=_command(joints[0], names[0], clock[0], layout)),)
+    hints = () if len(clock) != 1 else (Hint("", effect=_command(joints[0], names[0], clock[0], layout)),)
     raise LogError(Finding(file=layout.file, found=found, allowed="one row per sample", hints=hints))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.sources.columns.columns import Column
 
-RECORD = Hint("", does="record the missing one")
+RECORD = Hint("", effect="record the missing one")
 OTHER_ROBOT = Hint("robot", None, "gives another arm")
 NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
 

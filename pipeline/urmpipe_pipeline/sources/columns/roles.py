@@ -170,7 +170,7 @@ def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> Non
     missing = [n for n in range(first, first + len(robot.coordinates)) if n not in numbers]
     none = f" and none with number {', '.join(map(str, missing))}" if numbers and not more else ""
     message = f"found {len(joints)} joint columns ({listed(joints)}){none}, {need}"
-    hints = (NAME_JOINTS,) if more else (Hint("", does="record every joint"), OTHER_ROBOT)
+    hints = (NAME_JOINTS,) if more else (Hint("", effect="record every joint"), OTHER_ROBOT)
     raise LogError(Finding(message, file=file, hints=hints))
 
 
@@ -243,7 +243,7 @@ def _path(
     _refuse_thousands(layouts, file)
     if path:
         hints = (
-            Hint("", does="name them so in the header"),
+            Hint("", effect="name them so in the header"),
             Hint("log_map", None, 'names them: [tcp] position = ["A", "B", "C"]'),
         )
         message = f"found no position in {listed(columns)}, allowed: x, y, z"

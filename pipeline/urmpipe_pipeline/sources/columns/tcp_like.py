@@ -39,7 +39,7 @@ def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
     table = f"[tcp] position = [{quoted}]"
     said = f"{listed(alike)} look like a recorded TCP and are not read as one"
     hints = (
-        Hint("", does="name its columns tcp_x, tcp_y, tcp_z"),
+        Hint("", effect="name its columns tcp_x, tcp_y, tcp_z"),
         Hint("log_map", None, f"names them: {table}"),
     )
     return [LogWarning(TCP_NOT_READ, said, hints=hints)]
@@ -51,7 +51,7 @@ def about_odd_rows(rest: Sequence[Column], layouts: Sequence[Layout]) -> list[Lo
         columns = family.ordered()
         if len(columns) in (9, 12, 16) and (rows := odd_rows(columns, layouts)):
             found = f"{listed(columns, most=4)} hold no orientation in {counted(len(rows), 'row')}, first in"
-            hints = (Hint("", does="correct the row, or leave these cells empty"),)
+            hints = (Hint("", effect="correct the row, or leave these cells empty"),)
             return [LogWarning(TCP_NOT_READ, f"{found} this one: none is read", rows[0], hints=hints)]
     return []
 

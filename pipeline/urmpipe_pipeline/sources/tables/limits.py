@@ -22,7 +22,7 @@ UNPACKED = 64 << 20
 RATIO = 50
 """A larger file may unpack to so many times its size: logs of doubles unpack to 2 to 10 times theirs."""
 
-_ROW_A_SAMPLE = Hint("", does="write one row per sample, one column per joint")
+_ROW_A_SAMPLE = Hint("", effect="write one row per sample, one column per joint")
 
 
 def refuse_wide(columns: int, file: str, line: int | None = None) -> None:

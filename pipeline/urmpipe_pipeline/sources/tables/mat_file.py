@@ -60,7 +60,7 @@ def read_mat(path: Path, head: bytes) -> Held:
     if rows < 2 or not columns:
         names = ", ".join(list(found)[:8]) or "it"
         hint = Hint(
-            "", does=f'in MATLAB: writetable(T, "log.csv") of a table, or save("{path.name}", "t", "q")'
+            "", effect=f'in MATLAB: writetable(T, "log.csv") of a table, or save("{path.name}", "t", "q")'
         )
         said = (
             f"found no numbers with one row per sample in {names}, allowed: such as t (n x 1), q (n x joints)"

@@ -162,7 +162,7 @@ def _no_table(path: Path, arrays: Mapping[str, Array | None]) -> Finding:
         f"import numpy; numpy.savez({_written(path)!r},"
         f" **dict(numpy.load({path.as_posix()!r}, allow_pickle=True).item()))"
     )
-    hint = Hint("", does=f"only if you trust it, since loading it runs its code: {command}")
+    hint = Hint("", effect=f"only if you trust it, since loading it runs its code: {command}")
     return Finding(file=str(path), found="a Python object", allowed="arrays of numbers", hints=(hint,))
 
 
@@ -195,7 +195,7 @@ def _refuse_lengths(path: Path, tables: Mapping[str, Array]) -> None:
         f"import numpy; f = numpy.load({path.as_posix()!r});"
         f" numpy.savez({_written(path)!r}, **{{k: f[k] for k in f if {keep}}})"
     )
-    hint = Hint("", does=f"to keep those of one length: {command}")
+    hint = Hint("", effect=f"to keep those of one length: {command}")
     raise LogError(Finding(file=str(path), found=shown + more, allowed="arrays of one length", hints=(hint,)))
 
 

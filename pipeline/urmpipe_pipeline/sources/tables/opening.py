@@ -139,7 +139,7 @@ def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
     """Yield the encoding of a text."""
     for text in texts:
         mark = "byte order mark" if text.start else "its bytes"
-        utf_8 = (Hint("", does="save the file as UTF-8"),)
+        utf_8 = (Hint("", effect="save the file as UTF-8"),)
         yield Inference("encoding", text.encoding, mark, hints=utf_8)
 
 

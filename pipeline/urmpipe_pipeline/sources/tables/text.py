@@ -214,7 +214,7 @@ def _about(container: Container, path: Path) -> Finding:
         advice = advice.replace(sign, name)
     hints = (Hint(name, None, does) for name, does in container.parameters.items())
     found = f"found {container.what}, allowed: a text table"
-    return Finding(found, str(path), hints=(*([Hint("", does=advice)] if advice else []), *hints))
+    return Finding(found, str(path), hints=(*([Hint("", effect=advice)] if advice else []), *hints))
 
 
 def _no_text(path: Path, raw: bytes) -> Finding:

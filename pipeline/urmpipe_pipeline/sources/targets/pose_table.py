@@ -246,7 +246,7 @@ def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> Non
 
 def _remedies(count: int, naming: str, *, timed: bool) -> Iterator[Hint]:
     """Yield remedies for so many columns without names: a header, the form of the orientation, the time."""
-    yield Hint("", does=naming)
+    yield Hint("", effect=naming)
     yield from (Hint("rotation", form, "specifies it") for form in FORMS if 3 + column_count(form) == count)
     if not timed and count - 1 in {3, *(3 + column_count(form) for form in FORMS)}:
         yield Hint("time", "1", "if the first is the time")

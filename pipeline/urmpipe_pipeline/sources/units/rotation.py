@@ -317,7 +317,9 @@ def _with_unit(columns: Sequence[Column], choice: Choice, values: FloatArray, to
     names = ", ".join(column.name for column in columns)
     said, taken = f"{names}: {unit} ({told.evidence}) is doubted: {why}", f"the orientation is in {unit}"
     asks, hints = bool(wrapped) or size > TWO_TURNS, which_unit(columns, unit, every=False)
-    warning = LogWarning("doubted-unit", said, hints=hints, assumption=taken, role="rotation", asks=asks)
+    warning = LogWarning(
+        "doubted-unit", said, hints=hints, assumption=taken, role="rotation", blocks_verdict=asks
+    )
     return _settled(columns, choice, "their names", warning)
 
 

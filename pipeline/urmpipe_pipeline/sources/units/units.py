@@ -399,5 +399,7 @@ class UnitFinder:
         said = f"no unit is given for {names}: the {what} are taken as {unit.name}{why}"
         role: Role = "position" if what == POSITIONS else "joint"
         taken = f"the {what} are in {unit.name}"
-        doubted = LogWarning("assumed-unit", said, hints=tuple(hints), assumption=taken, role=role, asks=asks)
+        doubted = LogWarning(
+            "assumed-unit", said, hints=tuple(hints), assumption=taken, role=role, blocks_verdict=asks
+        )
         self._warn(columns, doubted)

@@ -89,7 +89,7 @@ class Reading:
 
     @property
     def asking(self) -> list[LogWarning]:
-        return [] if self.log is None else [w for w in self.log.warnings if w.asks]
+        return [] if self.log is None else [w for w in self.log.warnings if w.blocks_verdict]
 
     @property
     def said(self) -> str:

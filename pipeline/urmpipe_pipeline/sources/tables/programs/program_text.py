@@ -94,7 +94,7 @@ def read_program(segment: Segment, options: ReadOptions) -> Held | None:
         return None
     if language.read is None:
         advice = Hint(
-            "", does="write its positions as a table, such as J1 [deg],J2 [deg],... one row per position"
+            "", effect="write its positions as a table, such as J1 [deg],J2 [deg],... one row per position"
         )
         found = f"found {language.name}, allowed: a text table"
         raise LogError(Finding(found, str(segment.path), hints=(advice,)))

@@ -220,7 +220,7 @@ def _columns(program: Program, arrays: Sequence[_Array]) -> dict[str, FloatArray
         for name, length in lengths.items():
             by_length.setdefault(length, []).append(name)
         parts = (f"{n} values in {shortened(', '.join(names))}" for n, names in by_length.items())
-        delete = Hint("", does="delete the arrays that are not columns of the log")
+        delete = Hint("", effect="delete the arrays that are not columns of the log")
         raise program.error("; ".join(parts), "arrays of one length", None, delete)
     return {name: values for columns in split.values() for name, values in columns.items()}
 

@@ -124,7 +124,7 @@ def _rows(
         lengths = {name: len(array) for name, array in arrays.items()}
         if len(set(lengths.values())) > 1:
             found = ", ".join(f"{name} of {counted(count, kind.name)}" for name, count in lengths.items())
-            delete = Hint("", does="delete the others")
+            delete = Hint("", effect="delete the others")
             raise program.error(shortened(found, 200), "one array, or several of one length", None, delete)
         return _Rows(kind, arrays, f"of {', '.join(arrays)}")
     if ordered is not None and (followed := [target for target in ordered if target.kind is kind]):
