@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import made_runs
+from asserting import there
 from same_results import assert_same
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
@@ -59,113 +60,95 @@ def full(run: Run) -> Run:
     return replace(run, log=log, tcp_recorded=recorded, tcp=replace(run.tcp, singular=singular))
 
 
-def test_a_run_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run()
-    assert len(run.repolarizations) >= 2
-    assert_same(round_trip(run, tmp_path), run)
+def without_robot(run: Run) -> Run:
+    return replace(run, robot=None, tcp=None)
 
 
-def test_a_run_with_every_array_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = full(make_run())
-    assert_same(round_trip(run, tmp_path), run)
-
-
-@pytest.mark.slow
-def test_a_long_run_comes_back_in_the_order_of_time(make_run: MakeRun, tmp_path: Path) -> None:
-    run = full(make_run(rows=140_000))  # three slices: the first and the last are sent before the other
-    assert_same(round_trip(run, tmp_path), run)
-
-
-def test_a_run_without_a_robot_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = replace(make_run(), robot=None, tcp=None)
-    assert_same(round_trip(run, tmp_path), run)
-
-
-def test_a_run_on_another_grid_than_its_rows_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=1000)
+def on_another_grid(run: Run) -> Run:
     rows = np.r_[0:400, 401:1000:3]
     log = replace(run.log, t_ns=run.log.t_ns[rows] + np.arange(len(rows)) % 7, q=run.log.q[rows])
-    run = replace(run, log=log)
-    assert_same(round_trip(run, tmp_path), run)
-
-
-def test_a_run_of_one_row_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=1)
-    assert_same(round_trip(run, tmp_path), run)
+    return replace(run, log=log)
 
 
 def path_run(run: Run) -> Run:
     """Return a path: the positions of a run, without joints."""
-    assert run.tcp is not None
-    none = np.empty((run.log.rows, 0))
-    log = replace(run.log, joints=(), q=none, columns=(), tcp_position=run.tcp.position)
+    empty, position = np.empty((run.log.rows, 0)), there(run.tcp).position
+    log = replace(run.log, joints=(), q=empty, columns=(), tcp_position=position)
     return replace(
-        run, log=log, robot=None, q=none, qd=none, qdd=none, tcp=None, tcp_recorded=run.tcp.position,
-        audit=(),
-    )  # fmt: skip
+        run, log=log, robot=None, q=empty, qd=empty, qdd=empty, tcp=None, tcp_recorded=position, audit=()
+    )
 
 
-def test_a_path_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = path_run(make_run())
+def times_alone(run: Run) -> Run:
+    run = path_run(run)
+    return replace(run, log=replace(run.log, tcp_position=None), tcp_recorded=None)
+
+
+def without_any_value(run: Run) -> Run:
+    tcp = there(run.tcp)
+    none = {
+        field.name: np.full_like(run.q[:, :3], np.nan) for field in fields(tcp) if field.name != "singular"
+    }
+    return replace(run, q=np.full_like(run.q, np.nan), tcp=replace(tcp, **none))
+
+
+@pytest.mark.parametrize(
+    ("rows", "change"),
+    [
+        (1500, lambda run: run), (1, lambda run: run), (1500, full), (1000, without_robot),
+        (1000, on_another_grid), (1500, path_run), (20, times_alone), (30, without_any_value),
+        # Three slices: the first and the last are sent before the other.
+        pytest.param(140_000, full, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_a_run_comes_back_as_it_was(
+    rows: int, change: Callable[[Run], Run], make_run: MakeRun, tmp_path: Path
+) -> None:
+    run = make_run(rows=rows)
+    assert rows < 1500 or len(run.repolarizations) >= 2
+    run = change(run)
     assert_same(round_trip(run, tmp_path), run)
 
 
-def test_a_log_of_times_alone_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = path_run(make_run(rows=20))
-    run = replace(run, log=replace(run.log, tcp_position=None), tcp_recorded=None)
-    assert_same(round_trip(run, tmp_path), run)
-
-
-def test_a_path_held_against_a_path_is_recorded(make_run: MakeRun, tmp_path: Path) -> None:
+def test_a_comparison_of_paths_is_recorded(make_run: MakeRun, tmp_path: Path) -> None:
     run = path_run(make_run(rows=20))
     comparison = compare_runs(run, [run, make_run(rows=20)])
-    back = read_recording(write_recording(comparison, tmp_path / "paths.rrd"))
-    assert isinstance(back, Comparison)
+    back = round_trip(comparison, tmp_path)
     assert [one.run.log.joints for one in back.runs] == [(), make_run(rows=20).log.joints]
     np.testing.assert_array_equal(back.runs[0].actual, comparison.runs[0].actual)
 
 
-def test_a_grid_without_any_value_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=30)
-    assert run.tcp is not None
-    nothing = {field.name: np.full((30, 3), np.nan) for field in fields(run.tcp) if field.name != "singular"}
-    run = replace(run, q=np.full_like(run.q, np.nan), tcp=replace(run.tcp, **nothing))
-    assert_same(round_trip(run, tmp_path), run)
-
-
+@pytest.mark.slow
 def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_path: Path) -> None:
     comparison = make_comparison(("coppeliasim", "matlab", "solidworks"))
     assert [one.verdict for one in comparison.runs] == ["pass", "pass", "fail"]
     assert comparison.runs[2].out_of_tolerance.any()
     assert_same(round_trip(comparison, tmp_path), comparison)
-
-
-@pytest.mark.slow
-def test_what_changed_since_a_baseline_comes_back_as_it_was(
-    make_comparison: MakeComparison, tmp_path: Path
-) -> None:
-    now = make_comparison(("coppeliasim", "matlab", "solidworks"))
-    before = make_comparison(("matlab", "old"))
-    before = replace(before, tolerance={"axis": 0.002}, recording=Path("before.rrd"))
-    found = against_baseline(now, before, {"axis": 1e-5})
-    assert found.changes and found.new and found.missing and found.differences
-    held = replace(now, baseline=found)
-    assert_same(round_trip(held, tmp_path), held)
+    earlier = replace(
+        make_comparison(("matlab", "old")), tolerance={"axis": 0.002}, recording=Path("before.rrd")
+    )
+    baseline = against_baseline(comparison, earlier, {"axis": 1e-5})
+    assert baseline.changes and baseline.new and baseline.missing and baseline.differences
+    comparison = replace(comparison, baseline=baseline)
+    assert_same(round_trip(comparison, tmp_path), comparison)
 
 
 def test_a_comparison_with_samples_left_out_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
     run = make_run()
-    assert run.tcp is not None
-    position = run.tcp.position.copy()
+    position = there(run.tcp).position.copy()
     position[[0, 5, 6, 700]] = np.nan
-    run = replace(run, tcp=replace(run.tcp, position=position))
+    run = replace(run, tcp=replace(there(run.tcp), position=position))
     comparison = compare_runs(path_run(make_run(rows=1400)), [run], CompareOptions(sync=-0.1))
     assert comparison.runs[0].left_out == 101  # 20 before and 80 after the path, one NaN
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
-def test_a_log_against_itself_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    comparison = compare_recorded(full(make_run()))
+def test_comparisons_with_recorded_poses_come_back_as_they_were(make_run: MakeRun, tmp_path: Path) -> None:
+    reference, log = full(make_run("asked for")), full(make_run("log"))
+    own = compare_recorded(log)
+    assert_same(round_trip(own, tmp_path), own)
+    comparison = compare_runs(reference, [log], CompareOptions(tcp="recorded"))
+    assert (comparison.runs[0].angle is None, comparison.runs[0].left_out) == (False, 1)
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
@@ -186,7 +169,7 @@ def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
-def test_what_poses_do_not_tell_of_base_and_tool_comes_back_as_it_was(tmp_path: Path) -> None:
+def test_unobservable_frames_come_back_as_they_were(tmp_path: Path) -> None:
     still = np.tile([0.0, 0.0, 0.0, 1.0], (40, 1))
     position = np.random.default_rng(0).normal(size=(40, 3))
     reference, log = made_runs.path_run(position), made_runs.path_run(position, still, name="log")
@@ -195,41 +178,22 @@ def test_what_poses_do_not_tell_of_base_and_tool_comes_back_as_it_was(tmp_path: 
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
-def test_a_comparison_of_recorded_poses_with_gaps_comes_back_as_it_was(
-    make_run: MakeRun, tmp_path: Path
-) -> None:
-    reference, log = full(make_run("asked for")), full(make_run("log"))
-    comparison = compare_runs(reference, [log], CompareOptions(tcp="recorded"))
-    angle = comparison.runs[0].angle
-    assert angle is not None
-    assert comparison.runs[0].left_out == 1
-    assert_same(round_trip(comparison, tmp_path), comparison)
-
-
 NAMES = (
-    "a b/c.d",
-    "reference",
-    "tolerance",
-    "recorded",
-    "",
-    "",
-    "Straße 7 Ω",
-    "x\udc80y",
-    "x?y",
-    "+ /**",
-    "..",
+    "a b/c.d", "reference", "tolerance", "recorded", "", "", "Straße 7 Ω", "x\udc80y", "x?y", "+ /**", "..",
     "a\n\\b",
-)
+)  # fmt: skip
 
 
 @pytest.mark.slow
 def test_runs_may_have_any_names(make_run: MakeRun, tmp_path: Path) -> None:
-    wanted = compare_runs(make_run("reference", 40), [make_run(f"run {i}", 40) for i in range(len(NAMES))])
+    comparison = compare_runs(
+        make_run("reference", 40), [make_run(f"run {i}", 40) for i in range(len(NAMES))]
+    )
     named = tuple(
         replace(one, name=name, run=replace(one.run, name=name))
-        for one, name in zip(wanted.runs, NAMES, strict=True)
+        for one, name in zip(comparison.runs, NAMES, strict=True)
     )
-    comparison = replace(wanted, name="x\udc80y", runs=named)
+    comparison = replace(comparison, name="x\udc80y", runs=named)
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
@@ -281,13 +245,8 @@ def test_options_come_back_as_json_has_them(make_run: MakeRun, tmp_path: Path) -
     run = make_run(rows=3)
     options = {"file": Path("a/b.toml"), "range": (1, 2.5), "n": np.int64(3), "tool": np.array([0.0, 0.1])}
     run = replace(run, provenance=replace(run.provenance, options=options))
-    back = round_trip(run, tmp_path)
-    assert back.provenance.options == {
-        "file": str(Path("a/b.toml")),
-        "range": [1, 2.5],
-        "n": 3,
-        "tool": [0.0, 0.1],
-    }
+    stored = {"file": str(Path("a/b.toml")), "range": [1, 2.5], "n": 3, "tool": [0.0, 0.1]}
+    assert round_trip(run, tmp_path).provenance.options == stored
 
 
 @pytest.mark.slow
@@ -322,23 +281,13 @@ def test_progress_is_told_up_to_one(make_run: MakeRun, tmp_path: Path) -> None:
     assert (shares[0] > 0.0, shares[-1]) == (True, 1.0)
 
 
-def test_a_recording_is_replaced_by_a_new_one(
-    make_run: MakeRun, make_comparison: MakeComparison, tmp_path: Path
-) -> None:
-    path = write_recording(make_run(), tmp_path / "one.rrd")
-    comparison = make_comparison()
-    assert_same(read_recording(write_recording(comparison, path)), comparison)
-
-
 def test_an_input_is_never_replaced(make_run: MakeRun, tmp_path: Path) -> None:
     path = write_recording(make_run(rows=5), tmp_path / "one.rrd")
     before = path.read_bytes()
     with pytest.raises(OutputError) as caught:
         write_recording(make_run(rows=6), path, inputs=[tmp_path / "log.csv", path])
-    assert (
-        str(caught.value)
-        == f"{path}: found an input of this command, allowed: any other name for the recording"
-    )
+    message = f"{path}: found an input of this command, allowed: any other name for the recording"
+    assert str(caught.value) == message
     assert path.read_bytes() == before
 
 

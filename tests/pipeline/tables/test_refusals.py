@@ -18,7 +18,7 @@ from urmpipe_models.errors import OptionError, OutputError, RecordingError, Urmp
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.exports import Times
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.tables import FORMATS, ExportOptions, Format, csv_files, format_of, typed_files
+from urmpipe_pipeline.tables import ExportOptions, Format, csv_files, typed_files
 from urmpipe_pipeline.tables.csv_files import find_line_differences, to_text_columns, write_lines
 from urmpipe_pipeline.tables.export import is_export, write_all
 
@@ -31,60 +31,16 @@ def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
     return caught.value.findings[0].sentence()
 
 
-def test_options_that_make_no_sense() -> None:
-    options: Any = ExportOptions
-    assert (
-        said(OptionError, lambda: options("xlsx")) == "to (--to): found xlsx, allowed: csv, parquet, mat, tum"
-    )
-    rows = "grid, file, velocities, samples, criteria"
-    assert said(OptionError, lambda: options("csv", "own")) == f"rows (--rows): found own, allowed: {rows}"
-    assert (
-        said(OptionError, lambda: options("tum", None, "ik"))
-        == "tcp (--tcp): found ik, allowed: fk, recorded"
-    )
-    assert said(OptionError, lambda: options("csv", tcp="fk")) == (
-        "tcp (--tcp): found fk with a table (csv), allowed: with trajectories; --to tum writes them"
-    )
-
-
-def test_recorded_poses_stand_at_the_rows_of_the_file(run: Run, tmp_path: Path) -> None:
-    work = lambda: export_result(run, tmp_path / "a.tum", ExportOptions("tum", "grid", "recorded"))  # noqa: E731
-    assert said(OptionError, work) == (
-        "rows (--rows): found grid with recorded poses, which are at other rows, allowed: file"
-    )
-
-
-def test_the_suffix_tells_the_format_unless_it_is_given() -> None:
-    assert [format_of(None, Path(f"a.{to.upper()}")) for to in FORMATS] == list(FORMATS)
-    assert format_of("csv", Path("a.txt")) == "csv"
-    assert said(OptionError, lambda: format_of(None, Path("a.txt"))) == (
-        "to (--to): found the output a.txt, allowed: csv, parquet, mat, tum, or an output with that suffix"
-    )
-    assert format_of(None, None) == "csv"
-
-
 def test_a_comparison_has_the_samples_that_it_compared(comparison: Comparison, tmp_path: Path) -> None:
     work = lambda: export_result(comparison, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
     assert said(OptionError, work) == "rows (--rows): found file with a comparison, allowed: compared"
 
 
-def test_a_trajectory_needs_poses(run: Run, tmp_path: Path) -> None:
-    def of(changed: Run, **options: Any) -> str:
-        message = said(
-            RecordingError,
-            lambda: export_result(changed, tmp_path / "a.tum", ExportOptions("tum", **options)),
-        )
-        assert not list(tmp_path.iterdir())
-        return message
-
-    assert of(replace(run, robot=None)) == (
-        "no robot, so no pose; urmpipe ingest --robot NAME|FILE gives it; --tcp recorded takes what the log"
-        " recorded"
-    )
-    assert of(run, tcp="recorded") == (
-        "no recorded orientation, so no recorded pose; --tcp fk takes the poses of a robot"
-    )
-    assert of(replace(run, q=np.full_like(run.q, np.nan))) == "no row with a pose"
+def test_a_trajectory_needs_a_row_with_a_pose(run: Run, tmp_path: Path) -> None:
+    empty = replace(run, q=np.full_like(run.q, np.nan))
+    work = lambda: export_result(empty, tmp_path / "a.tum", ExportOptions("tum"))  # noqa: E731
+    assert said(RecordingError, work) == "no row with a pose"
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_log_that_came_from_no_file_has_no_columns_of_one(run: Run, tmp_path: Path) -> None:
@@ -111,16 +67,6 @@ def test_an_export_of_ours_is_replaced_and_nothing_else(run: Run, tmp_path: Path
             "found a file that is not an export of urmpipe, allowed: a new name, or such an export to replace"
         )
         assert path.read_bytes() == foreign
-
-
-def test_a_csv_is_never_replaced_even_if_it_is_ours(run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    export_result(run, path, ExportOptions("csv"))
-    before = path.read_bytes()
-    assert said(OutputError, lambda: export_result(run, path, ExportOptions("csv", "file"))) == (
-        "found a file, allowed: a new name; an existing CSV file is never replaced"
-    )
-    assert path.read_bytes() == before
 
 
 def test_what_a_mat_file_cannot_hold_is_said_before_it_is_written(

@@ -10,14 +10,11 @@ from decimal import Decimal
 from pathlib import Path
 
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scipy.io import loadmat
 
 import urmpipe
-from urmpipe_pipeline.tables import FORMATS, Format
 from urmpipe_pipeline.tables.csv_files import EXPONENTS
 
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "latin-1")
@@ -134,102 +131,6 @@ def test_what_was_read_leaves_as_it_was(specimen: Specimen) -> None:
                 assert abs(float(one) - float(other)) <= ulp
 
 
-def test_numbers_as_people_write_them_come_back_to_the_letter(tmp_path: Path) -> None:
-    text = "t [ms],q2 [deg],q1 [deg],x [mm],y [mm],z [mm]\n" + "".join(
-        f"{4 * k}.25,{147.3 + k},{-0.1 * k - 0.5:.3g},{250.5 - k},{1e-3 * (k + 1):.6g},{k + 0.125}\n"
-        for k in range(5)
-    )
-    (tmp_path / "log.csv").write_text(text)
-    run = urmpipe.ingest(tmp_path / "log.csv")
-    urmpipe.export(run, tmp_path / "again.csv", rows="file")
-    there = pd.read_csv(tmp_path / "log.csv", dtype=str)
-    back = pd.read_csv(tmp_path / "again.csv", dtype=str)
-    assert list(back.columns) == list(there.columns)
-    assert back["t [ms]"].tolist() == there["t [ms]"].tolist()
-    for name in back.columns[1:]:
-        assert back[name].astype(float).tolist() == there[name].astype(float).tolist()
-    assert back["q2 [deg]"].tolist() == ["147.3", "148.3", "149.3", "150.3", "151.3"]
-
-
-def test_a_log_without_a_header_gets_names_and_one_without_a_clock_gets_none(tmp_path: Path) -> None:
-    (tmp_path / "bare.csv").write_text("0.0,0.1,2.5\n0.01,0.3,2.4\n0.02,0.4,2.9\n")
-    urmpipe.export(urmpipe.ingest(tmp_path / "bare.csv"), tmp_path / "a.csv", rows="file")
-    assert (
-        tmp_path / "a.csv"
-    ).read_text() == "t [s],q1 [rad],q2 [rad]\n0.00,0.1,2.5\n0.01,0.3,2.4\n0.02,0.4,2.9\n"
-    (tmp_path / "timeless.csv").write_text("q1,q2\n1,2\n1.5,2.5\n")
-    urmpipe.export(urmpipe.ingest(tmp_path / "timeless.csv"), tmp_path / "b.csv", rows="file")
-    assert (tmp_path / "b.csv").read_text() == "q1,q2\n1,2\n1.5,2.5\n"
-
-
-def test_files_that_share_a_header_leave_as_one_table_with_names_of_their_own(tmp_path: Path) -> None:
-    for k in (1, 2):
-        text = "Time (sec),Angular Displacement (deg)\n" + "".join(
-            f"{0.1 * t:.1f},{10 * k + t}\n" for t in range(4)
-        )
-        (tmp_path / f"phi{k}.csv").write_text(text)
-    run = urmpipe.ingest([tmp_path / "phi1.csv", tmp_path / "phi2.csv"])
-    result = urmpipe.export(run, tmp_path / "both.csv", rows="file")
-    assert (tmp_path / "both.csv").read_text().splitlines()[:2] == [
-        "Time (sec),phi1 [deg],phi2 [deg]",
-        "0.0,10,20",
-    ]
-    assert result.columns == (("Time (sec)", "s"), ("phi1 [deg]", "deg"), ("phi2 [deg]", "deg"))
-
-
-def test_seconds_and_nanoseconds_leave_as_two_columns(tmp_path: Path) -> None:
-    text = "header.stamp.sec,header.stamp.nanosec,q1 [rad]\n1700000000,999999999,0.5\n1700000001,9,0.75\n"
-    (tmp_path / "log.csv").write_text(text)
-    urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
-    assert (tmp_path / "again.csv").read_text() == text
-
-
-def test_columns_that_were_not_used_are_named(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("t,q1,battery,qd1\n0,1,12.5,\n1,2,12.6,\n2,3,12.7,\n")
-    result = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
-    assert [warning.message for warning in result.warnings] == [
-        "qd1: not ingested, since a column of them was empty",
-        "battery: not ingested (no role is known for them), so they cannot be exported",
-    ]
-    assert [name for name, _ in result.columns] == ["t", "q1"]
-
-
-def test_units_that_the_names_do_not_tell_are_told(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("t,q1,q2 (arm),q3 [deg]\n0,1,2,3\n1,2,3,4\n")
-    run = urmpipe.ingest(tmp_path / "log.csv", unit="deg")
-    result = urmpipe.export(run, tmp_path / "again.csv", rows="file")
-    assert [warning.message for warning in result.warnings] == [
-        "q1, q2: in deg, which their names do not give"
-    ]
-    assert result.columns[1] == ("q1", "deg")
-    assert not urmpipe.export(run, tmp_path / "again.parquet", rows="file").warnings
-
-
-def test_a_clock_that_the_file_did_not_have_does_not_leave_with_it(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("q1,q2\n1,2\n1.5,2.5\n")
-    run = urmpipe.ingest(tmp_path / "log.csv")
-    urmpipe.export(run, tmp_path / "a.parquet", rows="file")
-    assert pq.read_table(tmp_path / "a.parquet").column_names == ["q1", "q2"]
-    urmpipe.export(run, tmp_path / "a.mat", rows="file")
-    assert loadmat(tmp_path / "a.mat", simplify_cells=True)["run"]["clock_ns"].size == 0
-
-
-def test_a_missing_sample_of_the_only_column_stays_a_row(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("q1,note\n1,a\n,b\n3,c\n")
-    urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
-    assert pd.read_csv(tmp_path / "again.csv")["q1"].isna().tolist() == [False, True, False]
-
-
-@pytest.mark.parametrize("to", FORMATS[:3])
-def test_a_path_leaves_though_a_robot_was_named(tmp_path: Path, to: Format) -> None:
-    (tmp_path / "path.csv").write_text("t,x,y,z\n0,1,2,3\n1,1,2,4\n2,1,2,5\n")
-    run = urmpipe.ingest(tmp_path / "path.csv", robot="urm6")
-    for rows in ("grid", "file"):
-        result = urmpipe.export(run, tmp_path / f"{rows}.{to}", rows=rows)
-        assert result.files[0].rows == 3
-        assert len(result.columns) == 4
-
-
 def test_the_grid_is_a_log_again(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(
         "t,q1 [deg],q2 [deg]\n" + "".join(f"{k},{3 * k},{-k}\n" for k in range(9))
@@ -240,51 +141,3 @@ def test_the_grid_is_a_log_again(tmp_path: Path) -> None:
     assert again.log.joints == run.log.joints
     for name in ("q", "qd", "qdd", "t_ns"):
         assert (getattr(again, name) == getattr(run, name)).all()
-
-
-LOG_OF_TIMES = "time,q1 [rad]\n{},0.5\n{},0.75\n{},0.875\n"
-
-
-@pytest.mark.parametrize(
-    "times",
-    [
-        ("23:59:59.500", "00:00:00.000", "00:00:00.500"),
-        ("25:10:00.000", "25:10:00.005", "25:10:00.010"),
-        ("-00:00:01", "00:00:00", "00:00:01"),
-    ],
-)
-def test_times_of_day_leave_as_the_file_counts_them(tmp_path: Path, times: tuple[str, ...]) -> None:
-    (tmp_path / "log.csv").write_text(LOG_OF_TIMES.format(*times))
-    result = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
-    assert (tmp_path / "again.csv").read_text() == (tmp_path / "log.csv").read_text()
-    assert not result.warnings
-
-
-def test_dates_with_a_time_zone_are_said_to_leave_in_utc(tmp_path: Path) -> None:
-    zoned = [f"2021-04-11T23:59:5{k}+02:00" for k in range(3)]
-    (tmp_path / "log.csv").write_text(LOG_OF_TIMES.format(*zoned))
-    result = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
-    assert [warning.message for warning in result.warnings] == [
-        "date and time, year first with a time zone: the dates are exported in UTC"
-    ]
-    assert pd.read_csv(tmp_path / "again.csv")["time"][0] == "2021-04-11T21:59:50"
-    (tmp_path / "plain.csv").write_text(LOG_OF_TIMES.format(*(one[:19] for one in zoned)))
-    assert not urmpipe.export(
-        urmpipe.ingest(tmp_path / "plain.csv"), tmp_path / "b.csv", rows="file"
-    ).warnings
-
-
-def test_times_that_were_rebuilt_and_rows_that_were_left_out_are_said(tmp_path: Path) -> None:
-    lines = [f"{k // 10},{k * 0.001}" for k in range(200)]
-    (tmp_path / "log.csv").write_text("\n".join(["t [s],q1 [rad]", *lines]) + "\n")
-    rebuilt = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "a.csv", rows="file")
-    assert [warning.message for warning in rebuilt.warnings] == [
-        "the file's own times, which were not kept: times in steps of 1 s cover 10 rows each: a regular"
-        " clock of 0.1 s is used instead"
-    ]
-    bad = [f"{k * 0.1:.1f},{'oops' if k == 50 else k * 0.001}" for k in range(200)]
-    (tmp_path / "bad.csv").write_text("\n".join(["t [s],q1 [rad]", *bad]) + "\n")
-    run = urmpipe.ingest(tmp_path / "bad.csv", skip_bad=True)
-    left = urmpipe.export(run, tmp_path / "b.csv", rows="file").warnings
-    assert [(warning.kind, warning.row) for warning in left] == [("not-exported", 51)]
-    assert left[0].message.startswith("data row 51 of the file is left out: ")
