@@ -47,10 +47,10 @@ def write(path: Path, q: FloatArray) -> Path:
     return path
 
 
-def command(reference: Path, logs: list[Path], output: Path, *options: str) -> list[str]:
-    """Return the command that compares logs."""
-    arm = ["--robot", "urm6", "--unit", "rad", "--tolerance"]
-    return [*URMPIPE, "compare", str(reference), *map(str, logs), *arm, *options, "-q", "-o", str(output)]
+def command(name: str, reference: Path, logs: list[Path], output: Path, tolerance: str) -> list[str]:
+    """Return the command that compares logs, or evaluates them as cycles."""
+    options = ["--robot", "urm6", "--unit", "rad", "--tolerance", tolerance, "-q", "-o", str(output)]
+    return [*URMPIPE, name, str(reference), *map(str, logs), *options]
 
 
 def main(count: int) -> None:
@@ -65,13 +65,11 @@ def main(count: int) -> None:
         whole = write(folder / "all.csv", np.vstack(done))
         outputs = {name: folder / f"{name}.rrd" for name in ("files", "one", "plain")}
         commands = {
-            f"compare --iso, {CYCLES} files": command(
-                reference, files, outputs["files"], "AT=1mm,RT=1mm", "--iso"
+            f"iso, {CYCLES} files": command("iso", reference, files, outputs["files"], "AT=1mm,RT=1mm"),
+            f"iso, one file of {CYCLES * ROWS} rows": command(
+                "iso", reference, [whole], outputs["one"], "AT=1mm,RT=1mm"
             ),
-            f"compare --iso, one file of {CYCLES * ROWS} rows": command(
-                reference, [whole], outputs["one"], "AT=1mm,RT=1mm", "--iso"
-            ),
-            f"compare, {CYCLES} files": command(reference, files, outputs["plain"], "3.5mm"),
+            f"compare, {CYCLES} files": command("compare", reference, files, outputs["plain"], "3.5mm"),
         }
         taken = rounds(commands, count)
         sizes = [f"{key} {path.stat().st_size / 1e6:.0f} MB" for key, path in outputs.items()]

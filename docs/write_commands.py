@@ -12,14 +12,15 @@ from pathlib import Path
 
 import click
 
-from urmpipe.main import COMMANDS, cli
+from urmpipe.main import cli, find_commands
 
 PAGE = Path(__file__).resolve().parent / "commands.md"
 WIDTH = 80
 
 PAGES = {
     "ingest": "[logs.md](logs.md), [recording-logs.md](recording-logs.md)",
-    "compare": "[compare.md](compare.md), [iso.md](iso.md), [ci.md](ci.md)",
+    "compare": "[compare.md](compare.md), [ci.md](ci.md)",
+    "iso": "[iso.md](iso.md)",
     "diagnose": "[diagnose.md](diagnose.md)",
     "robot": "[robots.md](robots.md), [dynamics.md](dynamics.md)",
     "ik": "[ik.md](ik.md), [targets.md](targets.md)",
@@ -56,9 +57,9 @@ user. A file that others may write is a warning (`defaults-writable`).
 Options on the command line override them all. A command prints the defaults that it uses, and their file.
 The line of a verdict of `compare` and `diagnose` names the file that sets `tolerance`, `align`, `sync` or
 `skip-bad`.
-Options for the output of a single call (`output`, `json`, `junit`, `csv`, `baseline`, `audit`, `write-map`,
-`explain`, `draw`, `list`) have no default. An upper file's `tool` also applies to the `robot` of a nearer
-file, unless that file sets `tool`, too.
+Options for a single call (`output`, `json`, `junit`, `csv`, `baseline`, `audit`, `write-map`, `explain`,
+`draw`, `picture`, `list`, `write-system`, `debug`) have no default. An upper file's `tool` also applies to
+the `robot` of a nearer file, unless that file sets `tool`, too.
 
     robot = "ur5e"
     tool = [0, 0, 0.15]
@@ -70,7 +71,7 @@ file, unless that file sets `tool`, too.
 
 def commands() -> Iterator[tuple[str, click.Context]]:
     """Yield the words of each command and its context; groups before the commands in them."""
-    for name in COMMANDS:
+    for name in find_commands():
         command = cli.get_command(click.Context(cli), name)
         if command is None:
             raise KeyError(name)
@@ -85,7 +86,7 @@ def page() -> str:
     """Return the page."""
     rows = [
         f"| [`{name}`](#urmpipe-{name}) | {short} | {PAGES.get(name, '')} |"
-        for name, short in COMMANDS.items()
+        for name, short in find_commands().items()
     ]
     sections = [f"\n## urmpipe {words}\n\n```text\n{_help(context)}\n```\n" for words, context in commands()]
     return INTRODUCTION + "\n".join(rows) + "\n" + SHARED + "".join(sections)

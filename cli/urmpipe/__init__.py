@@ -4,6 +4,7 @@
     run = urmpipe.ingest("log.csv", robot="urm6")
     comparison = urmpipe.compare("path.csv", "log.csv", robot="urm6")
     urmpipe.diagnose("path.csv", "log.csv", robot="urm6").summary
+    urmpipe.iso("path.csv", "test.csv", robot="urm6", tolerance="AP=0.4mm")
     urmpipe.report(comparison, "report.html")
     urmpipe.export(run, "log.parquet")
     simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv", "reference": "path.csv"})
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from urmpipe.api.export import export as export
     from urmpipe.api.ik import ik as ik
     from urmpipe.api.ingest import ingest as ingest
+    from urmpipe.api.iso import iso as iso
     from urmpipe.api.load_robot import load_robot as load_robot
     from urmpipe.api.network import load_network as load_network
     from urmpipe.api.network import network_check as network_check
@@ -48,10 +50,10 @@ if TYPE_CHECKING:
     from urmpipe.api.simulate import simulate as simulate
     from urmpipe.api.view import view as view
     from urmpipe.api.write_map import write_map as write_map
-    from urmpipe.keyword_checks import UrmpipeWarning as UrmpipeWarning
-    from urmpipe.reading import LogReading as LogReading
-    from urmpipe.reading import Reading as Reading
-    from urmpipe.reading import TableReading as TableReading
+    from urmpipe.parameters.shared import LogReading as LogReading
+    from urmpipe.parameters.shared import Reading as Reading
+    from urmpipe.parameters.shared import TableReading as TableReading
+    from urmpipe.public_functions import UrmpipeWarning as UrmpipeWarning
     from urmpipe_fmus.build.fmu import BuiltFmu as BuiltFmu
     from urmpipe_models.arm.chain import Chain as Chain
     from urmpipe_models.errors import CosimulationError as CosimulationError
@@ -103,7 +105,7 @@ _HOME = {
     "IkResult": "urmpipe_pipeline.solved_targets.result",
     "JointLog": "urmpipe_pipeline.joint_log",
     "LogError": "urmpipe_models.errors",
-    "LogReading": "urmpipe.reading",
+    "LogReading": "urmpipe.parameters.shared",
     "LogMap": "urmpipe_pipeline.sources",
     "Network": "urmpipe_models.networks.file",
     "NetworkError": "urmpipe_models.errors",
@@ -111,7 +113,7 @@ _HOME = {
     "NetworkResult": "urmpipe_pipeline.networks.result",
     "OptionError": "urmpipe_models.errors",
     "OutputError": "urmpipe_models.errors",
-    "Reading": "urmpipe.reading",
+    "Reading": "urmpipe.parameters.shared",
     "PathError": "urmpipe_models.errors",
     "PathRows": "urmpipe_models.planning.path",
     "PlannedPath": "urmpipe_pipeline.planned_paths.result",
@@ -121,12 +123,12 @@ _HOME = {
     "RobotError": "urmpipe_models.errors",
     "Run": "urmpipe_pipeline.runs.run",
     "Simulation": "urmpipe_pipeline.simulations.simulation",
-    "TableReading": "urmpipe.reading",
+    "TableReading": "urmpipe.parameters.shared",
     "Targets": "urmpipe_models.ik.solutions",
     "Transform": "urmpipe_models.math3d",
     "UnitError": "urmpipe_models.errors",
     "UrmpipeError": "urmpipe_models.errors",
-    "UrmpipeWarning": "urmpipe.keyword_checks",
+    "UrmpipeWarning": "urmpipe.public_functions",
     "ViewerError": "urmpipe_models.errors",
     "accuracy": "urmpipe.api.accuracy",
     "build_fmu": "urmpipe.api.build_fmu",
@@ -136,6 +138,7 @@ _HOME = {
     "export": "urmpipe.api.export",
     "ik": "urmpipe.api.ik",
     "ingest": "urmpipe.api.ingest",
+    "iso": "urmpipe.api.iso",
     "load_network": "urmpipe.api.network",
     "load_robot": "urmpipe.api.load_robot",
     "network_check": "urmpipe.api.network",

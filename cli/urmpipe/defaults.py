@@ -14,38 +14,73 @@ first. Files named in a file are seen from its own folder.
 
 from __future__ import annotations
 
-import json
 import os
 import stat
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from urmpipe.command_line import ParamOption
     from urmpipe_models.errors import Finding
     from urmpipe_pipeline.joint_log import LogWarning
 
 NAME = "urmpipe.toml"
 
-EACH_TIME = (
-    "--output", "--audit", "--write-map", "--explain", "--json", "--junit", "--csv", "--baseline", "--draw",
-    "--list",
-)  # fmt: skip
-"""Options of what one call is to give: no file says them for all."""
 
-FILES = ("robot", "map", "log-map")
-"""Options whose value may be a file."""
+@dataclass(frozen=True, slots=True)
+class Defaults:
+    """The defaults of a command.
 
-TABLES = ("tolerance", "noise")
-"""Options whose value may be a table: what the command line has as KIND=VALUE,..."""
+    Attributes:
+        by_file: The values that each urmpipe.toml sets, the nearest file first, by the long names of options
+            without dashes.
+        warnings: About files among them that other users may write.
+    """
+
+    by_file: dict[Path, dict[str, Any]]
+    warnings: tuple[LogWarning, ...] = ()
+
+    def report(self, *, quiet: bool) -> None:
+        """Print the defaults of each file and the warnings about files on standard error, unless quiet."""
+        if quiet:
+            return
+        from urmpipe.printing.terminal import print_warnings, say
+
+        for path, values in self.by_file.items():
+            settings = (f"{name}={_format_value(value)}" for name, value in values.items())
+            say(f"note: defaults of {path}: {', '.join(settings)}", err=True)
+        print_warnings(self.warnings)
+
+    def origins(self, options: Collection[str]) -> Iterator[str]:
+        """Yield the settings of some options by file: "sync=auto from ../urmpipe.toml"."""
+        for path, values in self.by_file.items():
+            settings = [f"{name}={_format_value(value)}" for name, value in values.items() if name in options]
+            if settings:
+                yield f"{', '.join(settings)} from {Path(relpath(path)).as_posix()}"
+
+    def file_of(self, option: str) -> Path:
+        """Return the file that sets an option."""
+        return next(path for path, values in self.by_file.items() if option in values)
+
+
+def _format_value(value: Any) -> str:
+    """Return a default as TOML has it, without quotes; a table as KIND=VALUE,..."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return ",".join(f"{name}={_format_value(item)}" for name, item in value.items())
+    return ",".join(map(_format_value, value)) if isinstance(value, list) else str(value)
 
 
 def find_defaults() -> list[Path]:
     """Return each `urmpipe.toml` in the working folder and above it, the nearest first.
 
-    Folders above the one with `.git`, above the home folder, and those of another user have no say.
+    The search ends at a folder with `.git`, at the home folder, and at a folder of another user.
     """
     working = Path.cwd()
     try:
@@ -109,9 +144,9 @@ def deciding_defaults(
     by_file = {}
     each = map_collecting_errors(lambda path: defaults_for(command, path, commands), files)
     for path, values in zip(files, each, strict=True):
-        if own := {name: value for name, value in values.items() if name not in decided}:
-            by_file[path] = own
-        decided |= own.keys()
+        if deciding := {name: value for name, value in values.items() if name not in decided}:
+            by_file[path] = deciding
+        decided |= deciding.keys()
     return by_file
 
 
@@ -130,72 +165,78 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
     from urmpipe_models.toml_tables import read_toml
 
     data = read_toml(path, OptionError)
-    faults = list(_faults(data, path, commands))
-    if faults:
+    if faults := list(_faults(data, path, commands)):
         raise OptionError(*faults)
-    own = _options(command)
-    given = {
-        key: value
-        for key, value in data.items()
-        if key in own and (key in TABLES or not isinstance(value, Mapping))
+    options = _options(command)
+    is_table = {key: isinstance(value, Mapping) and key in commands for key, value in data.items()}
+    values = {key: value for key, value in data.items() if key in options and not is_table[key]}
+    values |= data.get(command.name or "", {})
+    return {
+        options[key].name or key: _to_option_value(value, options[key], path.parent)
+        for key, value in values.items()
     }
-    given |= data.get(command.name or "", {})
-    return {own[key].name or key: _text(key, value, own[key], path.parent) for key, value in given.items()}
 
 
 def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Command]) -> Iterator[Finding]:
-    """Yield what is wrong with the keys of a file."""
+    """Yield the faults of the keys of a file."""
     from urmpipe_models.errors import Finding, format_unknown_name
 
-    every = {name: option for one in commands.values() for name, option in _options(one).items()}
+    all_options = {
+        name: option for command in commands.values() for name, option in _options(command).items()
+    }
     for key, value in data.items():
-        place = ""
+        table = ""
         if isinstance(value, Mapping) and key in commands:
-            own, place = _options(commands[key]), f"{key}."
-            faults = [_fault(name, inner, own) for name, inner in value.items()]
-        elif isinstance(value, Mapping) and key not in every:
+            options, table = _options(commands[key]), f"{key}."
+            faults = [_key_fault(name, options, all_options) for name in value]
+        elif isinstance(value, Mapping) and key not in all_options:
             faults = [f"{key}: {format_unknown_name(key, commands)}"]
         else:
-            faults = [_fault(key, value, every)]
-        yield from (Finding(f"key {place}{fault}", str(path)) for fault in faults if fault)
+            faults = [_key_fault(key, all_options, all_options)]
+        yield from (Finding(f"key {table}{fault}", str(path)) for fault in faults if fault)
 
 
-def _fault(name: str, value: Any, allowed: Mapping[str, click.Option]) -> str | None:
-    """Return what is wrong with one key and its value; None if nothing is."""
+def _key_fault(
+    name: str, options: Mapping[str, ParamOption], all_options: Mapping[str, ParamOption]
+) -> str | None:
+    """Return what is wrong with a key, or None; its value is read as that of an option."""
     from urmpipe_models.errors import format_names, format_suggestion
 
-    if f"--{name}" in EACH_TIME:
+    allowed = [key for key, option in options.items() if not option.param.each_call]
+    if name in allowed:
+        return None
+    if name in all_options and all_options[name].param.each_call:
         return f"{name}: found an option of a single call, allowed: --{name} on the command line"
-    if name not in allowed:
-        hint = format_suggestion(name, allowed)
-        return f"{name}: unknown{hint}; allowed: {format_names(name, sorted(allowed))}"
-    if isinstance(value, Mapping) and name not in TABLES:
-        return f"{name}: found a table, allowed: a value"
-    if allowed[name].is_flag != isinstance(value, bool):
-        kinds = "true or false" if allowed[name].is_flag else "a text, a number, or a list of them"
-        return f"{name}: found {json.dumps(value, default=str)}, allowed: {kinds}"
-    return None
+    return (
+        f"{name}: unknown{format_suggestion(name, allowed)}; allowed: {format_names(name, sorted(allowed))}"
+    )
 
 
-def _options(command: click.Command) -> dict[str, click.Option]:
-    """Return the options of a command that a file may set, by their long names without dashes."""
-    found = {}
-    for param in command.params:
-        if isinstance(param, click.Option) and param.expose_value:
-            for name in (*param.opts, *param.secondary_opts):
-                if name.startswith("--") and name not in EACH_TIME:
-                    found[name.removeprefix("--")] = param
-    return found
+def _options(command: click.Command) -> dict[str, ParamOption]:
+    """Return the options of a command by their long names without dashes."""
+    return {
+        name.removeprefix("--"): option
+        for option in command.params
+        if hasattr(option, "param")
+        for name in option.opts
+        if name.startswith("--")
+    }
 
 
-def _text(key: str, value: Any, option: click.Option, folder: Path) -> Any:
-    """Return a value as the command line would give it."""
-    if key in FILES and isinstance(value, str) and Path(value).suffix:
-        return str(folder / value)
+def _to_option_value(value: Any, option: ParamOption, folder: Path) -> Any:
+    """Return a value as click passes it to its option: numbers as texts, files from its folder."""
+    if option.is_flag:
+        return value
+    if option.param.kind.is_file and isinstance(value, str) and Path(value).suffix:
+        value = str(folder / value)
+    value = _to_text(value)
+    return [value] if option.multiple else value
+
+
+def _to_text(value: Any) -> Any:
+    """Return a value with its numbers as texts, which need a unit where a text does."""
     if isinstance(value, Mapping):
-        value = ",".join(f"{name}={inner}" for name, inner in value.items())
-    if option.multiple:
-        return [str(one) for one in value] if isinstance(value, list) else [str(value)]
+        return {name: _to_text(item) for name, item in value.items()}
     if isinstance(value, list):
-        return ",".join(map(str, value))
-    return value if option.is_flag else str(value)
+        return [_to_text(item) for item in value]
+    return value if isinstance(value, bool) else str(value)

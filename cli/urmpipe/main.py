@@ -7,14 +7,16 @@ checks), 2 bad input or usage.
 from __future__ import annotations
 
 import gc
+import io
 import os
 import signal
 import sys
 import time
 import warnings
 from _thread import interrupt_main, start_new_thread
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -22,57 +24,71 @@ from typing import Any
 import click
 
 from urmpipe import __version__
-from urmpipe.defaults import deciding_defaults, find_defaults, shared_files
-from urmpipe.error_boundary import (
-    close_streams,
-    findings_of,
-    leave_output,
-    open_streams,
-    print_findings,
-    tell_junit_of,
+from urmpipe.answers import (
+    ERROR,
+    discard_output,
+    discard_stream,
+    error_to_findings,
+    print_errors,
+    write_junit_errors,
 )
-from urmpipe.usage import Defaults, Group
+from urmpipe.command_line import Group, long_name
+from urmpipe.defaults import Defaults, deciding_defaults, find_defaults, shared_files
 
-COMMANDS = {
-    "demo": "Run the whole workflow on example logs.",
-    "ingest": "Turn one log into a recording.",
-    "compare": "Compare logs with a reference and give a verdict.",
-    "diagnose": "Find out why a log deviates from its reference.",
-    "report": "Write the HTML report of recordings.",
-    "view": "Open recordings in the viewer.",
-    "export": "Write a recording as CSV, Parquet, MAT or TUM.",
-    "robot": "List, show and export robots.",
-    "ik": "Find joint values for poses of the tool.",
-    "plan": "Plan a path of lines and arcs, and its timing.",
-    "accuracy": "Measure the path error of an arm with drives.",
-    "network": "Assemble kinematic networks and compute their mobility.",
-    "fmu": "List units, build and check FMUs.",
-    "simulate": "Run a system of blocks.",
-}
-"""Each command and its short help: --help must not import them all (a test holds both together)."""
+FOLDER = Path(__file__).with_name("commands")
+ORDER = (  # of the data; other commands follow by their names
+    "demo", "ingest", "compare", "iso", "diagnose", "report", "view", "export", "robot", "ik", "plan",
+    "accuracy", "network", "fmu", "simulate",
+)  # fmt: skip
 
-COLLECT_AT = 100_000
-"""Objects made before Python looks for cycles among them. Python's own 700 cost a command, which first of
-all imports thousands of them, a tenth of a second."""
+GARBAGE_THRESHOLD = (
+    100_000  # objects between two searches for cycles; with Python's 700 imports take 10 % longer
+)
+
+
+def find_commands() -> dict[str, str]:
+    """Return the commands with their short help: the modules in `commands`, and the first line of each.
+
+    `urmpipe --help` needs them without importing the modules.
+    """
+    names = [path.stem for path in FOLDER.glob("[!_]*.py")]
+    order = {name: place for place, name in enumerate(ORDER)}
+    return {
+        name: _read_short_help(FOLDER / f"{name}.py")
+        for name in sorted(names, key=lambda name: (order.get(name, len(order)), name))
+    }
+
+
+def _read_short_help(module: Path) -> str:
+    with module.open(encoding="utf-8") as file:
+        return file.readline().strip().strip('"')
 
 
 class LazyGroup(Group):
     """A group whose commands are modules, loaded when they are run."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names, in the order of the way of the data."""
-        return list(COMMANDS)
+        """Return the names of the commands, in the order of the data."""
+        return list(find_commands())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Load one command."""
-        if cmd_name not in COMMANDS:
+        if not (cmd_name.isidentifier() and (FOLDER / f"{cmd_name}.py").is_file()):
             return None
         command = self._load(cmd_name)
-        asked = not isinstance(command, click.Group) and not ctx.resilient_parsing  # a shell that completes
-        files = find_defaults() if asked else []
+        takes_defaults = not isinstance(command, click.Group) and not ctx.resilient_parsing
+        files = find_defaults() if takes_defaults else []
         if files:
-            ctx.default_map = {cmd_name: self._defaults(ctx, command, files)}
+            ctx.default_map = {cmd_name: self._read_defaults(ctx, command, files)}
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the first word names; of a file, suggest the commands that take it."""
+        if not ctx.resilient_parsing and (suggestion := _suggest_command(args)):
+            raise click.UsageError(suggestion, ctx)
+        return super().resolve_command(ctx, args)
 
     def _load(self, name: str) -> click.Command:
         """Import the module of a command."""
@@ -81,20 +97,45 @@ class LazyGroup(Group):
             raise TypeError(f"urmpipe.commands.{name} defines no command of its name")
         return command
 
-    def _defaults(self, ctx: click.Context, command: click.Command, files: Sequence[Path]) -> dict[str, Any]:
+    def _read_defaults(
+        self, ctx: click.Context, command: click.Command, files: Sequence[Path]
+    ) -> dict[str, Any]:
         """Return the defaults in files, the nearest first, and leave their origin in the context."""
-        by_file = deciding_defaults(command, files, {name: self._load(name) for name in COMMANDS})
-        options = {param.name: max(param.opts, key=len).lstrip("-") for param in command.params}
+        commands = {name: self._load(name) for name in find_commands()}
+        by_file = deciding_defaults(command, files, commands)
+        names = {param.name: long_name(param) for param in command.params}
         ctx.obj = Defaults(
-            {path: {options[name]: value for name, value in own.items()} for path, own in by_file.items()},
+            {
+                path: {names[name]: value for name, value in values.items()}
+                for path, values in by_file.items()
+            },
             tuple(shared_files(by_file)),
         )
-        return {name: value for own in by_file.values() for name, value in own.items()}
+        return {name: value for values in by_file.values() for name, value in values.items()}
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands with their short help, without loading them."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl(list(find_commands().items()))
+
+
+def _suggest_command(words: Sequence[str]) -> str:
+    """Return the message about files in the place of a command, or an empty string."""
+    files = list(takewhile(lambda word: "\0" not in word and Path(word).exists(), words))
+    if not files or (FOLDER / f"{files[0]}.py").is_file():
+        return ""
+    from urmpipe_models.errors import format_value, shell_quote
+
+    several = ("logs", "compare") if len(files) > 1 else ("a log", "ingest")
+    kind, *commands = {
+        ".rrd": ("a recording", "view", "report"),
+        ".toml": ("a TOML file", "simulate", "network check", "robot show"),
+        ".urdf": ("a robot", "robot show"),
+        ".fmu": ("an FMU", "fmu check"),
+    }.get(Path(files[0]).suffix.lower(), several)
+    quoted = " ".join(map(shell_quote, files if several[0] in ("logs", kind) else files[:1]))
+    calls = " or ".join(f"urmpipe {command} {quoted}" for command in commands)
+    return f"found {format_value(files[0])}, {kind}, allowed: a command before it, such as {calls}"
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -126,39 +167,56 @@ def cli() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        gc.set_threshold(COLLECT_AT)
+        gc.set_threshold(GARBAGE_THRESHOLD)
         open_streams()
-        for number in (signal.SIGINT, signal.SIGTERM):  # what ends us asks for order, as Ctrl-C does
+        for number in (signal.SIGINT, signal.SIGTERM):  # a request to end stops as Ctrl-C does
             signal.signal(number, _stop)
         sys.unraisablehook = _stop_again
-        code = run(given)
+        code = run(words)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: there is nothing left to stop
-    except KeyboardInterrupt as stop:  # just before or after what `run` answers for
+    except KeyboardInterrupt as stop:  # just before or after `run`
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        print_findings(findings_of(stop), "--json" in given)
-        code = 2
+        print_errors(error_to_findings(stop), as_json=False)
+        code = ERROR
     close_streams()
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)
 
 
-_stopped: list[int] = []
-"""The signals that asked this process to stop."""
+def open_streams() -> None:
+    """Make both outputs accept any name of a file, even if the caller has closed them."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - to the end
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def close_streams() -> None:
+    """Write the rest of both outputs; Python would report a full disk again, and exit with its own code."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            discard_stream(stream)
+
+
+_stopped: list[int] = []  # signals that asked this process to stop
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    """Stop what is done now."""
+    """Stop the current work."""
     _stopped.append(number)
     raise KeyboardInterrupt
 
 
 def _stop_again(dropped: sys.UnraisableHookArgs) -> None:
-    """Stop after all, where Python dropped the error: in a callback of its own, such as of an import.
+    """Stop where Python dropped the error: in a callback of its own, such as of an import.
 
-    From another thread and a little later: an interrupt that came before this function returns would be
-    dropped like the first.
+    From another thread and a little later: an interrupt before this function returns would be dropped, too.
     """
     if isinstance(dropped.exc_value, KeyboardInterrupt):
         start_new_thread(_interrupt_soon, ())
@@ -173,32 +231,54 @@ def _interrupt_soon() -> None:
 
 def run(arguments: Sequence[str]) -> int:
     """Run the command line and return the exit code."""
-    as_json = "--json" in arguments
     if "_URMPIPE_COMPLETE" in os.environ:
-        from urmpipe.options.bash import add_bash
+        from urmpipe.bash import add_bash
 
         add_bash()
+    options: Mapping[str, Any] = {}
+    operands: Sequence[str] = ()
     try:
+        options, operands = _parse_leniently(arguments)
         with warnings.catch_warnings():
             warnings.filterwarnings(
                 "ignore", module=r"urmpipe\.commands"
             )  # a command prints those of results
-            if "--debug" not in arguments:  # behind all other filters: -W error still makes an error of it
+            if not options.get("debug"):  # after all other filters: -W error still makes an error of it
                 warnings.simplefilter("ignore", RuntimeWarning, append=True)
             return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
-    except BrokenPipeError:  # the reader of a help text left, as head does; results are told to the end
-        leave_output()
+    except BrokenPipeError:  # the reader of a help text left, as head does; results are printed to the end
+        discard_output()
         return 0
     except click.exceptions.NoArgsIsHelpError as error:  # a group alone, which is answered by its help
         error.show()
     except (Exception, KeyboardInterrupt) as raised:
-        why = KeyboardInterrupt() if _stopped else raised  # an import may have made another error of it
-        if "--debug" in arguments:
+        error = KeyboardInterrupt() if _stopped else raised  # an import may have made another error of it
+        if options.get("debug"):
             import traceback
 
             traceback.print_exception(raised)
-        findings = findings_of(why)
-        print_findings(findings, as_json)
-        if not isinstance(why, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
-            tell_junit_of(arguments, findings)
-    return 2
+        findings = error_to_findings(error)
+        print_errors(findings, as_json=bool(options.get("json")))
+        if not isinstance(error, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
+            write_junit_errors(options, operands, findings)
+    return ERROR
+
+
+def _parse_leniently(arguments: Sequence[str]) -> tuple[Mapping[str, Any], Sequence[str]]:
+    """Return the options of a line as texts and its other words, whatever is wrong with it."""
+    command: click.Command = cli
+    ctx = click.Context(cli, resilient_parsing=True, **cli.context_settings)
+    words = list(arguments)
+    while isinstance(command, click.Group) and words:
+        name = words.pop(0)
+        found = command.get_command(ctx, name)
+        if found is None:
+            return {}, arguments
+        command = found
+    settings = {"resilient_parsing": True, "ignore_unknown_options": True, "allow_extra_args": True}
+    ctx = command.make_context(command.name, words, ctx, **settings)
+    operands = [
+        ctx.params.get(param.name or "") for param in command.params if isinstance(param, click.Argument)
+    ]
+    listed = [value if isinstance(value, tuple) else (value,) for value in operands]
+    return ctx.params, [*(str(word) for value in listed for word in value if word), *ctx.args]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from urmpipe import __version__
-from urmpipe.keyword_checks import PathLike
+from urmpipe.public_functions import PathLike
 from urmpipe_models.errors import Finding, OptionError, format_value, map_collecting_errors
 from urmpipe_pipeline.outputs import (
     DRAWING_HEADER,

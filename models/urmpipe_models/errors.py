@@ -44,7 +44,7 @@ _PLACEHOLDERS: Mapping[str, Any] = {  # of other parameters: the name in capital
     "duration": Placeholder("SECONDS"),
     "interval": (Placeholder("LOW"), Placeholder("HIGH")),
     "joints": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
-    "log_map": Placeholder("FILE.toml"),
+    "map": Placeholder("FILE.toml"),
     "measured": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
     "output": Placeholder("FILE"),
     "period": Placeholder("SECONDS"),
@@ -65,7 +65,7 @@ _NO_OPTION = {  # keywords that are positional arguments of commands, or of Pyth
     *("defaults", "drives", "font", "inputs", "lazy", "logs", "name", "name_or_path", "names", "network"),
     *("offsets", "orientation", "path", "position", "progress", "q", "recorded_tcp", "recordings"),
     *("reference", "result", "results", "run", "shared", "side", "signs", "starts", "system", "t", "targets"),
-    *("title", "told", "width"),
+    *("on_message", "title", "width"),
 }
 
 _QUOTES = "'\u2018\u2019\u201a\u201b"  # single quotes of PowerShell

@@ -56,15 +56,28 @@ SPEED = "allowed: a speed in m/s, such as 0.25 or 250mm/s"
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--velocities", "0,-1"], "velocities (--velocities): found 0.0, -1.0, allowed: finite numbers of"
-                                   " m/s above 0"),
+        (
+            ["--velocities", "0,-1"],
+            "velocities (--velocities): found 0.0, -1.0, allowed: finite numbers of m/s"
+            " above 0",
+        ),
         (["--velocities", "nan"], f"velocities (--velocities): found 'nan', {SPEED}"),
         (["--velocities", "abc"], f"velocities (--velocities): found 'abc', {SPEED}"),
-        (["--limit", "0"], "limit (--limit): found '0', allowed: a positive length in m, such as 0.0004 or"
-                           " 0.4mm"),
-        (["--force", "1,2"], "force (--force): found [1.0, 2.0], allowed: three finite numbers of N"),
-        (["--law", "limit"], "law (--law): found 'limit' (did you mean limits?), allowed: trapezoid, jerk,"
-                             " limits"),
+        (
+            ["--limit", "0"],
+            "limit (--limit): found '0', allowed: a positive length in m, such as 0.0004 or"
+            " 0.4mm",
+        ),
+        (
+            ["--force", "1,2"],
+            "force (--force): found '1,2', allowed: three finite numbers of N, such as"
+            " 0,0,-50",
+        ),
+        (
+            ["--law", "limit"],
+            "law (--law): found 'limit' (did you mean limits?), allowed: trapezoid, jerk,"
+            " limits",
+        ),
     ],
 )  # fmt: skip
 def test_values_that_are_refused(capsys: Captured, options: list[str], said: str) -> None:

@@ -118,7 +118,7 @@ def test_each_log_decides_for_itself_and_coarse_stamps_do_not(
     made = api.read_recording(tmp_path / "v.rrd")
     assert isinstance(made, Comparison)
     assert [run.sync.mode for run in made.runs] == ["stamps", "start", "start"]
-    assert refusal(OptionError, api.compare, wanted, early, "ur5e", iso=True, sync="stamps").startswith(
+    assert refusal(OptionError, api.iso, wanted, early, "ur5e", sync="stamps").startswith(
         "sync (--sync): found stamps, allowed: auto, start or an offset with iso"
     )
 

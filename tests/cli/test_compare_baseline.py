@@ -119,7 +119,7 @@ def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -
     given = ["--tolerance", "1mm", "--align", "none", "-o", "b.rrd"]
     assert run(["compare", "a.rrd", "--baseline", "a.rrd", *given]) == 2
     assert said(capsys) == (
-        "error: --output, --tolerance, --align: found with the recording of a comparison (a.rrd), which"
+        "error: --tolerance, --output, --align: found with the recording of a comparison (a.rrd), which"
         " stands as it was made, allowed: with the logs themselves"
     )
     assert run(["compare", "a.rrd"]) == 2

@@ -1,4 +1,4 @@
-"""`compare --iso`: what comes in, what comes out, exit codes, recordings and baselines."""
+"""`urmpipe iso`: what comes in, what comes out, exit codes, recordings and baselines."""
 
 from __future__ import annotations
 
@@ -63,13 +63,13 @@ FILES = [f"cycle{k}.csv" for k in range(1, 5)]
 
 def iso(*arguments: str) -> int:
     """Return the exit code of a test on the command line, without a word of what is fine."""
-    return run(["compare", "square.csv", *arguments, "--iso", "-q", "-o", "run.rrd"])
+    return run(["iso", "square.csv", *arguments, "-q", "-o", "run.rrd"])
 
 
 def answer(captured: Captured, *arguments: str) -> dict[str, object]:
     """Return what a test prints as JSON."""
     captured.readouterr()
-    run(["compare", "square.csv", *arguments, "--iso", "--json", "-o", "run.rrd"])
+    run(["iso", "square.csv", *arguments, "--json", "-o", "run.rrd"])
     found: dict[str, object] = json.loads(captured.readouterr().out)
     return found
 
@@ -83,7 +83,7 @@ def read(path: str) -> Comparison:
 
 @pytest.mark.slow
 def test_without_a_tolerance_nothing_is_judged(capsys: Captured) -> None:
-    assert run(["compare", "square.csv", *FILES, "--iso"]) == 0
+    assert run(["iso", "square.csv", *FILES]) == 0
     printed = capsys.readouterr().out
     assert "no criterion is judged" in printed
     assert "After ISO 9283" in printed
@@ -148,27 +148,19 @@ def test_given_cycles_are_taken_as_they_are(capsys: Captured) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--iso", "--align", "rigid"], "align (--align): found rigid, allowed: none with iso"),
-        (["--iso", "--diagnose"], "diagnose (--diagnose): found with iso, allowed: one of the two"),
-        (["--iso", "--cycles", "1:601"], "cycles (--cycles): found rows of cycles and 4 logs"),
-        (["--iso", "--planes", "0"], "planes (--planes): found 0, allowed: a whole number, 1 or more"),
-        (["--iso", "--band", "0"], "band (--band): found '0', allowed: a positive length in m"),
-        (["--iso", "--band", "-1mm"], "band (--band): found '-1mm', allowed: a positive length in m"),
-        (
-            ["--iso", "--tolerance", "axis=1mm"],
-            "tolerance (--tolerance): found axis=0.001, allowed: criteria",
-        ),
-        (["--iso", "--tolerance", "3.5mm"], "tolerance (--tolerance): found axis=0.0035, allowed: criteria"),
-        (["--tolerance", "AP=1mm"], "tolerance (--tolerance): found AP=0.001, allowed: numbers of axis"),
-        (["--iso", "--tolerance", "RV=5mm"], "tolerance (--tolerance): found 'RV=5mm'"),
-        (["--cycles", "1:2"], "cycles (--cycles): found no test, allowed: with iso"),
-        (["--targets", "square.csv"], "targets: found no test, allowed: with iso"),
-        (["--planes", "5"], "planes (--planes): found no test, allowed: with iso"),
-        (["--band", "1mm"], "band (--band): found no test, allowed: with iso"),
+        (["--align", "rigid"], "--align: no such option"),
+        (["--sync", "stamps"], "sync (--sync): found stamps, allowed: auto, start or an offset with iso"),
+        (["--cycles", "1:601"], "cycles (--cycles): found rows of cycles and 4 logs"),
+        (["--planes", "0"], "planes (--planes): found '0', allowed: a whole number, 1 or more"),
+        (["--band", "0"], "band (--band): found '0', allowed: a positive length in m"),
+        (["--band", "-1mm"], "band (--band): found '-1mm', allowed: a positive length in m"),
+        (["--tolerance", "axis=1mm"], "tolerance (--tolerance): found axis=0.001, allowed: criteria"),
+        (["--tolerance", "3.5mm"], "tolerance (--tolerance): found axis=0.0035, allowed: criteria"),
+        (["--tolerance", "RV=5mm"], "tolerance (--tolerance): found 'RV=5mm'"),
     ],
 )
 def test_what_does_not_go_is_exit_code_2(options: list[str], said: str, capsys: Captured) -> None:
-    assert run(["compare", "square.csv", *FILES, *options]) == 2
+    assert run(["iso", "square.csv", *FILES, *options]) == 2
     assert said in capsys.readouterr().err
     assert not list(Path().glob("*.rrd"))
 
@@ -184,7 +176,7 @@ def test_what_does_not_go_is_exit_code_2(options: list[str], said: str, capsys: 
     ],
 )
 def test_bad_cycles_are_exit_code_2(cycles: str, said: str, capsys: Captured) -> None:
-    assert run(["compare", "square.csv", "all.csv", "--iso", "--cycles", cycles]) == 2
+    assert run(["iso", "square.csv", "all.csv", "--cycles", cycles]) == 2
     assert said in capsys.readouterr().err
 
 
@@ -203,8 +195,8 @@ def test_one_cycle_has_what_needs_no_spread() -> None:
 
 
 def test_a_reference_alone_is_no_test(capsys: Captured) -> None:
-    assert run(["compare", "square.csv", "--iso"]) == 2
-    assert "iso (--iso): found no log, allowed: a reference and its cycles" in capsys.readouterr().err
+    assert run(["iso", "square.csv"]) == 2
+    assert "logs: found none, allowed: a reference and its cycles" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -225,9 +217,7 @@ def test_junit_and_csv_have_the_criteria() -> None:
 
 @pytest.mark.slow
 def test_a_recording_read_back_has_the_same_criteria_bit_for_bit() -> None:
-    made = urmpipe.compare(
-        "square.csv", FILES, iso=True, tolerance="AP=0.4mm", output="run.rrd", junit="v.xml"
-    )
+    made = urmpipe.iso("square.csv", FILES, tolerance="AP=0.4mm", output="run.rrd", junit="v.xml")
     again = read("run.rrd")
     assert made.iso is not None
     assert again.iso is not None
@@ -351,7 +341,7 @@ def test_a_plan_gives_its_corners_stops_and_speed() -> None:
     plan = urmpipe.plan("rows.csv", velocity=0.2, acceleration=2.0, output="plan.rrd")
     written(Path("as_planned.csv"), plan.position, plan.t)
     for reference in (plan, "plan.rrd"):
-        test = judged(urmpipe.compare(reference, ["as_planned.csv", "as_planned.csv"], iso=True))
+        test = judged(urmpipe.iso(reference, ["as_planned.csv", "as_planned.csv"]))
         assert test.poses is not None
         assert test.path is not None
         assert test.poses.command == pytest.approx(plan.stops, abs=1e-12)  # rounding
@@ -394,7 +384,7 @@ def test_a_robot_that_overshoots_a_stop_of_a_plan_is_taken_where_it_rests() -> N
     rest[:, 0] += swing
     log = np.vstack([beyond[:stop], rest, beyond[stop:]])
     written(Path("overshoots.csv"), log)
-    test = judged(urmpipe.compare(plan, "overshoots.csv", iso=True))
+    test = judged(urmpipe.iso(plan, "overshoots.csv"))
     # What swings is down to exp(-10) of 0.5 mm in the second half of the rest of 2 s.
     assert value(test, "AP", "pose 2") == pytest.approx(0.0, abs=3e-8)
 

@@ -20,7 +20,7 @@ from click.shell_completion import ShellComplete
 import urmpipe
 from four_logs import ALLOWED, Captured, compare, lay_logs, names, recorded, said, write_log
 from urmpipe.main import cli, run
-from urmpipe.options.comparing import SYNC
+from urmpipe.parameters.kinds import SYNC
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.comparison.verdict import LEAST_SHARES
@@ -139,7 +139,7 @@ def test_a_table_that_is_no_tolerance_is_refused(folder: Path, capsys: Captured)
     assert compare("good.csv", "-q") == 2
     assert capsys.readouterr().err.splitlines() == [
         f"error: {folder}/urmpipe.toml: key tolerance: found 'roll=1', {ALLOWED}",
-        f"""error: {folder}/urmpipe.toml: key tolerance: found "axis={{'x': 1}}", {ALLOWED}""",
+        f"""error: {folder}/urmpipe.toml: key tolerance: found "axis={{'x': '1'}}", {ALLOWED}""",
     ]
 
 
@@ -238,7 +238,7 @@ def test_tolerances_add_up(capsys: Captured) -> None:
 
 @pytest.mark.parametrize("offset", ["0.2", "200ms", "0.2 s", "-200 ms"])
 def test_an_offset_of_clocks_may_have_its_unit(offset: str) -> None:
-    seconds = SYNC.convert(offset, None, None)
+    seconds = SYNC.read(offset)
     assert abs(seconds) == 0.2
     assert (seconds < 0.0) == offset.startswith("-")
 

@@ -16,7 +16,9 @@ from click.shell_completion import ShellComplete
 
 from command_contexts import EVERY, NAMES
 from urmpipe.main import cli
-from urmpipe.options.reading import DELIMITERS, SOURCES
+from urmpipe.parameters.completion import CRITERIA, DEVIATIONS, SHARES
+from urmpipe.parameters.kinds import DELIMITERS, SOURCES
+from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.sources import source_names
 
 RunCommand = Callable[..., Any]
@@ -59,9 +61,9 @@ def completions(line: str, begun: str) -> list[str]:
         ("compare log.csv --tolerance", "angle=.5", ["angle=.5rad", "angle=.5mrad", "angle=.5deg"]),
         ("compare log.csv --tolerance", "axis=1mm,c", ["axis=1mm,coverage="]),
         ("compare log.csv --tolerance", "judged=4", ["judged=4%"]),
-        ("compare log.csv --iso --tolerance", "c", []),
-        ("compare log.csv --iso --tolerance", "AP=1mm,AV", ["AP=1mm,AV="]),
-        ("compare log.csv --iso --tolerance", "AV=5", ["AV=5%"]),
+        ("iso log.csv --tolerance", "c", []),
+        ("iso log.csv --tolerance", "AP=1mm,AV", ["AP=1mm,AV="]),
+        ("iso log.csv --tolerance", "AV=5", ["AV=5%"]),
         ("compare log.csv --baseline a.rrd --noise", "no", ["norm="]),
         ("compare log.csv --baseline a.rrd --noise", "c", []),
         ("compare log.csv --sync", "", ["stamps", "start", "auto"]),
@@ -124,6 +126,7 @@ def test_every_option_completes_unless_its_value_is_free(folder: Path, context: 
 
 
 def test_words_are_those_of_the_pipeline(folder: Path, urmpipe: RunCommand) -> None:
+    assert {**DEVIATIONS, **SHARES, **CRITERIA} == UNITS
     assert source_names() == SOURCES
     allowed = f"{', '.join(DELIMITERS)}, or the character itself"
     assert urmpipe("ingest", "log.csv", "--delimiter", "foo").err == (

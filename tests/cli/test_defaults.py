@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from urmpipe import read_recording
-from urmpipe.main import COMMANDS, run
-from urmpipe.options.reading import FORMS
+from urmpipe.main import find_commands, run
+from urmpipe.parameters.kinds import FORMS
 from urmpipe_models import math3d as orientation
 from urmpipe_pipeline.comparison.comparison import Comparison
 
@@ -19,7 +19,7 @@ LOG = "t [s],a,b,c,d,e,f\n" + "".join(f"{k * 0.005},{k},1,2,3,4,5\n" for k in ra
 
 INGEST = ("ingest", "log.csv", "--unit", "deg", "--joints", "a,b,c,d,e,f")
 
-NAMES = ", ".join(COMMANDS)
+NAMES = ", ".join(find_commands())
 
 Captured = pytest.CaptureFixture[str]
 
@@ -40,7 +40,7 @@ def result(capsys: Captured) -> dict[str, object]:
 
 
 def test_the_forms_are_those_of_the_models() -> None:
-    assert tuple(FORMS) == orientation.FORMS
+    assert FORMS == orientation.FORMS
 
 
 def test_defaults_of_a_folder_above_hold_and_are_told(lab: Path, capsys: Captured) -> None:
@@ -80,8 +80,8 @@ def test_each_error_names_the_file_that_it_is_in(lab: Path, capsys: Captured) ->
     nearer.write_text("strict = 1\n")
     assert run(["ingest", "log.csv", "-q"]) == 2
     assert capsys.readouterr().err == (
+        f"error: {upper}: key tsp: found true, allowed: a positive time in s, such as 0.005 or 5ms\n"
         f"error: {nearer}: key strict: found 1, allowed: true or false\n"
-        f"error: {upper}: key tsp: found true, allowed: a text, a number, or a list of them\n"
     )
     upper.write_text("tsp = -1\n")
     nearer.write_text('robot = "ur10"\n')
@@ -112,8 +112,8 @@ def test_everything_that_is_wrong_with_it(lab: Path, capsys: Captured) -> None:
         ("tsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
         ("[ingest]\ntsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
         ("derivative = 'x'", "key derivative: found 'x', allowed: central, savgol"),
-        ("strict = 'yes'", 'key strict: found "yes", allowed: true or false'),
-        ("tsp = true", "key tsp: found true, allowed: a text, a number, or a list of them"),
+        ("strict = 'yes'", "key strict: found 'yes', allowed: true or false"),
+        ("tsp = true", "key tsp: found true, allowed: a positive time in s, such as 0.005 or 5ms"),
         ("[ignest]\ntsp = 1", f"key ignest: found 'ignest' (did you mean ingest?), allowed: {NAMES}"),
     ],
 )
@@ -257,12 +257,15 @@ def test_tables_and_truths_are_no_values(lab: Path, capsys: Captured) -> None:
     (lab / "urmpipe.toml").write_text("[robot]\n")
     assert run([*INGEST, "-q"]) == 0
     assert capsys.readouterr().err == ""
-    (lab / "urmpipe.toml").write_text("unit = {a = 'deg'}\n")
+    (lab / "urmpipe.toml").write_text("tsp = {a = 'deg'}\n")
     assert run([*INGEST]) == 2
-    assert "key unit: found a table, allowed: a value" in capsys.readouterr().err
+    assert "key tsp: found {'a': 'deg'}, allowed: a positive time in s, " in capsys.readouterr().err
     (lab / "urmpipe.toml").write_text("robot = true\n")
     assert run([*INGEST]) == 2
-    assert "urmpipe.toml: key robot: found true, allowed: a text, a number, " in capsys.readouterr().err
+    assert (
+        "urmpipe.toml: key robot: found true, allowed: a name, a TOML or URDF file, "
+        in capsys.readouterr().err
+    )
 
 
 def limited_by_git(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

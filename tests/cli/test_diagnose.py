@@ -1,4 +1,4 @@
-"""`urmpipe diagnose` and `compare --diagnose`: the answer, what is written, and what is refused."""
+"""`urmpipe diagnose`, of one log and of several: the answer, what is written, and what is refused."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def lay_logs(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Both:
-    """What `diagnose` and `compare --diagnose` of the same logs print as JSON, and where they write."""
+    """What `diagnose` of one log and of two logs prints as JSON, and where it writes."""
 
     folder: Path
     diagnosed: dict[str, Any]
@@ -76,10 +76,10 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
     """Both commands, run once."""
     folder, printed = tmp_path_factory.mktemp("both"), []
     lay_logs(folder)
-    compare = ["compare", PATH, WRONG, *ARM, "--diagnose", "-o", "compared.rrd", "--junit", "verdict.xml"]
+    several = ["diagnose", PATH, WRONG, RIGHT, *ARM, "-o", "compared.rrd", "--junit", "verdict.xml"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        for line in (["diagnose", PATH, WRONG, *ARM], compare):
+        for line in (["diagnose", PATH, WRONG, *ARM], several):
             with redirect_stdout(io.StringIO()) as out:
                 assert run([*line, "--json"]) == 1
             printed.append(json.loads(out.getvalue()))
@@ -126,7 +126,7 @@ def test_json_has_the_keys_that_are_promised(both: Both, capsys: Captured) -> No
     assert (cause["kind"], cause["name"], cause["joint"]) == ("joint_sign", "phi3", "q3")
     assert cause["value"] is None
     assert [one["message"] for one in found["warnings"]][-1].startswith("no unit is given for x, y, z")
-    (compared,) = both.compared["runs"]
+    compared = both.compared["runs"][0]
     same = [key for key in KEYS if key not in ("warnings", "recording")]
     assert {key: compared["diagnosis"][key] for key in same} == {key: found[key] for key in same}
     assert run(["compare", PATH, WRONG, *ARM, "--json"]) == 1
@@ -160,15 +160,6 @@ def test_junit_has_the_answer_as_a_property(both: Both) -> None:
             [RIGHT, *ARM],
             "matlab.csv: one log, which recorded no tool centre point; allowed: a reference before the log",
         ),
-        (
-            [PATH, RIGHT, WRONG, *ARM],
-            f"found {WRONG} besides the rest, allowed: urmpipe diagnose [OPTIONS] REFERENCE [LOG]; --robot"
-            " sets a robot",
-        ),
-        (
-            [PATH, RIGHT, *ARM, "--align", "rigid"],
-            "align (--align): found rigid, allowed: none with a diagnosis: base and tool are possible causes",
-        ),
     ],
 )
 def test_what_cannot_be_diagnosed_is_refused(arguments: list[str], said: str, capsys: Captured) -> None:
@@ -177,27 +168,8 @@ def test_what_cannot_be_diagnosed_is_refused(arguments: list[str], said: str, ca
     assert sorted(one.name for one in Path.cwd().iterdir()) == sorted(NAMES)
 
 
-def test_an_alignment_is_refused_with_a_diagnosis(capsys: Captured) -> None:
-    assert run(["compare", PATH, RIGHT, *ARM, "--diagnose", "--align", "tool"]) == 2
-    assert capsys.readouterr().err == (
-        "error: align (--align): found tool, allowed: none with a diagnosis: base and tool are possible"
-        " causes\n"
-    )
-
-
 @pytest.mark.slow
-def test_a_comparison_that_stands_is_not_diagnosed(capsys: Captured) -> None:
-    run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])
-    assert run(["compare", "made.rrd", "--baseline", "made.rrd", "--diagnose"]) == 2
-    assert capsys.readouterr().err == (
-        "error: diagnose (--diagnose): found with the recording of a comparison (made.rrd), which stands"
-        " as it was made,"
-        " allowed: with the logs themselves\n"
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("operands", [["made.rrd"], [PATH, "made.rrd"]])
+@pytest.mark.parametrize("operands", [[PATH, "made.rrd"]])
 def test_the_recording_of_a_comparison_is_no_log(operands: list[str], capsys: Captured) -> None:
     run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])
     assert run(["diagnose", *operands, *ARM]) == 2
@@ -227,7 +199,7 @@ def test_in_python_it_stands_in_its_comparison() -> None:
 def test_in_python_operands_are_refused_by_their_names() -> None:
     number, listed = cast("tuple[Any, Any]", (3, [1.0]))
     said = refusal(OptionError, urmpipe.diagnose, number, listed)
-    assert [line.split(":")[0] for line in said.splitlines()] == ["reference", "log"]
+    assert [line.split(":")[0] for line in said.splitlines()] == ["reference", "logs"]
     assert refusal(LogError, urmpipe.diagnose, PATH, RIGHT).startswith("matlab.csv: no robot")
 
 
@@ -273,7 +245,7 @@ def test_what_to_do_removes_the_causes(setup: dict[str, Any], parameters: list[s
 def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:
     table = pd.read_csv(RIGHT)
     table.assign(q3=np.degrees(table.q3)).to_csv("mixed.csv", index=False)
-    (run,) = urmpipe.compare(PATH, "mixed.csv", "urm6", unit="rad", diagnose=True).runs
+    (run,) = urmpipe.diagnose(PATH, ["mixed.csv"], "urm6", unit="rad").runs
     cause = Cause("joint_unit", "phi3", ("q3",), value=(np.pi / 180.0,))
     diagnosis = replace(there(run.diagnosis), causes=(cause,), unexplained=Unexplained(0.0))
     (hint,) = remedy_hints(replace(run, diagnosis=diagnosis))

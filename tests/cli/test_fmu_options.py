@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe.options.named import option_value
+from urmpipe.commands.fmu import option_value
 from urmpipe.systems.logs import read_mapped_table, read_table
 from urmpipe.systems.units import unit_of
 from urmpipe_datasets import LOGS
@@ -152,10 +152,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
         (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),
-        (
-            ("delta_meter", "--map", "lab.toml"),
-            "log_map (--log-map): found without a log; --log LOG sets one",
-        ),
+        (("delta_meter", "--map", "lab.toml"), "map (--map): found without a log; --log LOG sets one"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(
@@ -172,7 +169,7 @@ def test_a_unit_is_told_what_a_map_says_of_its_log(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,q1,q2\n0,1,2\n1,1.1,2.1\n", encoding="utf-8")
     *_, warning = (one for one in read_mapped_table(path).warnings if one.kind == "assumed-unit")
-    written = "--log-map FILE.toml from urmpipe ingest --unit {} --write-map FILE.toml"
+    written = "--map FILE.toml from urmpipe ingest --unit {} --write-map FILE.toml"
     assert str(warning).endswith(f"; {written.format('deg')} overrides this")
     path.write_text("time,q1,q2\n0,1,2\n1000,1,2\n2000,1,2\n", encoding="utf-8")
     (said,) = refusal("log_source", log=path)

@@ -8,7 +8,8 @@ import click
 import pytest
 
 from command_contexts import EVERY, NAMES
-from urmpipe.headings import FLAT, HeadedOption, Heading
+from urmpipe.command_line import MAX_FLAT_OPTIONS, HeadedOption
+from urmpipe.parameters.param import Heading
 
 HEADINGS = re.compile(r"^([A-Z][^\n]*):\n", re.MULTILINE)
 NOT_OF_OPTIONS = {"Usage", "Commands"}
@@ -31,7 +32,7 @@ def options_of(context: click.Context) -> list[click.Option]:
 @ALL
 def test_many_options_stand_under_headings_in_one_order(context: click.Context) -> None:
     found, options = headings_of(context), options_of(context)
-    if len(options) <= FLAT:
+    if len(options) <= MAX_FLAT_OPTIONS:
         assert found == ["Options"]
         return
     assert found == [one for one in Heading if one in found]
@@ -54,7 +55,7 @@ def test_each_option_stands_once_and_every_line_fits(context: click.Context) -> 
 def test_the_help_of_compare_begins_with_what_is_used_most() -> None:
     context = next(one for one in EVERY if one.command_path == "urmpipe compare")
     assert headings_of(context) == [
-        "Robot", "Judging", "Aligning", "Compared motions", "Test after ISO 9283", "Baseline",
-        "Reading files", "Processing", "Output", "General",
+        "Robot", "Judging", "Aligning", "Compared motions", "Baseline", "Reading files", "Processing",
+        "Output", "General",
     ]  # fmt: skip
     assert context.get_help().split("\nRobot:\n")[1].splitlines()[0].startswith("  --robot NAME|FILE ")

@@ -44,8 +44,8 @@ def refused(capsys: Captured, *arguments: str) -> list[str]:
             "found mm and m for x, allowed: one unit, or that of a column as COLUMN=UNIT",
         ),
         (
-            ["rz=deg, ry=deg"],
-            "found 'rz=deg, ry=deg', allowed: one COLUMN=UNIT per option: --unit rz=deg --unit ry=deg",
+            ["rz=deg, ry=deg, rz=rad"],
+            "found deg and rad for rz, allowed: one unit, or that of a column as COLUMN=UNIT",
         ),
     ],
 )
@@ -134,7 +134,7 @@ def test_a_robot_that_is_no_arm(capsys: Captured, folder: Path, joints: str, sai
         (
             "t,q1,q2\n0,1,2\n1,2,3\n",
             "targets.csv: found no position in q1, q2, allowed: x, y, z; name them so in the header;"
-            ' --log-map FILE.toml names them: [tcp] position = ["A", "B", "C"]',
+            ' --map FILE.toml names them: [tcp] position = ["A", "B", "C"]',
         ),
     ],
 )

@@ -232,17 +232,20 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: strictly increasing, by 1 ns or"),
         ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of the two"),
         ({"start": [0.0]}, "start (--start): found 1 values, allowed: 6, one for each of theta1, "),
-        ({"start": "zero"}, "start (--start): found 'zero', allowed: 6, one for each of theta1, "),
+        (
+            {"start": "zero"},
+            "start (--start): found 'zero', allowed: joint values in rad and m, or with units, ",
+        ),
         (
             {"start": [np.nan] * 6},
-            "--start: found a value that is not finite, allowed: 6, one for each of ",
+            "start (--start): found a value that is not finite, allowed: 6, one for each of ",
         ),
         ({"seed": -1}, "seed (--seed): found -1, allowed: a whole number, 0 or more"),
         ({"seed": -1, "tsp": 1.0}, "seed (--seed): found -1, allowed: a whole number, 0 or more"),
         ({"restarts": 1.5}, "restarts (--restarts): found 1.5, allowed: a whole number, 0 or more"),
         (
             {"tolerance": np.nan, "tsp": 1.0},
-            "tolerance (--tolerance): found nan m, allowed: more than 0, finite",
+            "tolerance (--tolerance): found nan, allowed: a positive length in m, such as",
         ),
         (
             {"method": "magic", "tsp": 1.0},

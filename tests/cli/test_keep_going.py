@@ -13,7 +13,7 @@ import pytest
 import urmpipe
 from four_logs import Captured, compare, lay_logs, names, read_lines, recorded
 from urmpipe.printing.results import print_presentation
-from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.errors import LogError
 from urmpipe_pipeline.results import present
 
 WRONG = [
@@ -118,10 +118,6 @@ def test_without_any_log_to_judge_it_is_an_error_as_ever(capsys: Captured) -> No
     with pytest.raises(LogError, match=r"^missing.csv: found no such file$"):
         urmpipe.compare("missing.csv", ["good.csv"], "ur5e", keep_going=True)
     assert names() == {"broken.csv"}
-    with pytest.raises(
-        OptionError, match=r"^keep_going \(--keep-going\): found with iso, allowed: one of the two$"
-    ):
-        urmpipe.compare("wanted.csv", ["good.csv"], "ur5e", keep_going=True, iso=True)
 
 
 def test_a_lab_may_keep_going_by_default(folder: Path) -> None:

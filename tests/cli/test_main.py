@@ -18,8 +18,8 @@ from click.testing import CliRunner
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from urmpipe.main import COMMANDS, cli, run
-from urmpipe.options.types import OffsetType
+from urmpipe.main import cli, find_commands, run
+from urmpipe.parameters import kinds
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import Finding
 
@@ -29,7 +29,7 @@ RunCommand = Callable[..., Any]
 
 def test_the_short_help_of_every_command_is_its_own() -> None:
     context = click.Context(cli)
-    for name, short in COMMANDS.items():
+    for name, short in find_commands().items():
         command = cli.get_command(context, name)
         assert command is not None
         assert command.get_short_help_str(limit=200) == short
@@ -38,7 +38,7 @@ def test_the_short_help_of_every_command_is_its_own() -> None:
 def commands() -> Iterator[tuple[tuple[str, ...], click.Command]]:
     """Every command and subcommand with its words."""
     context = click.Context(cli)
-    for name in COMMANDS:
+    for name in find_commands():
         command = cli.get_command(context, name)
         assert command is not None
         yield (name,), command
@@ -83,7 +83,7 @@ def test_version(urmpipe: RunCommand) -> None:
         assert (ran.code, ran.out) == (0, f"urmpipe, version {version('urmpipe')}\n")
 
 
-COMMAND_NAMES = ", ".join(COMMANDS)
+COMMAND_NAMES = ", ".join(find_commands())
 DURATIONS = "allowed: a positive time in s, such as 0.005 or 5ms"
 OFFSETS = "allowed: stamps, start, auto, or a time in s, such as -0.2 or 200ms"
 FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
@@ -136,7 +136,7 @@ def test_wrong_use_is_one_line_that_says_what_is_allowed(urmpipe: RunCommand, li
     ("line", "said"),
     [
         (
-            "compare LOG LOG --iso --planes 1000000000",
+            "iso LOG LOG --planes 1000000000",
             "planes (--planes): found 1000000000, allowed: 10000 at most",
         ),
         (
@@ -228,7 +228,7 @@ def test_a_stop_in_a_callback_of_python_stops_all_the_same() -> None:
     assert (done.returncode, done.stderr) == (2, "error: stopped; no file is left incomplete\n")
 
 
-@given(name=st.sampled_from(sorted(COMMANDS)), at=st.integers(0, 20))
+@given(name=st.sampled_from(sorted(find_commands())), at=st.integers(0, 20))
 def test_a_command_with_a_letter_missing_is_meant(name: str, at: int) -> None:
     at %= len(name)
     typed = name[:at] + name[at + 1 :]
@@ -240,8 +240,7 @@ def test_a_command_with_a_letter_missing_is_meant(name: str, at: int) -> None:
 
 def test_a_length_may_have_its_unit_in_a_frame() -> None:
     typed, plain = (
-        OffsetType().convert(text, None, None)
-        for text in ("0,1cm,150 mm,0,0,90deg", "0,0.01,0.15,0,0,1.5707963267948966")
+        kinds.FRAME.read(text) for text in ("0,1cm,150 mm,0,0,90deg", "0,0.01,0.15,0,0,1.5707963267948966")
     )
     assert typed == plain
 

@@ -96,7 +96,7 @@ def test_ik_comes_back_to_it(name: str, tmp_path: Path) -> None:
             [f"tcp_{axis}" for axis in axes] for axes in (["x", "y", "z"], ["qx", "qy", "qz", "qw"])
         )
         given = LogMap(ReadOptions(position=(*place,), orientation=(*turn,), rotation="quat_xyzw"))
-    solved = urmpipe.ik(there(plan.log), robot=there(plan.robot), log_map=given)
+    solved = urmpipe.ik(there(plan.log), robot=there(plan.robot), map=given)
     assert [warning.kind for warning in solved.warnings if warning.kind != "singular"] == []
     assert solved.targets.position.tolist() == plan.position.tolist()
     assert (solved.targets.rotation is None) == (plan.quat_xyzw is None)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
 import pytest
 
-from urmpipe.commands.plan import plan
 from urmpipe.main import run
+from urmpipe.parameters.motions import Plan
+from urmpipe.parameters.param import params_of
 from urmpipe_models.planning.laws import ARCS
 from urmpipe_pipeline.planned_paths.request import LAWS
 
@@ -36,8 +36,8 @@ def refused(capsys: Captured, *arguments: str) -> list[str]:
 
 
 def test_laws_and_arcs_are_those_of_the_planner() -> None:
-    choices = {one.name: tuple(one.type.choices) for one in plan.params if isinstance(one.type, click.Choice)}
-    assert (choices["law"], choices["arcs"]) == (LAWS, ARCS)
+    params = params_of(Plan)
+    assert (params["law"].kind.allowed, params["arcs"].kind.allowed) == (", ".join(LAWS), ", ".join(ARCS))
 
 
 def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
@@ -81,7 +81,7 @@ def test_a_path_has_no_time(capsys: Captured) -> None:
 
 
 def test_a_map_that_is_not_there_is_told_once(capsys: Captured) -> None:
-    assert refused(capsys, "path.csv", "--log-map", "map.toml", "--velocity", "-1") == [
+    assert refused(capsys, "path.csv", "--map", "map.toml", "--velocity", "-1") == [
         "map.toml: cannot be read: No such file or directory",
         "velocity (--velocity): found -1.0, allowed: a finite number of m/s above 0",
     ]
@@ -91,7 +91,7 @@ def test_a_map_that_is_not_there_is_told_once(capsys: Captured) -> None:
 def test_the_base_of_a_map_stands_for_the_robot_beside_it(folder: Path) -> None:
     (folder / "map.toml").write_text("base = [0, 0, 0.1]\n")
     cube = ["plan", CUBE, "--robot", "irb60", "-q"]
-    assert run([*cube, "--log-map", "map.toml", "-o", "a.csv"]) == 0
+    assert run([*cube, "--map", "map.toml", "-o", "a.csv"]) == 0
     assert run([*cube, "--base", "0,0,0.1", "-o", "b.csv"]) == 0
     assert (folder / "a.csv").read_text() == (folder / "b.csv").read_text()
 

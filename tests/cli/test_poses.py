@@ -34,9 +34,9 @@ def test_poses_and_measured_reach_the_log(urmpipe: RunCommand, tmp_path: Path) -
     assert (answer["duration"], answer["tsp"], answer["period"]) == (None, None, None)
     lab = (tmp_path / "lab.toml").read_text()
     assert "poses = true" in lab and 'position = ["A", "B", "C"]\nmeasured = true' in lab
-    run = package.ingest(log, log_map=tmp_path / "lab.toml")
+    run = package.ingest(log, map=tmp_path / "lab.toml")
     assert not run.timed and run.log.measured
-    assert package.ingest(log, log_map=tmp_path / "lab.toml", poses=False).timed
+    assert package.ingest(log, map=tmp_path / "lab.toml", poses=False).timed
 
 
 def test_the_rows_are_told_in_the_terminal(urmpipe: RunCommand, tmp_path: Path) -> None:

@@ -14,37 +14,37 @@ from typing import Any
 
 import pytest
 
-from urmpipe.printing.terminal import print_recording, progress_bar
+from urmpipe.printing.terminal import progress_bar, recording_line
 from urmpipe_models.errors import shell_quote
 from urmpipe_models.robots.catalogue import load_robot
 
 
 def test_the_command_that_opens_a_recording_works_without_an_activated_environment(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     command = tmp_path / "bin" / "urmpipe"
     command.parent.mkdir()
     command.touch(mode=0o755)
     monkeypatch.setenv("PATH", str(command.parent))
-    print_recording(Path("run.rrd"))
-    assert capsys.readouterr().out == "Recording: run.rrd  (open it: urmpipe view run.rrd)\n"
-    print_recording(Path("run.rrd"), replaced=True)
-    said = "Recording: run.rrd  (open it: urmpipe view run.rrd; it replaced an earlier one)\n"
-    assert capsys.readouterr().out == said
+    line = recording_line(Path("run.rrd"))
+    assert line == "Recording: run.rrd  (open it: urmpipe view run.rrd)"
+    line = recording_line(Path("run.rrd"), is_replaced=True)
+    said = "Recording: run.rrd  (open it: urmpipe view run.rrd; it replaced an earlier one)"
+    assert line == said
 
-    print_recording(Path("joint 3.rrd"))
+    line = recording_line(Path("joint 3.rrd"))
     quoted = shell_quote("joint 3.rrd")
-    assert capsys.readouterr().out == f"Recording: joint 3.rrd  (open it: urmpipe view {quoted})\n"
+    assert line == f"Recording: joint 3.rrd  (open it: urmpipe view {quoted})"
 
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(command.with_name("python")))
-    print_recording(Path("run.rrd"))
-    assert capsys.readouterr().out == f"Recording: run.rrd  (open it: {command} view run.rrd)\n"
+    line = recording_line(Path("run.rrd"))
+    assert line == f"Recording: run.rrd  (open it: {command} view run.rrd)"
 
     monkeypatch.chdir(tmp_path)
-    print_recording(Path("run.rrd"))
+    line = recording_line(Path("run.rrd"))
     within = Path("bin") / "urmpipe"
-    assert capsys.readouterr().out == f"Recording: run.rrd  (open it: {within} view run.rrd)\n"
+    assert line == f"Recording: run.rrd  (open it: {within} view run.rrd)"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows allows no such names")

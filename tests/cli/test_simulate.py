@@ -411,8 +411,8 @@ def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
 
 def test_a_step_and_a_duration_are_positive(following: Path) -> None:
     assert refusal(following, step=float("nan"), duration=0.0) == [
-        "step (--step): found nan s, allowed: above 0",
-        "duration (--duration): found 0 s, allowed: above 0",
+        "step (--step): found nan, allowed: a positive time in s, such as 0.005 or 5ms",
+        "duration (--duration): found 0.0, allowed: a positive time in s, such as 0.005 or 5ms",
     ]
 
 

@@ -8,13 +8,13 @@ from click.shell_completion import ShellComplete
 
 from urmpipe.commands.simulate import simulate as command
 from urmpipe.main import cli
-from urmpipe.options.types import UNIT
+from urmpipe.parameters.kinds import UNIT_MODEL
 
 
 def test_names_complete_in_the_shell() -> None:
     context, argument = click.Context(command), command.params[0]
-    assert argument.type.shell_complete(context, argument, "six")[1].value == "six-drives"
-    units = UNIT.shell_complete(context, argument, "dc")
+    assert argument.shell_complete(context, "six")[1].value == "six-drives"
+    units = UNIT_MODEL.complete(context, argument, "dc")
     assert [(one.value, one.type) for one in units] == [("dc", "file"), ("dc_drive", "plain")]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import urmpipe as public
-from urmpipe.main import COMMANDS, cli
+from urmpipe.main import cli, find_commands
 from urmpipe_pipeline.presentation.section import Section, Table
 from urmpipe_pipeline.results import present
 
@@ -23,7 +23,8 @@ LINES = {
     "accuracy": f"accuracy --path {CUBE} --robot irb60",
     "compare": "compare path.csv log.csv --baseline before.rrd",
     "diagnose": "diagnose path.csv log.csv", "ik": "ik targets.csv --robot ur5e", "ingest": "ingest log.csv",
-    "plan": f"plan {CUBE}", "report": "report run.rrd --figures figures", "simulate": "simulate one-drive",
+    "iso": "iso path.csv log.csv", "plan": f"plan {CUBE}",
+    "report": "report run.rrd --figures figures", "simulate": "simulate one-drive",
 }  # fmt: skip
 
 TIMES = [("5ms", 0.005), ("0.02", 0.02), ("30us", 3e-5), ("20", 20.0)]
@@ -37,7 +38,7 @@ TAKEN: dict[tuple[str, str], list[tuple[str, Any]]] = {
     ("accuracy", "jerk"): [("60m/s3", 60.0), ("9000mm/s^3", 9.0)],
     ("accuracy", "limit"): DEVIATIONS,
     ("accuracy", "velocities"): [("100mm/s,0.2,3m/s", (0.1, 0.2, 3.0))],
-    ("compare", "band"): DEVIATIONS,
+    ("iso", "band"): DEVIATIONS,
     ("compare", "noise"): [("5um,angle=0.5deg,AV=1%", {"norm": 5e-6, "angle": np.pi / 360, "AV": 0.01})],
     ("compare", "period"): TIMES,
     ("compare", "sync"): [*TIMES, ("-200ms", -0.2)],
@@ -66,7 +67,7 @@ SHARES_AND_ANGLES = [
 ]
 REFUSED = {
     ("accuracy", "limit"): UNCLEAR,
-    ("compare", "band"): UNCLEAR,
+    ("iso", "band"): UNCLEAR,
     ("compare", "noise"): [*UNCLEAR, *SHARES_AND_ANGLES],
     ("compare", "tolerance"): [*UNCLEAR, *SHARES_AND_ANGLES],
     ("diagnose", "tolerance"): [*UNCLEAR, *SHARES_AND_ANGLES],
@@ -99,7 +100,7 @@ def ran(request: pytest.FixtureRequest, urmpipe: Callable[..., Any], tmp_path: P
 
 def options_of_quantities() -> Iterator[tuple[str, str]]:
     """Yield the options that are declared as a number with a unit."""
-    for name in COMMANDS:
+    for name in find_commands():
         command = cli.get_command(click.Context(cli), name)
         for param in command.params if command else ():
             if isinstance(param, click.Option) and param.type.name.startswith("NUMBER["):
@@ -172,14 +173,18 @@ def test_a_text_with_units_does_what_its_numbers_do(
     ("line", "said"),
     [
         ("robot show ur5e --q 0,0,0,0,0,5mm", "q: found wrist_3_joint = 5mm, allowed: an angle in rad"),
-        ("network check boom.toml --set turn=5mm", "controls (--controls): found turn = 5mm, allowed: a"
-                                                   " number, or"),
-        ("compare p l --iso --tolerance AV=1.01", "tolerance (--tolerance): found AV=1.01, allowed: a"
-                                                  " unit: AV=1.01%"),
-        ("compare p l --iso --tolerance AT=1", "tolerance (--tolerance): found AT=1, allowed: a unit:"
-                                               " AT=1mm or AT=1m"),
-        ("ingest log.csv --interval -180:180deg", "interval (--interval): found '-180:180deg', allowed:"
-                                                  " LOW:HIGH"),
+        (
+            "network check boom.toml --set turn=5mm",
+            "controls (--controls): found turn = 5mm,"
+            " allowed: a number, or",
+        ),
+        ("iso p l --tolerance AV=1.01", "tolerance (--tolerance): found AV=1.01, allowed: a unit: AV=1.01%"),
+        ("iso p l --tolerance AT=1", "tolerance (--tolerance): found AT=1, allowed: a unit: AT=1mm or AT=1m"),
+        (
+            "ingest log.csv --interval -180:180deg",
+            "interval (--interval): found"
+            " '-180:180deg', allowed: LOW:HIGH",
+        ),
         ("plan p --velocity 30deg/s", "velocity (--velocity): found '30deg/s', allowed: a speed in m/s"),
     ],
 )  # fmt: skip

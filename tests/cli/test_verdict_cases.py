@@ -65,7 +65,7 @@ def test_the_measured_motion_fails_beside_a_command_that_does_not(
 
 
 def test_cycles_that_do_not_follow_fail_the_test(urmpipe: Run, cases: Path) -> None:
-    ran = urmpipe("compare", "sq.csv", "t10d.csv", "--iso", "--tolerance", "AP=0.4mm,AT=1mm")
+    ran = urmpipe("iso", "sq.csv", "t10d.csv", "--tolerance", "AP=0.4mm,AT=1mm")
     assert ran.code == 1
     assert ran.out.startswith("FAIL  1 of 10 cycles")
 
@@ -81,7 +81,7 @@ def test_the_same_data_on_both_sides_is_a_warning(urmpipe: Run, cases: Path) -> 
     [
         ("ik reach.csv --robot ur5e --tolerance 3.5", "3.5mm or 3.5m"),
         ("compare path.csv ok.csv --robot ur5e --tolerance 0.1", "0.1mm or 0.1m"),
-        ("accuracy --limit 0.4", "0.4mm or 0.4m"),
+        ("accuracy --path cube: --limit 0.4", "0.4mm or 0.4m"),
     ],
 )
 def test_a_deviation_of_an_unclear_unit_is_refused(

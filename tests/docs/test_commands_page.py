@@ -11,7 +11,7 @@ import click
 import pytest
 
 from pages import DOCS, command_lines, commands_in_text, pages, script, text_of
-from urmpipe.defaults import EACH_TIME
+from urmpipe.command_line import ParamOption, long_name
 from urmpipe.main import cli
 from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.cosim import system_names
@@ -44,7 +44,13 @@ def test_every_option_of_every_command_is_on_it(writer: Any) -> None:
 
 def test_what_has_no_default_is_named(writer: Any) -> None:
     defaults = text_of("docs/commands.md").split("**Defaults.**")[1].split("\n\n")[0]
-    assert all(f"`{name.removeprefix('--')}`" in defaults for name in EACH_TIME)
+    each_call = {
+        long_name(option)
+        for _, context in writer.commands()
+        for option in context.command.params
+        if isinstance(option, ParamOption) and option.param.each_call
+    }
+    assert [name for name in sorted(each_call) if f"`{name}`" not in defaults] == []
 
 
 @pytest.mark.parametrize("page", pages())

@@ -59,7 +59,7 @@ def test_numbers_of_the_page_are_those_of_the_code() -> None:
 @pytest.mark.slow
 def test_the_object_of_the_page_has_the_keys_and_values_of_the_code() -> None:
     told = json.loads(snippets("docs/iso.md", "json")[0])
-    found = there(urmpipe.compare("square.csv", "test.csv", iso=True, tolerance="AP=0.4mm").iso).to_dict()
+    found = there(urmpipe.iso("square.csv", "test.csv", tolerance="AP=0.4mm").iso).to_dict()
     assert told["poses"] == found["poses"]
     for key, digits in (("cycles", 4), ("criteria", 6)):
         assert told[key] == [rounded(one, digits) for one in found[key][: len(told[key])]]

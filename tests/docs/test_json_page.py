@@ -17,7 +17,7 @@ import urmpipe
 from diagnoses import diagnosis_of
 from flat_arm import lay_flat_arm
 from pages import lay, repeated_files
-from urmpipe.main import COMMANDS, cli, run
+from urmpipe.main import cli, find_commands, run
 from urmpipe_datasets import LOGS
 from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.robots.catalogue import load_robot
@@ -86,8 +86,8 @@ def test_each_key_of_a_diagnosis_is_named() -> None:
 @pytest.mark.slow
 def test_each_key_of_a_test_after_iso_9283_is_named(tmp_path: Path) -> None:
     lay(tmp_path, repeated_files())
-    before = urmpipe.compare(tmp_path / "square.csv", tmp_path / "test.csv", iso=True)
-    result = urmpipe.compare(tmp_path / "square.csv", tmp_path / "test.csv", iso=True, baseline=before)
+    before = urmpipe.iso(tmp_path / "square.csv", tmp_path / "test.csv")
+    result = urmpipe.iso(tmp_path / "square.csv", tmp_path / "test.csv", baseline=before)
     found = result.to_dict()
     assert keys(found) - NAMED == set()
     assert {"cycles", "poses", "criteria", "at", "last_row"} <= keys(found["iso"])
@@ -111,6 +111,7 @@ def test_each_key_of_a_simulation_is_named() -> None:
 CALLS = {
     "accuracy accuracy": "accuracy --path short.csv --robot arm.toml --velocities 0.05 --backend python",
     "compare compare": "compare path.csv log.csv --robot urm6",
+    "iso iso": "iso path.csv log.csv --robot urm6",
     "diagnose diagnose": "diagnose path.csv log.csv --robot urm6",
     "export export": "export log.rrd -o log.parquet",
     "fmu build": "fmu build dc_drive --backend python",
@@ -155,7 +156,7 @@ def test_each_command_with_json_is_called_and_named() -> None:
     context = click.Context(cli)
     asked = {
         f"{name} {one.name}"
-        for name in COMMANDS
+        for name in find_commands()
         for command in [cli.get_command(context, name)]
         for one in (command.commands.values() if isinstance(command, click.Group) else [command])
         if one is not None and any("--json" in param.opts for param in one.params)

@@ -110,7 +110,7 @@ def test_the_map_and_the_defaults_of_the_page_are_sound(tmp_path: Path) -> None:
     names = ("ingest", "compare")
     commands = {name: getattr(import_module(f"urmpipe.commands.{name}"), name) for name in names}
     ingest, compare = (defaults_for(commands[name], tmp_path / "urmpipe.toml", commands) for name in names)
-    assert ingest == {"robot": "ur5e", "log_map": str(tmp_path / "maps/lab.toml")}
+    assert ingest == {"robot": "ur5e", "map": str(tmp_path / "maps/lab.toml")}
     assert compare == {"robot": "ur5e", "tolerance": ["0.002"]}
 
 

@@ -16,7 +16,7 @@ import pytest
 
 import urmpipe
 from asserting import there
-from urmpipe.main import COMMANDS, cli, run
+from urmpipe.main import cli, find_commands, run
 from urmpipe_datasets import LOGS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "python.md").read_text(encoding="utf-8")
@@ -97,7 +97,7 @@ def options() -> dict[str, set[str]]:
     """The options of each command that is a function, by its name."""
     context = click.Context(cli)
     found: dict[str, set[str]] = {}
-    for name in COMMANDS:
+    for name in find_commands():
         command = there(cli.get_command(context, name))
         for one in command.commands.values() if isinstance(command, click.Group) else [command]:
             if name not in ("demo", "robot") and one.name != "check":
@@ -118,7 +118,7 @@ def test_options_of_the_same_name_are_keywords() -> None:
     row = next(line for line in PAGE.splitlines() if line.endswith("| the same name, `_` for `-` |"))
     keywords = {one[2:].replace("-", "_") for one in re.findall(r"`(--[a-z-]+)`", row)}
     functions = (
-        "ingest", "compare", "ik", "plan", "accuracy", "report", "export", "simulate", "build_fmu",
+        "ingest", "compare", "iso", "ik", "plan", "accuracy", "report", "export", "simulate", "build_fmu",
         "network_drive",
     )  # fmt: skip
     assert keywords <= {name for one in functions for name in signature(getattr(urmpipe, one)).parameters}

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from forks import Ended, Forks
 from jobs import Job, check_whole
-from urmpipe.error_boundary import OWN_ERROR
+from urmpipe.answers import OWN_ERROR
 
 Content = dict[str, bytes]
 

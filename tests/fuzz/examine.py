@@ -14,7 +14,7 @@ from tests.fuzz.byte_mutators import mutate
 from tests.fuzz.corpus import Specimen
 from tests.fuzz.kinds import Kind
 
-from urmpipe.error_boundary import OWN_ERROR, findings_of
+from urmpipe.answers import OWN_ERROR, error_to_findings
 
 FAULT, ABORT, SLOW, LARGE = "fault", "abort", "slow", "large"
 """What can be wrong: an error that is none of urmpipe's, an end of the process, too long, too much memory."""
@@ -77,7 +77,7 @@ def examine(kind: Kind, path: Path, made: Path, rng: Random) -> Outcome:
     if error is None:
         return Outcome(seconds, peak, LARGE if peak > MEMORY else "")
     try:
-        lines = [str(one) for one in findings_of(error)]
+        lines = [str(one) for one in error_to_findings(error)]
     except Exception as second:  # an error that cannot be told
         lines, error = [OWN_ERROR], second
     text = "".join(traceback.format_exception(error))[-20_000:]

@@ -111,7 +111,7 @@ def log_map(path: Path, made: Path, rng: Random) -> None:
     import urmpipe
 
     found = urmpipe.read_map(path)
-    told(urmpipe.ingest(made / "log.csv", log_map=found, robot=None if found.robot else "ur5"))
+    told(urmpipe.ingest(made / "log.csv", map=found, robot=None if found.robot else "ur5"))
 
 
 def system(path: Path, made: Path, rng: Random) -> None:

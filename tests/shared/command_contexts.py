@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import click
 
-from urmpipe.main import COMMANDS, cli
+from urmpipe.main import cli, find_commands
 
 
 def contexts() -> Iterator[click.Context]:
     """The context of each command, those in groups, too, as `main` makes it."""
     top = click.Context(cli, info_name="urmpipe", **cli.context_settings)
-    for name in COMMANDS:
+    for name in find_commands():
         command = cli.get_command(top, name)
         assert command is not None
         context = click.Context(command, top, name)

@@ -89,7 +89,7 @@ def judged(result: Comparison) -> IsoTest:
 def told(reference: Path, done: Path | Sequence[Path], **options: object) -> IsoTest:
     """Return what the cycles of a test tell."""
     many = done if isinstance(done, Path) else list(done)
-    return judged(urmpipe.compare(reference, many, iso=True, **options))  # type: ignore[arg-type]
+    return judged(urmpipe.iso(reference, many, **options))  # type: ignore[arg-type]
 
 
 def values_of(test: IsoTest) -> dict[tuple[str, str | None], float | None]:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from numbers import Real
 from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
 
-from urmpipe.arm_placing import Frame, Robot
+from urmpipe.arm_placing import Robot
 from urmpipe.driven_runs import ArmRuns, ArmUnit, running_speed
-from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
 from urmpipe.output_files import guarded_outputs
-from urmpipe.reading import UntimedReading, map_files, options_of, resolved
+from urmpipe.parameters import kinds
+from urmpipe.parameters.motions import Accuracy as AccuracyParameters
+from urmpipe.public_functions import PathLike, as_paths, public_function, raise_warnings, reject_recording
+from urmpipe.reading import map_files, resolve_reading, to_read_options
 from urmpipe.systems.blocks import ON_PYTHON
 from urmpipe.systems.units import Backend
 from urmpipe_fmus.build.fmu import select_backend
@@ -31,22 +31,18 @@ from urmpipe_models.errors import (
     format_value,
     map_collecting_errors,
 )
-from urmpipe_models.planning.laws import Arcs
 from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
-from urmpipe_pipeline.accuracy.result import DECIDES, FASTEST, AccuracyResult, Decides
+from urmpipe_pipeline.accuracy.result import FASTEST, AccuracyResult, Decides
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import HEAD, PATH_ROW
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planning import joints_of, plan_path
-from urmpipe_pipeline.planned_paths.request import Law, Request, Timing, checked_timing, refuse_unlimited
+from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing, refuse_unlimited
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.solved_targets.request import JointValues, start_of
-
-VELOCITIES = tuple(round(0.1 * k, 1) for k in range(1, 11))
-"""Ten velocities in [m/s], where none are given: those of the paper's Fig. 7."""
 
 POSES = 10
 """Poses along the path at which the sampled loop is looked at."""
@@ -57,35 +53,12 @@ REACHED = 1.0 - 1e-6
 SLOWER = "some hundred"
 """How much longer ten velocities of irb60 take in NumPy (benchmarks/results/accuracy.md)."""
 
-RUNNING = 0.9
-"""Share of the work that the runs are."""
+RUNNING_SHARE = 0.9  # of the work
 
 
-@public_reading(UntimedReading)
+@public_function(AccuracyParameters, path=kinds.PLANNED, robot=kinds.ROBOT)
 def accuracy(
-    path: PathLike | PathRows,
-    robot: Robot | None = None,
-    *,
-    velocities: Sequence[float] = VELOCITIES,
-    acceleration: float | None = None,
-    law: Law = "trapezoid",
-    jerk: float | None = None,
-    arcs: Arcs = "tangential",
-    limit: float | None = None,
-    error: Decides = "time",
-    force: Sequence[float] | None = None,
-    base: Frame | None = None,
-    tool: Frame | None = None,
-    base_link: str | None = None,
-    tip_link: str | None = None,
-    start: JointValues | None = None,
-    backend: Backend | None = None,
-    strict: bool = False,
-    output: PathLike | None = None,
-    inputs: Sequence[PathLike] = (),
-    told: Callable[[str], None] | None = None,
-    progress: Callable[[float], None] | None = None,
-    **reading: Unpack[UntimedReading],
+    path: PathLike | PathRows, robot: Robot | None = None, **options: Unpack[AccuracyParameters]
 ) -> AccuracyResult:
     """Run an arm with drives along a path at some velocities, and measure how far it is from it.
 
@@ -97,28 +70,9 @@ def accuracy(
     Args:
         path: A file of rows x, y, z, r; a test cube, such as "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"; or rows.
         robot: The arm, with masses, and a drive or a spring for every joint; default: that of the map.
-        velocities: Largest speeds along the path in [m/s]; default: 0.1, 0.2, ..., 1.0.
-        acceleration: The largest acceleration in [m/s2] at all of them; default: 6, with the law limits none.
-        law: trapezoid, jerk or limits, as in `plan`.
-        jerk: The largest jerk of the law jerk in [m/s3].
-        arcs: What the acceleration limits on arcs, as in `plan`.
-        limit: The largest error allowed in [m]; with it there is a verdict, and the running speed is found.
-        error: Which error is judged: time, from the set point of the same time, or path, from the nearest
-            point of the path. Both are told.
-        force: What acts on the tool from outside in [N], along the axes of the world, all the time.
-        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
-        tool: The tool centre point in the frame of the arm's tip, likewise.
-        base_link: Link of a URDF where the arm begins; default: its root.
-        tip_link: Link of a URDF where the arm ends; default: its end.
-        start: Joint values in [rad] or [m], or texts with units, shape (joints,), to be near to at
-            the first sample.
-        backend: native: as machine code; python: in NumPy; default: native if it can be built here.
-        strict: Whether a warning is an error, but for the one that the arm runs in NumPy.
-        output: The recording (.rrd) to write.
-        inputs: Files besides the path that are never replaced.
-        told: Told what takes its time, a line each.
-        progress: Called with the share that is done, 0..1.
-        **reading: How to read the file where it does not show it, as of `plan`.
+        **options: Velocities, the law of time, the limit, how the file is read, what is written: the options
+            of `urmpipe accuracy`, by their names. With `strict`, all warnings are errors, except that the arm
+            runs in NumPy.
 
     Returns:
         The accuracy: `errors` (of each velocity: `error`, `path_error` in [m], None if it diverged,
@@ -130,26 +84,30 @@ def accuracy(
 
     Source: [Iso9283]_ sections 5 and 6, eq. 6 and 7.
     """
-    tell, done = told or (lambda line: None), progress or (lambda share: None)
-    timing = Timing(law, None, acceleration, jerk, arcs)
+    values: Mapping[str, Any] = options  # as their kinds read them
+    on_message = values["on_message"] or (lambda line: None)
+    progress = values["progress"] or (lambda share: None)
+    limit, error = values["limit"], values["error"]
+    timing = Timing(values["law"], None, values["acceleration"], values["jerk"], values["arcs"])
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: _request(resolved(reading, robot, base, tool, base_link, tip_link).arm, start, timing),
-        lambda: _given(path, reading),
+        lambda: _request(resolve_reading(values, robot).arm, values["start"], timing),
+        lambda: _read_rows(path, values),
         lambda: checked_timing(timing),
-        lambda: _checked(velocities, limit, error, force),
+        lambda: _check_velocities(values["velocities"]),
     )
-    request, given, _, pushed = map_collecting_errors(lambda make: make(), parts)
-    kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
-    with guarded_outputs({"recording": output}, kept) as written:
-        asked = list(dict.fromkeys(map(float, velocities)))
+    request, rows, _, velocities = map_collecting_errors(lambda part: part(), parts)
+    kept = [*([] if rows.file is None else as_paths(str(path))), *map_files(values), *values["inputs"]]
+    with guarded_outputs({"recording": values["output"]}, kept) as written:
+        force = values["force"] or (0.0, 0.0, 0.0)
         runs, notes = _runs(
-            given, request, pushed, backend, tell, lambda share: done(RUNNING * share), asked[0]
-        )
-        motions = runs.run(asked)
-        speed = None if limit is None else running_speed(_judge(runs, limit, error), asked)
-        result = _accuracy(given, request, runs, motions, speed, limit, error, notes)
-        refuse_warnings(strict, [one for one in result.warnings if one.kind != ON_PYTHON])
-        return written.recorded(result, lambda share: done(RUNNING + (1.0 - RUNNING) * share))
+            rows, request, force, values["backend"], on_message,
+            lambda share: progress(RUNNING_SHARE * share), velocities[0],
+        )  # fmt: skip
+        motions = runs.run(velocities)
+        speed = None if limit is None else running_speed(_judge(runs, limit, error), velocities)
+        result = _accuracy(rows, request, runs, motions, speed, limit, error, notes)
+        raise_warnings(values["strict"], [one for one in result.warnings if one.kind != ON_PYTHON])
+        return written.recorded(result, lambda share: progress(RUNNING_SHARE + (1.0 - RUNNING_SHARE) * share))
 
 
 def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Request:
@@ -181,42 +139,24 @@ def _refuse_undriven(arm: Chain) -> None:
         raise RobotError(*faults)
 
 
-def _given(path: PathLike | PathRows, reading: Any) -> GivenPath:
+def _read_rows(path: PathLike | PathRows, options: Mapping[str, Any]) -> GivenPath:
     """Return the rows of a path; raise a `LogError` if it is a recording."""
-    refuse_recording(path, "a table (CSV) of rows, or a test cube (cube:...)")
+    reject_recording(path, "a table (CSV) of rows, or a test cube (cube:...)")
     if isinstance(path, (str, Path)) and Path(path).is_file():
         with Path(path).open("rb") as file:
             header = file.readline(HEAD)
         if PATH_ROW.encode() in header:
             found, allowed = "the log of a plan", "the rows that it was made of"
             raise LogError(Finding(file=str(path), found=found, allowed=allowed))
-    return given_path(path, options_of(reading))
+    return given_path(path, to_read_options(options))
 
 
-def _checked(
-    velocities: Sequence[float], limit: float | None, error: str, force: Sequence[float] | None
-) -> tuple[float, float, float]:
-    """Return the force on the tool; raise an `OptionError` with every option that makes no sense."""
-    if faults := [*_faults(velocities, limit, error, force)]:
-        raise OptionError(*faults)
-    x, y, z = (0.0, 0.0, 0.0) if force is None else map(float, force)
-    return x, y, z
-
-
-def _faults(
-    velocities: Sequence[float], limit: float | None, error: str, force: Sequence[float] | None
-) -> Iterator[Finding]:
-    """Yield what is wrong with options."""
-    bad = [one for one in velocities if not (isinstance(one, Real) and 0.0 < float(one) < math.inf)]
-    if bad or not len(velocities):
-        found = ", ".join(map(format_value, bad)) or "none"
-        yield Finding(parameter="velocities", found=found, allowed="finite numbers of m/s above 0")
-    if limit is not None and not (isinstance(limit, Real) and 0.0 < float(limit) < math.inf):
-        yield Finding(parameter="limit", found=format_value(limit), allowed="a finite number of m above 0")
-    if error not in DECIDES:
-        yield Finding(parameter="error", found=format_value(error), allowed=", ".join(DECIDES))
-    if force is not None and not (len(force) == 3 and np.isfinite(np.asarray(force, dtype=float)).all()):
-        yield Finding(parameter="force", found=format_value(list(force)), allowed="three finite numbers of N")
+def _check_velocities(velocities: Sequence[float]) -> list[float]:
+    """Return each velocity in [m/s] once; raise an `OptionError` if one is not above 0."""
+    if wrong := [format_value(velocity) for velocity in velocities if velocity <= 0.0]:
+        allowed = "finite numbers of m/s above 0"
+        raise OptionError(Finding(parameter="velocities", found=", ".join(wrong), allowed=allowed))
+    return list(dict.fromkeys(velocities))
 
 
 def _runs(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from urmpipe.arm_placing import Robot
-from urmpipe.keyword_checks import PathLike, one_or_many, public
+from urmpipe.parameters import kinds
+from urmpipe.parameters.systems import BuildFmu
+from urmpipe.public_functions import PathLike, public_function
 from urmpipe.systems.logs import LogTable
-from urmpipe.systems.units import Backend, unit_of
+from urmpipe.systems.units import unit_of
 from urmpipe_fmus.block import BlockModel
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.operands import log_files
@@ -18,35 +20,20 @@ from urmpipe_pipeline.outputs import safe_output
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build.fmu import BuiltFmu
-    from urmpipe_pipeline.sources import LogMap
 
 
-@public
+@public_function(BuildFmu, unit=kinds.UNIT_MODEL, robot=kinds.ROBOT)
 def build_fmu(
-    unit: BlockModel | PathLike,
-    robot: Robot | None = None,
-    *,
-    log: PathLike | LogTable | None = None,
-    options: Mapping[str, Any] | None = None,
-    log_map: PathLike | LogMap | None = None,
-    backend: Backend | None = None,
-    platforms: str | Sequence[str] = (),
-    output: PathLike = ".",
-    told: Callable[[str], None] | None = None,
+    unit: BlockModel | PathLike, robot: Robot | None = None, **options: Unpack[BuildFmu]
 ) -> BuiltFmu:
     """Package a unit as an FMU (FMI 2.0 co-simulation).
 
     Args:
         unit: A name of `urmpipe_fmus.blocks`, a Python file with a unit in it, or a `BlockModel`.
         robot: Name, file (TOML, URDF) or chain of the arm, for a unit that has one.
-        log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
-        options: Further options of the unit by name; see `urmpipe fmu list`.
-        log_map: A map (TOML), or what `read_map` returned: how to read the log.
-        backend: native (C) or python (needs Python with NumPy on the target); default: native if this
-            machine can build it or `platforms` are named, else python, with a `note` why.
-        platforms: linux64, win64; default: this one. Others than this one need the extra `cross`.
-        output: The folder for UNIT.fmu, or a name that ends in .fmu; only an FMU of urmpipe's is replaced.
-        told: Told what takes minutes: compiling for another platform.
+        **options: A log for a unit that plays one (a file, a folder of plots, or what `read_table` returned),
+            `options` of the unit by name, the backend, the output: the options of `urmpipe fmu build`, by
+            their names. Without a compiler for `native` the backend is python, with a `note` why.
 
     Returns:
         The FMU: its `path`, `backend`, `platforms`, `guid` and `note`.
@@ -56,15 +43,20 @@ def build_fmu(
     """
     from urmpipe_fmus.build.fmu import build_fmu as build
 
-    made = unit_of(unit, robot=robot, log=log, options=options, log_map=log_map)
-    path = Path(output)
+    values: Mapping[str, Any] = options  # as their kinds read them
+    log = values["log"]
+    model = unit_of(unit, robot=robot, log=log, options=values["options"], log_map=values["map"])
+    path = values["output"]
     if not path.is_dir() and path.suffix.lower() != ".fmu":
         allowed = "a folder that exists, or a name that ends in .fmu"
         raise OutputError(Finding(f"found no folder, allowed: {allowed}", str(path)))
-    target = path / f"{made.name}.fmu" if path.is_dir() else path
-    inputs = [file for one in (unit, robot, log) for file in _files(one)]
+    target = path / f"{model.name}.fmu" if path.is_dir() else path
+    inputs = [file for operand in (unit, robot, log) for file in _files(operand)]
     with safe_output(target, inputs, "fmu") as part:
-        built = build(made, part, backend=backend, platforms=tuple(one_or_many(platforms)), on_message=told)
+        built = build(
+            model, part, backend=values["backend"], platforms=values["platforms"],
+            on_message=values["on_message"],
+        )  # fmt: skip
         return replace(built, path=target)
 
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
-from urmpipe.arm_placing import Frame, Robot, place_robot
-from urmpipe.keyword_checks import PathLike, public
+from urmpipe.arm_placing import Robot, place_robot
+from urmpipe.parameters import kinds
+from urmpipe.parameters.outputs import Equations as EquationsParameters
+from urmpipe.parameters.param import params_of
+from urmpipe.parameters.shared import Placing
+from urmpipe.public_functions import public_function
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.files import write_export
-from urmpipe_models.lagrange.derivation import TERMS, TermName
+from urmpipe_models.lagrange.derivation import TERMS
 from urmpipe_models.lagrange.formulas import (
     Cost,
     Operations,
@@ -24,8 +29,6 @@ from urmpipe_models.lagrange.formulas import (
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FormName = Literal["text", "c"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -88,29 +91,15 @@ class Equations(Displayable):
         }
 
 
-@public
-def equations(
-    robot: Robot,
-    *,
-    base: Frame | None = None,
-    tool: Frame | None = None,
-    base_link: str | None = None,
-    tip_link: str | None = None,
-    form: FormName | None = None,
-    term: TermName | Literal["all"] = "all",
-    output: PathLike | None = None,
-) -> Equations:
+@public_function(EquationsParameters, robot=kinds.ROBOT)
+def equations(robot: Robot, **options: Unpack[EquationsParameters]) -> Equations:
     """Derive the equations of motion of an arm of up to 4 coordinates as formulas. See docs/dynamics.md.
 
     Args:
         robot: The arm, with masses.
-        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
-        tool: The tool centre point in the frame of the arm's tip, likewise.
-        base_link: Link of a URDF where the arm begins; default: its root.
-        tip_link: Link of a URDF where the arm ends; default: its end.
-        form: text: a line a term; c: functions in C99; default: c for an output that ends in .c, else text.
-        term: inertia, centrifugal, coriolis, gravity or tool alone; default: all of them.
-        output: A file to write; it replaces only another export of a robot.
+        **options: The place of the arm, `form` (text: a line per term; c: functions in C99), `term`, and
+            `output`, a file to write, which replaces only another export of a robot: the options of `urmpipe
+            robot equations`, by their names.
 
     Raises:
         UrmpipeError: With what is wrong with the arm, such as no masses or too many coordinates; if SymPy
@@ -118,14 +107,16 @@ def equations(
 
     Source: [Iso9283]_ eq. 8-13, section 4.
     """
-    is_c = output is not None and Path(output).suffix == ".c"
-    form = form or ("c" if is_c else "text")
+    values: Mapping[str, Any] = options  # as their kinds read them
+    output, term = values["output"], values["term"]
+    is_c = output is not None and output.suffix == ".c"
+    form = values["form"] or ("c" if is_c else "text")
     if is_c and form == "text":
         raise OptionError(Finding(parameter="form", found=f"text for {output}", allowed="c, or another name"))
-    chain = cast("Chain", place_robot(robot, base, tool, base_link=base_link, tip_link=tip_link))
+    placing = {name: values[name] for name in params_of(Placing)}
+    chain = cast("Chain", place_robot(robot, **placing))
     found = open_form(chain, TERMS if term == "all" else (term,))
     text = c_code(found) if form == "c" else equations_text(found)
-    target = None if output is None else Path(output)
-    if target is not None:
-        write_export(target, text, Path(chain.name if isinstance(robot, Chain) else robot))
-    return Equations(chain, text, found.costs, target)
+    if output is not None:
+        write_export(output, text, Path(chain.name if isinstance(robot, Chain) else robot))
+    return Equations(chain, text, found.costs, output)

@@ -2,62 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from urmpipe.arm_placing import Frame, Robot
-from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
+from urmpipe.arm_placing import Robot
 from urmpipe.output_files import output_kind
-from urmpipe.reading import Resolved, TableReading, map_files, resolved
+from urmpipe.parameters import kinds
+from urmpipe.parameters.motions import Ik
+from urmpipe.public_functions import as_paths, public_function, raise_warnings, reject_recording
+from urmpipe.reading import ResolvedReading, map_files, resolve_reading
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
-from urmpipe_models.ik.solutions import DEFAULT_SEARCH, SearchOptions
-from urmpipe_models.ik.solve import Method
+from urmpipe_models.ik.solutions import SearchOptions
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import check_output, safe_output
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
-from urmpipe_pipeline.solved_targets.request import JointValues, Request, refuse_unsolvable, start_of
+from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, start_of
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
-SOLVING = 0.7
-"""Share of the work that solving is where something is written, too."""
-
-RESTARTS = DEFAULT_SEARCH.restarts
-"""Random starts of the iterative solver for a target that it does not reach from the start."""
+SOLVING_SHARE = 0.7  # of the work, where an output is written, too
 
 
-@public_reading(TableReading)
+@public_function(Ik, targets=kinds.TARGETS, robot=kinds.ROBOT)
 def ik(
     targets: TargetsLike,
     robot: Robot | None = None,
     *,
-    base: Frame | None = None,
-    tool: Frame | None = None,
-    base_link: str | None = None,
-    tip_link: str | None = None,
     t: ArrayLike | None = None,
-    tsp: float | None = None,
-    start: JointValues | None = None,
-    every: bool = False,
-    tolerance: float | None = None,
-    within_pi: bool = False,
-    method: Method = "auto",
-    restarts: int = RESTARTS,
-    seed: int = 0,
-    strict: bool = False,
-    output: PathLike | None = None,
-    inputs: Sequence[PathLike] = (),
-    progress: Callable[[float], None] | None = None,
-    **reading: Unpack[TableReading],
+    **options: Unpack[Ik],
 ) -> IkResult:
     """Find the joint values that bring an arm's tool to targets, limits kept. See docs/ik.md.
 
@@ -67,26 +48,9 @@ def ik(
     Args:
         targets: A file; positions in [m], shape (n, 3); poses as matrices, shape (n, 4, 4); or `Targets`.
         robot: The arm.
-        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
-        tool: The tool centre point in the frame of the arm's tip, likewise.
-        base_link: Link of a URDF where the arm begins; default: its root.
-        tip_link: Link of a URDF where the arm ends; default: its end.
         t: Times of arrays in [s], shape (n,).
-        tsp: Time from target to target in [s] where the targets have no times.
-        start: Joint values in [rad] or [m], or texts with units, shape (joints,), to be near to;
-            default: the robot's own.
-        every: Collect all solutions of any arm, and record every branch as a ghost arm.
-        tolerance: A target out of reach takes the nearest point within this on each axis, in [m].
-        within_pi: Write the joints of a path within -pi to pi, with jumps.
-        method: closed or iterative to allow only one; default: closed where there is one.
-        restarts: Random starts of the iterative solver.
-        seed: Of the random starts: the same seed, the same solutions.
-        strict: Whether a warning is an error.
-        output: A joint log (.csv) or a recording (.rrd) to write.
-        inputs: Files besides the targets that are never replaced.
-        progress: Called with the share that is done, 0..1.
-        **reading: How to read the file where it does not show it: unit, time, rotation, log_map and the
-            others of `urmpipe.TableReading`.
+        **options: How solutions are searched for, how the file is read, what is written: the options of
+            `urmpipe ik`, by their names.
 
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output. A target that is out of
@@ -94,28 +58,27 @@ def ik(
 
     Source: [Serial6dof2019]_ section 4, [UrmArm2021]_ section 5.
     """
-    path = None if output is None else Path(output)
-    said = resolved(reading, robot, base, tool, base_link, tip_link)
+    values: Mapping[str, Any] = options  # as their kinds read them
+    path = values["output"]
+    resolved = resolve_reading(values, robot)
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: _arm_of(said),
+        lambda: _require_arm(resolved),
         lambda: output_kind(path, "joints"),
-        lambda: _given(targets, t, tsp, said.options),
+        lambda: _read_targets(targets, t, values["tsp"], resolved.options),
     )
-    arm, kind, given = map_collecting_errors(lambda make: make(), parts)
-    solving, writing = _parts(progress, path is not None)
-    search = SearchOptions(tolerance, restarts, seed)
-    request = Request(arm, given, start_of(arm, start), every, within_pi, method, search)
+    arm, kind, rows = map_collecting_errors(lambda part: part(), parts)
+    solving, writing = _split_progress(values["progress"], path is not None)
+    search = SearchOptions(*(values[name] for name in ("tolerance", "restarts", "seed")))
+    start = start_of(arm, values["start"])
+    request = Request(arm, rows, start, values["every"], values["within_pi"], values["method"], search)
     refuse_unsolvable(request, recorded=kind == "recording")
 
-    kept = [
-        *(paths(targets) if isinstance(targets, (str, Path)) else []),
-        *map_files(reading),
-        *paths(inputs),
-    ]
+    files = as_paths(targets) if isinstance(targets, (str, Path)) else []
+    kept = [*files, *map_files(values), *values["inputs"]]
     if path is not None and kind is not None:
         check_output(path, kept, kind)
     result = solve_targets(request, solving)
-    refuse_warnings(strict, result.warnings)
+    raise_warnings(values["strict"], result.warnings)
     if path is None:
         return result
     if not result.reached.any():
@@ -129,19 +92,19 @@ def ik(
     return replace(result, recording=path)
 
 
-def _arm_of(said: Resolved) -> Chain:
+def _require_arm(resolved: ResolvedReading) -> Chain:
     """Return the arm; raise an `OptionError` if there is none."""
-    if said.arm is None:
+    if resolved.arm is None:
         allowed = f"a TOML, a URDF or one of {', '.join(robot_names())}"
         raise OptionError(Finding(parameter="robot", found="none", allowed=allowed))
-    return said.arm
+    return resolved.arm
 
 
-def _given(
+def _read_targets(
     targets: TargetsLike, t: ArrayLike | None, tsp: float | None, read: ReadOptions | None
 ) -> GivenTargets:
     """Return targets with their rows and times; raise a `LogError` if they are a recording."""
-    refuse_recording(targets, "a table (CSV) of targets")
+    reject_recording(targets, "a table (CSV) of targets")
     return given_targets(targets, t, tsp, read)
 
 
@@ -158,11 +121,11 @@ def _write_joints(result: IkResult, path: Path, kept: Sequence[Path]) -> None:
         )  # fmt: skip
 
 
-def _parts(
+def _split_progress(
     progress: Callable[[float], None] | None, writes: bool
 ) -> tuple[Callable[[float], None] | None, Callable[[float], None] | None]:
     """Return the progress functions of solving and of writing; None where no progress is reported."""
     if progress is None:
         return None, None
-    share = SOLVING if writes else 1.0
+    share = SOLVING_SHARE if writes else 1.0
     return lambda done: progress(share * done), lambda done: progress(share + (1.0 - share) * done)

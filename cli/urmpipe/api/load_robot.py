@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from urmpipe.keyword_checks import PathLike, public
+from urmpipe.parameters import kinds
+from urmpipe.public_functions import PathLike, public_function
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.robots import catalogue
 
 
-@public
+@public_function(name_or_path=kinds.ROBOT_FILE, base_link=kinds.LINK, tip_link=kinds.LINK)
 def load_robot(name_or_path: PathLike, *, base_link: str | None = None, tip_link: str | None = None) -> Chain:
     """Return a robot of the catalogue, or of a .toml or .urdf file.
 

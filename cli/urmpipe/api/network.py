@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,15 +11,16 @@ from typing import Any, TypeAlias, Unpack
 
 import numpy as np
 
-from urmpipe.keyword_checks import PathLike, public, public_reading, refuse_warnings
 from urmpipe.output_files import guarded_outputs, output_kind, write_drawing
-from urmpipe.reading import Reading, map_files, resolved
+from urmpipe.parameters import kinds
+from urmpipe.parameters.param import params_of
+from urmpipe.parameters.shared import Reading
+from urmpipe.parameters.systems import DRIVES, NetworkCheck, NetworkDrive, NetworkSolve
+from urmpipe.public_functions import PathLike, public_function, raise_warnings
+from urmpipe.reading import map_files, resolve_reading
 from urmpipe_models.errors import Finding, LogError, OptionError, map_collecting_errors
 from urmpipe_models.networks import file as network_file
-from urmpipe_models.networks.assembly import DEFAULT_RESTARTS
-from urmpipe_models.networks.driving import Law
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.forces import Wrench
 from urmpipe_pipeline.networks.drawing import network_svg
 from urmpipe_pipeline.networks.drive_request import DriveRequest, drive_network
 from urmpipe_pipeline.networks.finding import Search, find_network
@@ -27,7 +29,6 @@ from urmpipe_pipeline.networks.network_motion import NetworkMotion, motion_drawi
 from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
-from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import TableLike, held_of
 from urmpipe_pipeline.sources.tables.text import fingerprint
@@ -36,11 +37,10 @@ from urmpipe_pipeline.tables.csv_files import write_joint_log
 NetworkLike: TypeAlias = PathLike | Mapping[str, Any] | Network
 """A name, a file, the tables of one, or a network."""
 
-SEARCHING = 0.9
-"""Share of the work that assembly is where something is written, too."""
+SEARCHING_SHARE = 0.9  # of the work
 
 
-@public
+@public_function(network=kinds.NETWORK_TABLES)
 def load_network(network: PathLike | Mapping[str, Any]) -> Network:
     """Return a network that urmpipe brings along, of a .toml file, or of such tables. See docs/networks.md.
 
@@ -54,33 +54,14 @@ def load_network(network: PathLike | Mapping[str, Any]) -> Network:
     return network_file.load_network(network)
 
 
-@public
-def network_check(
-    network: NetworkLike,
-    *,
-    controls: Mapping[str, float | str] | None = None,
-    start: Mapping[str, Any] | None = None,
-    restarts: int = DEFAULT_RESTARTS,
-    seed: int = 0,
-    strict: bool = False,
-    draw: PathLike | None = None,
-    output: PathLike | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> NetworkResult:
+@public_function(NetworkCheck, network=kinds.NETWORK)
+def network_check(network: NetworkLike, **options: Unpack[NetworkCheck]) -> NetworkResult:
     """Assemble a network and find how it moves: its graph, its mobility, and which constraints are redundant.
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.
-        controls: Values of controls instead of their starts, by name: numbers in the units of the network,
-            or texts with units, such as "40deg".
-        start: Values of joints in [rad] and [m] by name, or texts with units: the assembly nearest to them is
-            returned; default: the one that a motion from the network's start leads to.
-        restarts: Random starts that are tried in vain where the network's own start does not close.
-        seed: Of the random starts.
-        strict: Whether a warning is an error.
-        draw: An SVG file to draw the graph and the mechanism to.
-        output: The recording (.rrd) to write.
-        progress: Called with the share that is done, 0..1.
+        **options: Values of controls and joints, the search, what is written: the options of `urmpipe network
+            check`, by their names.
 
     Returns:
         `mobility` (None if it does not close: then `gaps`), `assemblies`, `loops`, `clusters`, `warnings`.
@@ -90,24 +71,11 @@ def network_check(
 
     Source: [KinematicSystems]_ section 3.
     """
-    search = Search(controls or {}, start or {}, False, restarts, seed)
-    return _found(network, "check", search, strict, draw, output, progress)
+    return _find(network, "check", options)
 
 
-@public
-def network_solve(
-    network: NetworkLike,
-    *,
-    controls: Mapping[str, float | str] | None = None,
-    start: Mapping[str, Any] | None = None,
-    every: bool = False,
-    restarts: int = DEFAULT_RESTARTS,
-    seed: int = 0,
-    strict: bool = False,
-    draw: PathLike | None = None,
-    output: PathLike | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> NetworkResult:
+@public_function(NetworkSolve, network=kinds.NETWORK)
+def network_solve(network: NetworkLike, **options: Unpack[NetworkSolve]) -> NetworkResult:
     """Assemble a network with its controls held: on the branch of its start, nearest to values, or every way.
 
     Controls away from their start are moved there from the assembly at the start. If no motion leads there,
@@ -115,17 +83,8 @@ def network_solve(
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.
-        controls: Values of controls instead of their starts, by name: numbers in the units of the network,
-            or texts with units, such as "40deg".
-        start: Values of joints in [rad] and [m] by name, or texts with units: the assembly nearest to them is
-            returned; default: the one that a motion from the network's start leads to.
-        every: Find all assemblies, by random starts.
-        restarts: Random starts in a row without anything new that end the search.
-        seed: Of the random starts: the same seed, the same assemblies.
-        strict: Whether a warning is an error.
-        draw: An SVG file to draw the graph and the assemblies to.
-        output: The recording (.rrd) to write; further assemblies are ghosts in it.
-        progress: Called with the share that is done, 0..1.
+        **options: Values of controls and joints, the search, what is written: the options of `urmpipe network
+            solve`, by their names.
 
     Returns:
         `assemblies`, each with its `values` by name in [m] and [rad], `residual` and `mobility`;
@@ -136,55 +95,40 @@ def network_solve(
 
     Source: [KinematicSystems]_ section 3.
     """
-    search = Search(controls or {}, start or {}, every, restarts, seed)
-    return _found(network, "solve", search, strict, draw, output, progress)
+    return _find(network, "solve", options)
 
 
-def _found(
-    network: NetworkLike,
-    command: Command,
-    search: Search,
-    strict: bool,
-    draw: PathLike | None,
-    output: PathLike | None,
-    progress: Callable[[float], None] | None,
-) -> NetworkResult:
-    """Return what is found of a network, and write what was requested."""
+def _find(network: NetworkLike, command: Command, values: Mapping[str, Any]) -> NetworkResult:
+    """Return the assemblies of a network, and write what is named."""
     loaded = network if isinstance(network, Network) else network_file.load_network(network)
-    named = [Path(network)] if isinstance(network, (str, Path)) else []
-    files = [path for path in named if path.suffix.lower() == ".toml"]
-    tell = progress or (lambda share: None)
-    with guarded_outputs({"recording": output, "drawing": draw}, files) as written:
+    search = Search(
+        values["controls"] or {}, values["start"] or {}, values.get("every", False), values["restarts"],
+        values["seed"],
+    )  # fmt: skip
+    files = [path for path in _paths(network) if path.suffix.lower() == ".toml"]
+    progress = values["progress"] or (lambda share: None)
+    with guarded_outputs({"recording": values["output"], "drawing": values["draw"]}, files) as written:
         inputs = [fingerprint(path) for path in files]
-        found = find_network(loaded, command, search, inputs, lambda share: tell(SEARCHING * share))
-        refuse_warnings(strict, found.warnings)
-        written.write("drawing", lambda part, path: write_drawing(part, network_svg(found)))
-        return written.recorded(found, lambda share: tell(SEARCHING + (1.0 - SEARCHING) * share))
+        result = find_network(
+            loaded, command, search, inputs, lambda share: progress(SEARCHING_SHARE * share)
+        )
+        raise_warnings(values["strict"], result.warnings)
+        written.write("drawing", lambda part, path: write_drawing(part, network_svg(result)))
+        return written.recorded(
+            result, lambda share: progress(SEARCHING_SHARE + (1.0 - SEARCHING_SHARE) * share)
+        )
 
 
-@public_reading(Reading)
+def _paths(*operands: object) -> list[Path]:
+    """Return the operands that are names of files, as paths."""
+    return [Path(operand) for operand in operands if isinstance(operand, (str, Path))]
+
+
+@public_function(NetworkDrive, network=kinds.NETWORK, drives=DRIVES)
 def network_drive(
     network: NetworkLike,
     drives: Mapping[str, Range] | None = None,
-    *,
-    steps: int | None = None,
-    duration: float | None = None,
-    law: Law = "uniform",
-    tsp: float | None = None,
-    branch: int | None = None,
-    start: Mapping[str, Any] | None = None,
-    point: str | tuple[str, Sequence[float]] | None = None,
-    wrenches: Sequence[str | Wrench] = (),
-    torques: Mapping[str, float | str] | None = None,
-    log: PathLike | TableLike | Run | None = None,
-    derivative: Method | None = None,
-    restarts: int = DEFAULT_RESTARTS,
-    seed: int = 0,
-    strict: bool = False,
-    draw: PathLike | None = None,
-    output: PathLike | None = None,
-    progress: Callable[[float], None] | None = None,
-    **reading: Unpack[Reading],
+    **options: Unpack[NetworkDrive],
 ) -> NetworkMotion:
     """Move a network by its controls, or by joints in their place, on one branch. See docs/networks.md.
 
@@ -196,28 +140,9 @@ def network_drive(
         drives: From and to by name, such as {"crank": (0, "360deg")}; one value holds a variable. Of controls
             numbers are in the units of the network, of joints in [rad] and [m]; texts have units. With a log:
             the joint of the log that drives each, such as {"crank": "q1"}; default: those of the same names.
-        steps: Equal steps, one per `tsp`; default: 200.
-        duration: Duration in [s] instead of steps.
-        law: How the drives move over the duration: uniform, trapezoid (a third each), quintic (from rest to
-            rest).
-        tsp: Time from row to row in [s]; default: 0.005. With a log: the period of its grid.
-        branch: Number of the assembly at the begin of the drives, as `network_solve` with `every` lists them.
-        start: Values of joints in [rad] and [m], or texts with units: the motion begins at the assembly
-            nearest to them; default: that which continues the network's own start.
-        point: A point of a body to trace, such as "coupler:0.45,0.2,0" in [m]: the tool centre point of the
-            run.
-        wrenches: Loads, such as "coupler:0.45,0,0:0,-50,0": point in the frame of the body in [m], force in
-            [N], and if wanted the moment in [N.m], along the axes of the ground.
-        torques: Loads at joints in [N.m] or [N], by name.
-        log: A log whose joints drive the network, row by row.
-        derivative: central or savgol: how the log is differentiated; default: by its resolution.
-        restarts: Random starts in a row without anything new that end a search for assemblies.
-        seed: Of the random starts.
-        strict: Whether a warning is an error.
-        draw: An SVG file to draw the motion to.
-        output: A recording (.rrd) or a log (.csv) to write.
-        progress: Called with the share that is done, 0..1.
-        **reading: How to read the log, as in `ingest`.
+        **options: Duration and law, loads, the log and how it is read, what is written: the options of
+            `urmpipe network drive`, by their names. `point` and the points of `wrenches` are in [m] in the
+            frame of their body, forces in [N], moments in [N.m] along the axes of the ground.
 
     Returns:
         `joints`, `joint_motion` (values, rates, second derivatives in [rad] or [m] and per [s], shape (n,
@@ -230,71 +155,69 @@ def network_drive(
 
     Source: [KinematicSystems]_ section 3.
     """
-    written = None if output is None else Path(output)
+    values: Mapping[str, Any] = options  # as their kinds read them
+    output, log, tsp = values["output"], values["log"], values["tsp"]
+    drives = drives or {}
     parts: tuple[Callable[[], Any], ...] = (
         lambda: network if isinstance(network, Network) else network_file.load_network(network),
         lambda: DriveRequest(
-            drives or {}, steps, duration, law, 0.005 if tsp is None else tsp, branch, start or {}, point,
-            wrenches, torques or {}, restarts, seed,
+            drives, values["steps"], values["duration"], values["law"], 0.005 if tsp is None else tsp,
+            values["branch"], values["start"] or {}, values["point"], values["wrenches"],
+            values["torques"] or {}, values["restarts"], values["seed"],
         ),
-        lambda: _refuse_together(log, steps, duration, law, {"derivative": derivative, **reading}),
-        lambda: output_kind(written, "motion"),
+        lambda: _check_log_parameters(values),
+        lambda: output_kind(output, "motion"),
     )  # fmt: skip
-    loaded, request, _, kind = map_collecting_errors(lambda make: make(), parts)
-    run = None if log is None else _read_log(log, loaded, drives or {}, tsp, derivative, reading)
-    named = [Path(path) for path in (network, log) if isinstance(path, (str, Path))]
-    files = [path for path in named if path.is_file()] + map_files(reading)
-    outputs: dict[OutputKind, PathLike | None] = {"drawing": draw}
+    loaded, request, _, kind = map_collecting_errors(lambda part: part(), parts)
+    run = None if log is None else _read_log(log, loaded, drives, values)
+    files = [path for path in _paths(network, log) if path.is_file()] + map_files(values)
+    outputs: dict[OutputKind, PathLike | None] = {"drawing": values["draw"]}
     if kind is not None:
-        outputs[kind] = written
-    share = progress or (lambda done: None)
-    with guarded_outputs(outputs, files) as targets:
+        outputs[kind] = output
+    progress = values["progress"] or (lambda share: None)
+    with guarded_outputs(outputs, files) as written:
         inputs = [fingerprint(path) for path in files if path.is_file()]
-        motion = drive_network(loaded, request, run, inputs, lambda done: share(SEARCHING * done))
-        refuse_warnings(strict, motion.warnings)
-        targets.write("drawing", lambda part, path: write_drawing(part, motion_drawing(motion)))
-        targets.write("motion", lambda part, path: _write_motion(motion, part, path))
-        motion = targets.recorded(motion, lambda done: share(SEARCHING + (1.0 - SEARCHING) * done))
-    return replace(motion, log=written) if kind == "motion" else motion
+        motion = drive_network(loaded, request, run, inputs, lambda share: progress(SEARCHING_SHARE * share))
+        raise_warnings(values["strict"], motion.warnings)
+        written.write("drawing", lambda part, path: write_drawing(part, motion_drawing(motion)))
+        written.write("motion", lambda part, path: _write_motion(motion, part, path))
+        motion = written.recorded(
+            motion, lambda share: progress(SEARCHING_SHARE + (1.0 - SEARCHING_SHARE) * share)
+        )
+    return replace(motion, log=output) if kind == "motion" else motion
 
 
 def _read_log(
-    log: PathLike | TableLike | Run,
-    network: Network,
-    drives: Mapping[str, Range],
-    tsp: float | None,
-    derivative: Method | None,
-    reading: Mapping[str, Any],
+    log: PathLike | TableLike | Run, network: Network, drives: Mapping[str, Range], values: Mapping[str, Any]
 ) -> Run:
     """Return the run of a log: its joints are the columns that drives name, or those named like controls."""
     if isinstance(log, Run):
         return log
     controls = [control.name for control in network.controls if control.value is None]
-    named = [str(column) for column in drives.values() if is_word(column)] or controls
+    names = [str(column) for column in drives.values() if is_word(column)] or controls
     operand = Path(log) if isinstance(log, (str, Path)) else held_of(log, "log")
-    load = partial(load_runs, [operand], tsp=tsp, derivative=derivative)
-    if named and reading.get("joints") is None:
-        try:
-            return load(read=resolved({**reading, "joints": named}).options)[0]
-        except LogError:
-            pass  # the log has other joints: reading it without names reports what is wrong with it
-    return load(read=resolved(reading).options)[0]
+    load = partial(load_runs, [operand], tsp=values["tsp"], derivative=values["derivative"])
+    if names and values["joints"] is None:
+        with suppress(LogError):  # the log has other joints: reading it without names reports its faults
+            return load(read=resolve_reading({**values, "joints": names}).options)[0]
+    return load(read=resolve_reading(values).options)[0]
 
 
-def _refuse_together(
-    log: Any, steps: int | None, duration: float | None, law: str, reading: Mapping[str, Any]
-) -> None:
-    """Raise an `OptionError` for options that a log leaves without a meaning, or that need one."""
-    given = {"steps": steps, "duration": duration, "law": None if law == "uniform" else law}
+def _check_log_parameters(values: Mapping[str, Any]) -> None:
+    """Raise an `OptionError` for parameters that do not apply with a log, or that need one."""
+    law = None if values["law"] == "uniform" else values["law"]
+    without = {"steps": values["steps"], "duration": values["duration"], "law": law}
+    of_logs = {name: values[name] for name in ("derivative", *params_of(Reading))}
+    has_log = values["log"] is not None
     faults = [
         Finding("found together with a log, allowed: without one, which has times of its own", parameter=name)
-        for name, value in given.items()
-        if log is not None and value is not None
+        for name, value in without.items()
+        if has_log and value is not None
     ]
     faults += [
         Finding("found without a log, allowed: with one", parameter=name)
-        for name, value in reading.items()
-        if log is None and value is not None and value is not False and value not in ({}, (), [])
+        for name, value in of_logs.items()
+        if not has_log and value is not None and value is not False and value not in ({}, (), [])
     ]
     if faults:
         raise OptionError(*faults)

@@ -9,14 +9,15 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from urmpipe.arm_placing import NO_ROBOT, Frame, Robot
-from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
+from urmpipe.arm_placing import NO_ROBOT, Robot
 from urmpipe.output_files import output_kind
-from urmpipe.reading import UntimedReading, map_files, options_of, resolved
+from urmpipe.parameters import kinds
+from urmpipe.parameters.motions import Plan
+from urmpipe.public_functions import PathLike, as_paths, public_function, raise_warnings, reject_recording
+from urmpipe.reading import map_files, resolve_reading, to_read_options
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
-from urmpipe_models.planning.laws import Arcs
 from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import PATH_ROW, check_output, safe_output
@@ -24,8 +25,6 @@ from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planning import plan_path
 from urmpipe_pipeline.planned_paths.request import (
-    PERIOD,
-    Law,
     Request,
     Timing,
     checked_timing,
@@ -36,56 +35,19 @@ from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.request import JointValues, start_of
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
-PLANNING = 0.8
-"""Share of the work that planning is where something is written, too."""
+PLANNING_SHARE = 0.8  # of the work, where an output is written, too
 
 
-@public_reading(UntimedReading)
-def plan(
-    path: PathLike | PathRows,
-    robot: Robot | None = None,
-    *,
-    base: Frame | None = None,
-    tool: Frame | None = None,
-    base_link: str | None = None,
-    tip_link: str | None = None,
-    velocity: float | None = None,
-    acceleration: float | None = None,
-    law: Law = "trapezoid",
-    jerk: float | None = None,
-    arcs: Arcs = "tangential",
-    tsp: float = PERIOD,
-    start: JointValues | None = None,
-    strict: bool = False,
-    output: PathLike | None = None,
-    inputs: Sequence[PathLike] = (),
-    progress: Callable[[float], None] | None = None,
-    **reading: Unpack[UntimedReading],
-) -> PlannedPath:
+@public_function(Plan, path=kinds.PLANNED, robot=kinds.ROBOT)
+def plan(path: PathLike | PathRows, robot: Robot | None = None, **options: Unpack[Plan]) -> PlannedPath:
     """Plan a path of lines and arcs, its time, and the joints of an arm along it. See docs/plan.md.
 
     Args:
         path: A file of rows x, y, z, r; a test cube, such as "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"; or rows.
-        robot: The arm; default: path and time alone.
-        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
-        tool: The tool centre point in the frame of the arm's tip, likewise.
-        base_link: Link of a URDF where the arm begins; default: its root.
-        tip_link: Link of a URDF where the arm ends; default: its end.
-        velocity: The largest speed along the path in [m/s]; default: 0.5, with the law limits none.
-        acceleration: The largest acceleration in [m/s2]; default: 6, with the law limits none.
-        law: trapezoid: within speed and acceleration; jerk: within a jerk, too; limits: in the least time
-            within the rates and accelerations of the joints.
-        jerk: The largest jerk of the law jerk in [m/s3].
-        arcs: What the acceleration limits on arcs; tangential: that along the path; total: v^2 / r, too.
-        tsp: Time from sample to sample in [s].
-        start: Joint values in [rad] or [m], or texts with units, shape (joints,), to be near to at
-            the first sample; default: the robot's own.
-        strict: Whether a warning is an error.
-        output: A log (.csv) or a recording (.rrd) to write.
-        inputs: Files besides the path that are never replaced.
-        progress: Called with the share that is done, 0..1.
-        **reading: How to read the file where it does not show it: log_map, rotation, delimiter, decimal and
-            unit, as of a table of targets. A path has no time.
+        robot: The arm; default: only path and time are planned.
+        **options: The law of time, how the file is read, where the arm is placed, what is written: the
+            options of `urmpipe plan`, by their names. Texts have units (`velocity="250mm/s"`), numbers are in
+            SI.
 
     Returns:
         The plan, a row a sample: `t` in [s], shape (n,), `motion` (arc length `s` in [m] and its derivatives
@@ -101,33 +63,34 @@ def plan(
 
     Source: [Iso9283]_ section 2, section 4 steps 1 to 19.
     """
-    written = None if output is None else Path(output)
-    timing = Timing(law, velocity, acceleration, jerk, arcs, tsp)
+    values: Mapping[str, Any] = options  # as their kinds read them
+    output, progress = values["output"], values["progress"]
+    timing = Timing(*(values[name] for name in ("law", "velocity", "acceleration", "jerk", "arcs", "tsp")))
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: _request(resolved(reading, robot, base, tool, base_link, tip_link).arm, start, timing),
-        lambda: _given(path, reading),
+        lambda: _request(resolve_reading(values, robot).arm, values["start"], timing),
+        lambda: _read_rows(path, values),
         lambda: checked_timing(timing),
-        lambda: output_kind(written, "plan"),
+        lambda: output_kind(output, "plan"),
     )
-    request, given, _, kind = map_collecting_errors(lambda make: make(), parts)
-    kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
-    if written is not None:
-        check_output(written, kept, kind)
-    share = PLANNING if written else 1.0
+    request, rows, _, kind = map_collecting_errors(lambda part: part(), parts)
+    kept = [*([] if rows.file is None else as_paths(str(path))), *map_files(values), *values["inputs"]]
+    if output is not None:
+        check_output(output, kept, kind)
+    share = PLANNING_SHARE if output else 1.0
     planning = None if progress is None else lambda done: progress(share * done)
-    result = plan_path(given, request, planning)
-    refuse_warnings(strict, result.warnings)
-    if written is None:
+    result = plan_path(rows, request, planning)
+    raise_warnings(values["strict"], result.warnings)
+    if output is None:
         return result
     if kind == "recording":
         writing = None if progress is None else lambda done: progress(share + (1.0 - share) * done)
-        write_recording(result, written, kept, writing)
-        return replace(result, recording=written)
+        write_recording(result, output, kept, writing)
+        return replace(result, recording=output)
     if result.infeasibilities:
-        said = f"{written} is not written: the arm cannot follow the plan"
-        return replace(result, warnings=(*result.warnings, LogWarning("not-written", said)))
-    _write_log(result, written, kept)
-    return replace(result, log=written)
+        unwritten = LogWarning("not-written", f"{output} is not written: the arm cannot follow the plan")
+        return replace(result, warnings=(*result.warnings, unwritten))
+    _write_log(result, output, kept)
+    return replace(result, log=output)
 
 
 def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Request:
@@ -136,8 +99,8 @@ def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Re
         lambda: _start(arm, start),
         lambda: refuse_unlimited(timing, arm),
     )
-    begin, _ = map_collecting_errors(lambda make: make(), parts)
-    return Request(arm, begin, timing)
+    start_values, _ = map_collecting_errors(lambda part: part(), parts)
+    return Request(arm, start_values, timing)
 
 
 def _start(arm: Chain | None, start: JointValues | None) -> FloatArray | None:
@@ -149,10 +112,10 @@ def _start(arm: Chain | None, start: JointValues | None) -> FloatArray | None:
     return None
 
 
-def _given(path: PathLike | PathRows, reading: Mapping[str, Any]) -> GivenPath:
+def _read_rows(path: PathLike | PathRows, options: Mapping[str, Any]) -> GivenPath:
     """Return the rows of a path; raise a `LogError` if it is a recording."""
-    refuse_recording(path, "a table (CSV) of rows, or a test cube (cube:...)")
-    return given_path(path, options_of(reading))
+    reject_recording(path, "a table (CSV) of rows, or a test cube (cube:...)")
+    return given_path(path, to_read_options(options))
 
 
 def _write_log(result: PlannedPath, path: Path, kept: Sequence[Path]) -> None:

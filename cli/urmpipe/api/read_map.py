@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe.keyword_checks import PathLike, public
+from urmpipe.parameters import kinds
+from urmpipe.public_functions import PathLike, public_function
 from urmpipe_pipeline import sources
 from urmpipe_pipeline.sources import LogMap
 
 
-@public
+@public_function(path=kinds.MAP_FILE)
 def read_map(path: PathLike) -> LogMap:
     """Return what a map (TOML) says: `read`, how to read a log, and its `robot`, `base` and `tool`.
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from urmpipe.keyword_checks import PathLike, paths, public
+from urmpipe.parameters import kinds
+from urmpipe.public_functions import PathLike, as_paths, public_function
 from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_pipeline import results
 from urmpipe_pipeline.presentation.result import Result
 
 
-@public
+@public_function(path=kinds.RECORDING, lazy=kinds.FLAG)
 def read_recording(path: PathLike, *, lazy: bool = False) -> Result:
     """Return the result that a recording holds: a Run, a Comparison, a Simulation, ...
 
@@ -27,7 +28,7 @@ def read_recording(path: PathLike, *, lazy: bool = False) -> Result:
     return found
 
 
-@public
+@public_function(output=kinds.RECORDING, inputs=kinds.PATHS, progress=kinds.PROGRESS)
 def write_recording(
     result: Result,
     output: PathLike,
@@ -53,4 +54,4 @@ def write_recording(
     if not results.is_result(result):
         allowed = "a result, such as a Run or a Comparison"
         raise OptionError(Finding(parameter="result", found=format_value(result), allowed=allowed))
-    return results.write_recording(result, Path(output), paths(inputs), progress)
+    return results.write_recording(result, Path(output), as_paths(inputs), progress)

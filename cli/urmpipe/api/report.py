@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
-from urmpipe.keyword_checks import PathLike, one_or_many, paths, public, refuse_foreign, refuse_others
+from urmpipe.parameters import kinds
+from urmpipe.parameters.outputs import Report as ReportParameters
+from urmpipe.public_functions import PathLike, as_list, check_types, public_function, require_recordings
 from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.errors import map_collecting_errors
 from urmpipe_pipeline.presentation.result import Result
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from urmpipe_pipeline.figures import FigureFile
-    from urmpipe_pipeline.figures.files import FigureFormat
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -72,36 +73,21 @@ SHOWN = (
 )
 
 
-@public
+@public_function(ReportParameters, output=kinds.ANY_FILE)
 def report(
     results: PathLike | Result | Sequence[PathLike | Result],
     output: PathLike,
-    *,
-    figures: PathLike | None = None,
-    formats: FigureFormat | Sequence[FigureFormat] = ("pdf", "png"),
-    figure_names: str | Sequence[str] = (),
-    figure_width: str | float = "page",
-    figure_font: float = 8.0,
-    figure_dpi: int = 300,
-    inputs: Sequence[PathLike] = (),
-    progress: Callable[[float], None] | None = None,
+    **options: Unpack[ReportParameters],
 ) -> Report:
     """Write one self-contained HTML file about recordings or results, and its figures as files: all or none.
 
     Args:
-        results: Recordings (.rrd), what `ingest`, `compare`, `diagnose` and `simulate` returned, or
-            one of them.
+        results: Recordings (.rrd), what `ingest`, `compare`, `diagnose` and `simulate` returned, or one of
+            them.
         output: The HTML file to write.
-        figures: A folder to write the figures to as files; needs the extra `figures`. Drawings, such as
-            that of a simulated system, are SVG in any case.
-        formats: pdf, svg, png, or several of them.
-        figure_names: Titles of the figures to write, or patterns of them such as "Deviation*"; with the
-            heading of their part before them, such as "log-2/Deviation over time". By default all.
-        figure_width: column (88 mm), page (180 mm), a text such as "85mm" or "3.5in", or a number in [m].
-        figure_font: Size of the text in figures in [pt].
-        figure_dpi: Dots an inch of a PNG.
-        inputs: Files besides the recordings that are never replaced.
-        progress: Told the share that is done, 0..1.
+        **options: The folder, the formats and the titles of figures as files, their size: the options of
+            `urmpipe report`, by their names. Figures need the extra `figures`; drawings, such as that of a
+            simulated system, are SVG in any case. A number as `figure_width` is in [m].
 
     Raises:
         UrmpipeError: With everything that is wrong with the recordings or the output.
@@ -109,32 +95,27 @@ def report(
     from urmpipe_pipeline.figures import FigureOptions
     from urmpipe_pipeline.report import write_report
 
-    def wanted(folder: PathLike) -> FigureOptions:
-        """Return which figures are written, all checked."""
-        chosen = tuple(one_or_many(formats)), tuple(one_or_many(figure_names))
-        return FigureOptions(Path(folder), *chosen, figure_width, figure_font, figure_dpi)
-
-    of_figures = None if figures is None else wanted(figures)
-    given = one_or_many(results)
-    refuse_others("results", given, (Result,), SHOWN)
-    files = [Path(one) for one in given if isinstance(one, (str, Path))]
-    refuse_foreign(files)
-    reading, writing = _halves(progress)
+    values: Mapping[str, Any] = options  # as their kinds read them
+    progress = values["progress"] or (lambda share: None)
+    figures: FigureOptions | None = None
+    if values["figures"] is not None:
+        size = (values[f"figure_{name}"] for name in ("width", "font", "dpi"))
+        figures = FigureOptions(values["figures"], values["formats"], values["figure_names"], *size)
+    operands = as_list(results)
+    check_types("results", operands, (Result,), SHOWN)
+    files = [Path(operand) for operand in operands if isinstance(operand, (str, Path))]
+    require_recordings(files)
 
     def read(numbered: tuple[int, PathLike | Result]) -> Result:
-        """Return a result, read if it is a recording, and tell how far it is."""
-        number, one = numbered
-        found = read_recording(Path(one), lazy=True) if isinstance(one, (str, Path)) else one
-        reading(number / len(given))
-        return enclosing_result(found)
+        """Return a result, read if it is a recording."""
+        number, operand = numbered
+        result = read_recording(Path(operand), lazy=True) if isinstance(operand, (str, Path)) else operand
+        progress(number / len(operands) / 2)
+        return enclosing_result(result)
 
-    found = map_collecting_errors(read, enumerate(given, start=1))
-    shown = [present(one) for one in found]
-    written = write_report(shown, Path(output), [*files, *paths(inputs)], of_figures, writing)
-    return Report(written.path, tuple(found), written.figures)
-
-
-def _halves(progress: Callable[[float], None] | None) -> tuple[Callable[[float], None], ...]:
-    """Return what to tell the progress of the first and of the second half of some work."""
-    tell = progress or (lambda share: None)
-    return lambda share: tell(share / 2), lambda share: tell((1 + share) / 2)
+    shown = map_collecting_errors(read, enumerate(operands, start=1))
+    written = write_report(
+        [present(result) for result in shown], Path(output), [*files, *values["inputs"]], figures,
+        lambda share: progress((1 + share) / 2),
+    )  # fmt: skip
+    return Report(written.path, tuple(shown), written.figures)

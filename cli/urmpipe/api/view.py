@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from urmpipe.keyword_checks import PathLike, one_or_many, public, refuse_others
+from urmpipe.public_functions import PathLike, as_list, check_types, public_function
 
 
-@public
+@public_function()
 def view(recordings: PathLike | Sequence[PathLike]) -> None:
     """Open recordings in the viewer, each in a window paused at its worst sample; return when all are closed.
 
@@ -20,6 +20,6 @@ def view(recordings: PathLike | Sequence[PathLike]) -> None:
     """
     from urmpipe_pipeline.recording.viewer import view_recordings
 
-    given = one_or_many(recordings)
-    refuse_others("recordings", given, (), "recordings (.rrd): the `recording` of a result is its file")
-    view_recordings([Path(one) for one in given])
+    files = as_list(recordings)
+    check_types("recordings", files, (), "recordings (.rrd): the `recording` of a result is its file")
+    view_recordings([Path(file) for file in files])

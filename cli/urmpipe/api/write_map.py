@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from urmpipe.arm_placing import offset_of
-from urmpipe.keyword_checks import PathLike, paths, public
+from urmpipe.parameters import kinds
+from urmpipe.public_functions import PathLike, as_paths, public_function
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import map_of, read_map
 
 
-@public
+@public_function(run=kinds.RUN, output=kinds.MAP_FILE, robot=kinds.ROBOT_FILE, inputs=kinds.PATHS)
 def write_map(
     run: Run, output: PathLike, *, robot: str | None = None, inputs: Sequence[PathLike] = ()
 ) -> Path:
@@ -30,7 +31,7 @@ def write_map(
         UrmpipeError: If it may not be written there.
     """
     path = Path(output)
-    with safe_output(path, paths(inputs), "map") as part:
+    with safe_output(path, as_paths(inputs), "map") as part:
         write_map_part(run, part, path, robot)
     return path
 

@@ -1,4 +1,4 @@
-"""`urmpipe demo`."""
+"""Run the whole workflow on example logs."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 import urmpipe
-from urmpipe.options.completion import folders
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.answers import Answer, Call, command
+from urmpipe.parameters.outputs import Demo
 
 if TYPE_CHECKING:
     from urmpipe.api.report import Report
@@ -21,23 +21,12 @@ EXPECTED = {"coppeliasim": "pass", "matlab": "pass", "solidworks": "pass", "coun
 EXPLAINED = """Four logs of one motion. Three should pass. The fourth comes from an arm with one module that
 counter-rotates: it should fail, and so should the overall verdict. The diagnosis should name the module."""
 
-AS_EXPECTED = """All verdicts are as expected: three logs agree with the path, the log of the arm with the
+EXPECTED_LINE = """All verdicts are as expected: three logs agree with the path, the log of the arm with the
 counter-rotating module does not. Why each log deviates:"""
 
 
-@click.command(short_help="Run the whole workflow on example logs.")
-@click.option(
-    "-o",
-    "--output",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    shell_complete=folders,
-    default=Path("urmpipe-demo"),
-    show_default=True,
-    help="Folder for recordings and report.",
-)
-@output_options
-def demo(output: Path, terminal: Terminal) -> int:
+@command(Demo)
+def demo(call: Call, output: Path) -> Answer:
     """Run the whole workflow on example logs: ingest, compare, diagnose, report.
 
     Three programs and an arm with a counter-rotating module logged one motion of the six-module URM arm.
@@ -52,39 +41,39 @@ def demo(output: Path, terminal: Terminal) -> int:
 
     output.mkdir(parents=True, exist_ok=True)
     runs = []
-    steps = len(EXPECTED) + 2
-    with terminal.progress("Demo") as progress:
+    with call.progress("Demo") as progress:
+        report_share = progress or (lambda share: None)
         for number, name in enumerate(EXPECTED, start=1):
             source = LOGS / name if (LOGS / name).is_dir() else LOGS / f"{name}.csv"
             runs.append(urmpipe.ingest(source, robot="urm6", output=output / f"{name}.rrd"))
-            if progress:
-                progress(number / steps)
-        result = urmpipe.compare(LOGS / "path.csv", runs, diagnose=True, output=output / "demo.rrd")
-        if progress:
-            progress((steps - 1) / steps)
+            report_share(number / (len(EXPECTED) + 2))
+        result = urmpipe.diagnose(LOGS / "path.csv", runs, output=output / "demo.rrd")
+        report_share((len(EXPECTED) + 1) / (len(EXPECTED) + 2))
         report = urmpipe.report([result], output / "report.html")
-    got = {one.name: one.verdict for one in result.runs}
-    as_expected = list(got.values()) == list(EXPECTED.values())
-    terminal.answer(
-        lambda: result.to_dict() | {"as_expected": as_expected, "report": str(report.path)},
-        lambda: _print(result, report, as_expected),
+    verdicts = {run.name: run.verdict for run in result.runs}
+    as_expected = list(verdicts.values()) == list(EXPECTED.values())
+    return Answer(
+        result,
+        warnings=(),
+        to_dict=lambda: result.to_dict() | {"as_expected": as_expected, "report": str(report.path)},
+        print_text=lambda: _print(result, report, as_expected),
+        verdict="pass" if as_expected else "fail",
     )
-    return 0 if as_expected else 1
 
 
 def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     """Print the verdicts, and how to go on from there."""
     from urmpipe.printing.results import print_presentation
-    from urmpipe.printing.terminal import print_recording, say
+    from urmpipe.printing.terminal import recording_line, say
     from urmpipe_datasets import LOGS
     from urmpipe_pipeline.results import present
 
     click.echo(f"{EXPLAINED}\n")
     print_presentation(present(result))
-    click.echo(AS_EXPECTED if as_expected else f"These verdicts differ from the expected ones: {EXPECTED}")
-    for one in result.runs:
-        if one.diagnosis is not None:
-            say(f"  {one.name}: {one.diagnosis.summary}")
+    click.echo(EXPECTED_LINE if as_expected else f"These verdicts differ from the expected ones: {EXPECTED}")
+    for run in result.runs:
+        if run.diagnosis is not None:
+            say(f"  {run.name}: {run.diagnosis.summary}")
     say(f"Logs:      {LOGS}  (try the commands with them)")
     say(f"Report:    {report.path}  (open it in any browser)")
-    print_recording(result.recording)
+    say(recording_line(result.recording))

@@ -1,42 +1,20 @@
-"""`urmpipe export`."""
+"""Write a recording as CSV, Parquet, MAT or TUM."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import click
+from typing import Any
 
 import urmpipe
-from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.types import RECORDING, OneOf
+from urmpipe.answers import Answer, Call, command
+from urmpipe.command_line import operand
+from urmpipe.parameters import kinds
+from urmpipe.parameters.outputs import Export, file_output
 
-if TYPE_CHECKING:
-    from urmpipe_pipeline.tables import Exported
 
-
-@click.command(short_help="Write a recording as CSV, Parquet, MAT or TUM.")
-@click.argument("recording", metavar="RUN.rrd", type=RECORDING)
-@click.option(
-    "--to",
-    type=OneOf(["csv", "parquet", "mat", "tum"]),
-    help="Format [default: by the suffix of the output, else csv].",
-)
-@output_option("FILE", "File to write [default: RUN-ROWS.FORMAT].")
-@click.option(
-    "--rows",
-    type=OneOf(["grid", "file", "velocities", "samples", "criteria"]),
-    help="Rows of a log: grid, in SI on the time grid, or file, with the file's own names and units [default:"
-    " grid]; of accuracy: velocities or samples [default: velocities]; of compare --iso: criteria.",
-)
-@click.option(
-    "--tcp",
-    type=OneOf(["fk", "recorded"]),
-    help="Source of the tool poses for --to tum: fk, from the joint values; recorded, from the log"
-    " [default: fk].",
-)
-@output_options
-def export(recording: Path, output: Path | None, terminal: Terminal, **options: Any) -> int:
+@command(Export, output=file_output("FILE", "File to write [default: RUN-ROWS.FORMAT]."))
+@operand("recording", kinds.RECORDING, metavar="RUN.rrd")
+def export(call: Call, recording: Path, output: Path | None, **options: Any) -> Answer:
     """Export the data of a recording for other tools.
 
     --rows grid has the processed log in SI: t, repolarized joint values (phase unwrapping that keeps real
@@ -58,14 +36,7 @@ def export(recording: Path, output: Path | None, terminal: Terminal, **options: 
       urmpipe export one-drive.rrd -o one-drive.csv
     """
     result = urmpipe.export(recording, output, **options)
-    terminal.warn(result.warnings)
-    terminal.answer(result.to_dict, lambda: _print(result))
-    return 0
-
-
-def _print(result: Exported) -> None:
-    """Print what was written."""
-    from urmpipe.printing.terminal import say
-
-    for one in result.files:
-        say(f"Export: {one.path}  ({one.rows} rows, {len(result.columns)} columns)")
+    columns = len(result.columns)
+    return Answer(
+        result, [f"Export: {file.path}  ({file.rows} rows, {columns} columns)" for file in result.files]
+    )

@@ -1,33 +1,22 @@
-"""`urmpipe fmu list|build|check`."""
+"""List units, build and check FMUs."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 
 import urmpipe
-from urmpipe.options.completion import one_of_each
-from urmpipe.options.named import NamedType, named_values, option_names, option_value
-from urmpipe.options.output import Terminal, output_options
-from urmpipe.options.reading import MAP_OPTION
-from urmpipe.options.types import ANY_FILE, DURATION, ROBOT, UNIT, FileType, NamesType, OneOf
-from urmpipe.usage import Group
+from urmpipe.answers import Answer, Call, command
+from urmpipe.command_line import Group, operand
+from urmpipe.parameters import kinds
+from urmpipe.parameters.param import Param
+from urmpipe.parameters.systems import BuildFmu, CheckFmu
 from urmpipe_models.errors import Finding, Hint, OptionError
+from urmpipe_models.toml_tables import TomlError, parse_toml_text
 
-PLATFORMS = ("linux64", "win64")
-
-
-def _platforms(
-    ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, ...], ...]
-) -> tuple[str, ...]:
-    """Return the platforms, each known and once."""
-    named = tuple(dict.fromkeys(one for value in values for one in value))
-    wrong = [one for one in named if one not in PLATFORMS]
-    if wrong:
-        raise click.BadParameter(f"found {', '.join(wrong)}, allowed: {', '.join(PLATFORMS)}")
-    return named
+ROBOT = Param(kinds.ROBOT, "Robot, for units that need one.")
 
 
 @click.group(cls=Group, short_help="List units, build and check FMUs.")
@@ -40,10 +29,10 @@ def fmu() -> None:
     """
 
 
-@fmu.command("list", short_help="List the built-in units.")
-@click.argument("unit", metavar="[UNIT|FILE.py]", type=UNIT, required=False)
-@output_options
-def list_(unit: str | None, terminal: Terminal) -> int:
+@fmu.add_command
+@command(name="list", short_help="List the built-in units.")
+@operand("unit", kinds.UNIT_MODEL, metavar="[UNIT|FILE.py]", required=False)
+def list_(call: Call, unit: str | None) -> Answer:
     """List the built-in units with their options, or the variables of one unit.
 
     \b
@@ -55,67 +44,16 @@ def list_(unit: str | None, terminal: Terminal) -> int:
     from urmpipe.printing.units import print_unit, print_units, unit_dict, units_dict
 
     if unit is None:
-        terminal.answer(units_dict, print_units)
-    else:
-        terminal.answer(lambda: unit_dict(unit), lambda: print_unit(unit))
-    return 0
+        return Answer(to_dict=units_dict, print_text=print_units)
+    return Answer(to_dict=lambda: unit_dict(unit), print_text=lambda: print_unit(unit))
 
 
-@fmu.command(short_help="Package a unit as an FMU.")
-@click.argument("unit", metavar="UNIT|FILE.py", type=UNIT)
-@click.option("--robot", type=ROBOT, help="Robot, for units that need one.")
-@click.option(
-    "--log",
-    metavar="LOG",
-    type=ANY_FILE,
-    help="Log, for units that play one back.",
-)
-@MAP_OPTION
-@click.option(
-    "-s",
-    "--options",
-    "--option",
-    type=NamedType(option_names),
-    multiple=True,
-    callback=named_values,
-    metavar="NAME=VALUE",
-    help="Another option of the unit, such as joints=6 or rates=true; see `urmpipe fmu list`.",
-)
-@click.option(
-    "--backend",
-    type=OneOf(["native", "python"]),
-    help="native: compiled C, needs nothing on the target. python: needs Python with NumPy there"
-    " [default: native if a compiler is found].",
-)
-@click.option(
-    "--platforms",
-    type=NamesType(),
-    shell_complete=one_of_each(*PLATFORMS),
-    multiple=True,
-    callback=_platforms,
-    metavar="A,B",
-    help="linux64, win64, or both with the extra `cross` [default: this platform; python: all].",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=FileType(".fmu"),
-    default=".",
-    metavar="DIR|FILE.fmu",
-    help="Folder for UNIT.fmu, or the file to write [default: the working folder].",
-)
-@output_options
+@fmu.add_command
+@command(BuildFmu, robot=ROBOT, short_help="Package a unit as an FMU.")
+@operand("unit", kinds.UNIT_MODEL, metavar="UNIT|FILE.py")
 def build(
-    unit: str,
-    robot: str | None,
-    log: Path | None,
-    log_map: Path | None,
-    options: dict[str, str],
-    backend: Literal["native", "python"] | None,
-    platforms: tuple[str, ...],
-    output: Path,
-    terminal: Terminal,
-) -> int:
+    call: Call, unit: str, robot: str | None, log: str | None, map: str | None, **options: Any
+) -> Answer:
     """Package a unit as an FMU: a name of `urmpipe fmu list`, or your own unit in a Python file.
 
     Building the same unit twice gives identical files. An FMU of another tool is never replaced.
@@ -134,42 +72,36 @@ def build(
     from urmpipe.systems.logs import read_mapped_table
     from urmpipe.systems.units import check_robot_and_log, parse_columns
 
-    if log_map and not log:
+    if map and not log:
         hint = Hint("log", None, "sets one")
-        raise OptionError(Finding("found without a log", parameter="log_map", hints=(hint,)))
-    given = {name: option_value(text) for name, text in options.items()}
+        raise OptionError(Finding("found without a log", parameter="map", hints=(hint,)))
+    of_unit = {name: option_value(text) for name, text in (options.pop("options") or {}).items()}
     if Path(unit).suffix != ".py":
         check_robot_and_log(unit, robot, log)
     arm = place_robot(robot)
-    columns = parse_columns(given.pop("columns", None))
-    table = log and read_mapped_table(log, columns, robot=arm, log_map=log_map)
-    if table:
-        terminal.warn(table.warnings)
-    with prints_apart(), terminal.working(f"Building {unit}"):
-        made = urmpipe.build_fmu(
-            unit,
-            robot=robot,
-            log=table,
-            options=given,
-            backend=backend,
-            platforms=platforms,
-            output=output,
-            told=terminal.note,
+    columns = parse_columns(of_unit.pop("columns", None))
+    table = log and read_mapped_table(log, columns, robot=arm, log_map=map)
+    with prints_apart(), call.working(f"Building {unit}"):
+        built = urmpipe.build_fmu(
+            unit, robot=robot, log=table, options=of_unit, on_message=call.note, **options
         )
-    terminal.answer(made.to_dict, lambda: print_built(made))
-    return 0
+    warnings = table.warnings if table else ()
+    return Answer(warnings=warnings, to_dict=built.to_dict, print_text=lambda: print_built(built))
 
 
-@fmu.command(short_help="Validate an FMU, run it and list its variables.")
-@click.argument("file", metavar="FILE.fmu", type=FileType(".fmu"))
-@click.option(
-    "--timeout",
-    type=DURATION,
-    default=60.0,
-    help="Longest time that a call of the FMU may take [default: 60 s].",
-)
-@output_options
-def check(file: Path, timeout: float, terminal: Terminal) -> int:
+def option_value(text: str) -> Any:
+    """Return the value of NAME=VALUE: as TOML has it, else words separated by commas, or a word."""
+    try:
+        return parse_toml_text(f"value = {text}\n")["value"]
+    except (TomlError, KeyError):
+        words = [part.strip() for part in text.split(",")]
+        return words if len(words) > 1 else text.strip()
+
+
+@fmu.add_command
+@command(CheckFmu, short_help="Validate an FMU, run it and list its variables.")
+@operand("file", kinds.file("FILE.fmu", ".fmu"), metavar="FILE.fmu")
+def check(call: Call, file: Path, timeout: float) -> Answer:
     """Validate an FMU of any tool, run it, and list its variables.
 
     \b
@@ -184,5 +116,8 @@ def check(file: Path, timeout: float, terminal: Terminal) -> int:
     from urmpipe_fmus.check import check_fmu
 
     checked = check_fmu(file, timeout=timeout)
-    terminal.answer(lambda: checked_dict(checked), lambda: print_checked(checked))
-    return 1 if checked.problems else 0
+    return Answer(
+        to_dict=lambda: checked_dict(checked),
+        print_text=lambda: print_checked(checked),
+        verdict="fail" if checked.problems else "pass",
+    )

@@ -1,49 +1,26 @@
-"""`urmpipe plan`."""
+"""Plan a path of lines and arcs, and its timing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 import urmpipe
-from urmpipe.headings import HeadedCommand, Heading, option
-from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.planning import law_options, path_completion, start_option
-from urmpipe.options.reading import path_options
-from urmpipe.options.types import DURATION, quantity_type
+from urmpipe.answers import Answer, Call, command
+from urmpipe.command_line import operand
+from urmpipe.parameters import kinds
+from urmpipe.parameters.motions import Plan
+from urmpipe.parameters.param import params_of
+from urmpipe.parameters.shared import ROBOT, Placing
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.planned_paths.result import PlannedPath
 
-PLACED = ("base", "tool", "base_link", "tip_link")
-"""Options that place the arm: what reads the plan needs them again."""
 
-
-@click.command(cls=HeadedCommand, short_help="Plan a path of lines and arcs, and its timing.")
-@click.argument("path", metavar="PATH.csv|cube:...", shell_complete=path_completion)
-@output_option("PLAN.csv|PLAN.rrd", "Write a log for the other commands, or a recording.")
-@option(
-    Heading.PLANNING,
-    "--velocity",
-    type=quantity_type("m/s", positive=False),
-    help="Largest speed along the path, such as 250mm/s [default: 0.5m/s; none with --law limits].",
-)
-@law_options
-@option(
-    Heading.PLANNING,
-    "--tsp",
-    type=DURATION,
-    default="5ms",
-    show_default=True,
-    help="Sample period, such as 8ms.",
-)
-@start_option
-@path_options
-@output_options
-def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
+@command(Plan, robot=ROBOT)
+@operand("path", kinds.PLANNED, metavar=kinds.PLANNED.metavar)
+def plan(call: Call, path: str, output: Path | None, **options: Any) -> Answer:
     """Plan a path of lines and arcs, its timing, and the joint values of an arm that follows it.
 
     PATH.csv is a table of x, y, z (m) and r, the radius of an arc that begins at the row; corner_r instead
@@ -63,35 +40,30 @@ def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> 
     Exit codes: 0 the arm can follow the plan (at reduced speed where joint limits require it), 1 it cannot
     (a jump, a singular pose, samples out of reach, less than 1 % of the speed left), 2 bad input or usage.
     """
-    replaces = output is not None and output.exists()
-    with terminal.progress(f"Planning {path}") as progress:
+    is_replaced = output is not None and output.exists()
+    with call.progress(f"Planning {path}") as progress:
         result = urmpipe.plan(path, output=output, progress=progress, **options)
-    terminal.warn(result.warnings)
-    terminal.answer(result.to_dict, lambda: _print(result, options, replaces))
-    return 1 if result.verdict == "fail" else 0
+    return Answer(result, _iter_lines(result, options, is_replaced))
 
 
-def _print(result: PlannedPath, options: Mapping[str, Any], replaces: bool) -> None:
-    """Print the plan, and what was written."""
-    from urmpipe.printing.results import print_presentation
-    from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_pipeline.results import present
+def _iter_lines(result: PlannedPath, options: Mapping[str, Any], is_replaced: bool) -> Iterator[str]:
+    from urmpipe.printing.terminal import recording_line
 
-    print_presentation(present(result))
     if result.recording is not None:
-        print_recording(result.recording, replaced=replaces)
+        yield recording_line(result.recording, is_replaced)
     elif result.log is not None:
-        earlier = "; it replaced an earlier one" if replaces else ""
-        say(f"Plan: {result.log}  (read it: {_reading(result.log, options)}{earlier})")
+        replaced = "; it replaced an earlier one" if is_replaced else ""
+        yield f"Plan: {result.log}  (read it: {_format_reader(result.log, options)}{replaced})"
 
 
-def _reading(log: Path, options: Mapping[str, Any]) -> str:
+def _format_reader(log: Path, options: Mapping[str, Any]) -> str:
     """Return the command that reads a plan: an arm of the catalogue is found by its joints and its path."""
     from urmpipe_models.errors import shell_quote, to_option
     from urmpipe_models.robots.catalogue import kinematically_distinct_names
 
-    placed = [to_option(name) for name in PLACED if options[name] is not None]
-    command = f"urmpipe ingest {shell_quote(log)}"
-    if options["robot"] is not None and (placed or options["robot"] not in kinematically_distinct_names()):
-        command += f" --robot {shell_quote(options['robot'])}"
-    return f"{command} with the same {', '.join(placed)}" if placed else command
+    placing = [to_option(name) for name in params_of(Placing) if options[name] is not None]
+    reader = f"urmpipe ingest {shell_quote(log)}"
+    robot = options["robot"]
+    if robot is not None and (placing or robot not in kinematically_distinct_names()):
+        reader += f" --robot {shell_quote(robot)}"
+    return f"{reader} with the same {', '.join(placing)}" if placing else reader

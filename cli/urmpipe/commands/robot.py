@@ -1,4 +1,4 @@
-"""`urmpipe robot list|show|export|equations`."""
+"""List, show and export robots."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import placing_options
-from urmpipe.options.types import DRAWING, JOINT_VALUES, ROBOT, OneOf
-from urmpipe.usage import Group
+import urmpipe
+from urmpipe.answers import Answer, Call, command
+from urmpipe.command_line import Group, operand
+from urmpipe.parameters import kinds
+from urmpipe.parameters.outputs import Equations, ExportRobot, ShowRobot
+from urmpipe_models.errors import Finding, OptionError, format_value
 
 if TYPE_CHECKING:
     from urmpipe_models.arm.chain import Chain
@@ -26,9 +28,9 @@ def robot() -> None:
     """
 
 
-@robot.command("list", short_help="List the built-in robots.")
-@output_options
-def list_(terminal: Terminal) -> int:
+@robot.add_command
+@command(name="list", short_help="List the built-in robots.")
+def list_(call: Call) -> Answer:
     """List the built-in robots.
 
     \b
@@ -40,27 +42,13 @@ def list_(terminal: Terminal) -> int:
     from urmpipe_models.robots.catalogue import load_robot, robot_names
 
     robots = [load_robot(name) for name in robot_names()]
-    terminal.answer(lambda: robots_dict(robots), lambda: print_robots(robots))
-    return 0
+    return Answer(to_dict=lambda: robots_dict(robots), print_text=lambda: print_robots(robots))
 
 
-@robot.command(short_help="Print the parameters of a robot, or draw it.")
-@click.argument("name", metavar="NAME|FILE", type=ROBOT)
-@click.option(
-    "--q",
-    type=JOINT_VALUES,
-    help="Joint values in rad and m, or with units, such as 0,90deg,500mm [default: the start pose].",
-)
-@click.option("--picture", metavar="FILE.svg", type=DRAWING, help="Draw the robot.")
-@placing_options
-@output_options
-def show(
-    name: str,
-    q: tuple[str, ...] | None,
-    picture: Path | None,
-    terminal: Terminal,
-    **placing: Any,
-) -> int:
+@robot.add_command
+@command(ShowRobot, short_help="Print the parameters of a robot, or draw it.")
+@operand("name", kinds.ROBOT, metavar="NAME|FILE")
+def show(call: Call, name: str, q: tuple[str, ...] | None, picture: Path | None, **placing: Any) -> Answer:
     """Print the parameters of a robot and the positions of its points; --picture draws it from two sides.
 
     The points p1..pn are the ends of its segments; the last one is the tool centre point (TCP). The picture
@@ -86,9 +74,8 @@ def show(
     from urmpipe_pipeline.solved_targets.request import joint_values
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
-    chain = _placed(name, placing)
+    chain = _load_placed(name, placing)
     values = joint_values(chain, chain.start if q is None else q, "q")
-    terminal.warn([*start_warnings(chain, values, "q"), *mass_warnings(chain)])
     posed = chain_at(chain, values.tolist())
     if picture is not None:
         masses = chain_masses(chain, values)
@@ -96,16 +83,14 @@ def show(
         write_export(
             picture, draw_projections(sketch, (SIDEWAYS, FRONT), posed.title, EXPORT_MARK), Path(name)
         )
-    terminal.answer(posed.to_dict, lambda: print_chain(posed))
-    return 0
+    warnings = [*start_warnings(chain, values, "q"), *mass_warnings(chain)]
+    return Answer(warnings=warnings, to_dict=posed.to_dict, print_text=lambda: print_chain(posed))
 
 
-@robot.command(short_help="Write a robot as URDF or TOML.")
-@click.argument("name", metavar="NAME|FILE", type=ROBOT)
-@output_option("FILE", "File to write, .urdf or .toml [default: NAME.urdf].")
-@placing_options
-@output_options
-def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -> int:
+@robot.add_command
+@command(ExportRobot, short_help="Write a robot as URDF or TOML.")
+@operand("name", kinds.ROBOT, metavar="NAME|FILE")
+def export(call: Call, name: str, output: Path | None, **placing: Any) -> Answer:
     """Write a robot as URDF (with its visuals, else solids from its geometry) or as a TOML robot file.
 
     Reading the file back gives the same arm: exactly from TOML, to rounding from URDF. The command replaces
@@ -117,44 +102,30 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
       urmpipe robot export ur5e --tool 0,0,0.15 -o ur5e-gripper.urdf
       urmpipe robot export urm8 -o urm8.toml
     """
-    from urmpipe.printing.terminal import say
-    from urmpipe_models.errors import Finding, OptionError, format_value
     from urmpipe_models.files import write_export
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
     from urmpipe_pipeline.runs.torques import urdf_mass_warning
 
     target = output or Path(f"{Path(name).stem}.urdf")
+    suffix = target.suffix.lower()
     writers = {".urdf": urdf_text, ".toml": robot_toml}
-    if target.suffix.lower() not in writers:
+    if suffix not in writers:
         allowed = "a name that ends in .urdf or .toml"
         raise OptionError(Finding(parameter="output", found=format_value(str(target)), allowed=allowed))
-    chain = _placed(name, placing)
-    write_export(target, writers[target.suffix.lower()](chain), Path(name))
-    terminal.warn(urdf_mass_warning(chain) if target.suffix.lower() == ".urdf" else [])
-    made = {"schema": 1, "robot": chain.name, "file": target}
-    terminal.answer(lambda: made, lambda: say(f"Robot: {target}"))
-    return 0
+    chain = _load_placed(name, placing)
+    write_export(target, writers[suffix](chain), Path(name))
+    return Answer(
+        lines=[f"Robot: {target}"],
+        warnings=urdf_mass_warning(chain) if suffix == ".urdf" else [],
+        to_dict=lambda: {"schema": 1, "robot": chain.name, "file": target},
+    )
 
 
-@robot.command(short_help="Write the equations of motion of a robot.")
-@click.argument("name", metavar="NAME|FILE", type=ROBOT)
-@output_option("FILE", "File to write [default: print the equations].")
-@click.option(
-    "--form",
-    type=OneOf(["text", "c"]),
-    help="Text, or C99 functions [default: c for a .c file, else text].",
-)
-@click.option(
-    "--term",
-    type=OneOf(["all", "inertia", "centrifugal", "coriolis", "gravity", "tool"]),
-    default="all",
-    show_default=True,
-    help="Term of the equations.",
-)
-@placing_options
-@output_options
-def equations(name: str, terminal: Terminal, **options: Any) -> int:
+@robot.add_command
+@command(Equations, short_help="Write the equations of motion of a robot.")
+@operand("name", kinds.ROBOT, metavar="NAME|FILE")
+def equations(call: Call, name: str, **options: Any) -> Answer:
     """Write the equations of motion of a robot with masses and up to 4 coordinates as formulas.
 
     Lagrange's equations of the second kind, term by term, with their number of additions and
@@ -167,24 +138,15 @@ def equations(name: str, terminal: Terminal, **options: Any) -> int:
       urmpipe robot equations my-arm.urdf --term gravity
       urmpipe robot equations my-arm.urdf -o my_arm.c
     """
-    import urmpipe
-    from urmpipe.printing.terminal import say
-
-    with terminal.working(f"Deriving {name}"):
+    with call.working(f"Deriving {name}"):
         result = urmpipe.equations(name, **options)
-
-    def text() -> None:
-        """Print the formulas, or where they are."""
-        if result.output is None:
-            click.echo(result.text, nl=False)
-        else:
-            say(f"Equations: {result.output}  ({result.reduced}; before reduction {result.operations})")
-
-    terminal.answer(result.to_dict, text)
-    return 0
+    if result.output is None:
+        return Answer(to_dict=result.to_dict, print_text=lambda: click.echo(result.text, nl=False))
+    cost = f"({result.reduced}; before reduction {result.operations})"
+    return Answer(lines=[f"Equations: {result.output}  {cost}"], to_dict=result.to_dict)
 
 
-def _placed(name: str, placing: Mapping[str, Any]) -> Chain:
+def _load_placed(name: str, placing: Mapping[str, Any]) -> Chain:
     """Return a robot on its base, with its tool, and cut."""
     from urmpipe_models.robots.catalogue import load_robot
 

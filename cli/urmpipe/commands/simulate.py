@@ -1,86 +1,34 @@
-"""`urmpipe simulate`."""
+"""Run a system of blocks."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import urmpipe
-from urmpipe.headings import HeadedCommand, Heading, option
-from urmpipe.options.named import NamedType, argument_names, named_values
-from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import STRICT_OPTION, row_options
-from urmpipe.options.types import DRAWING, DURATION, SYSTEM, FileType, OneOf
+from urmpipe.answers import Answer, Call, command, default_output
+from urmpipe.command_line import operand
+from urmpipe.parameters import kinds
+from urmpipe.parameters.systems import Simulate
 from urmpipe_models.errors import Finding, OptionError
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.simulations.simulation import Simulation
 
 
-@click.command(cls=HeadedCommand, short_help="Run a system of blocks.")
-@click.argument("system", metavar="[SYSTEM|FILE.toml]", type=SYSTEM, required=False)
-@option(Heading.OUTPUT, "--list", "listed", is_flag=True, help="List the built-in systems.")
-@output_option("RUN.rrd", "Recording to write [default: SYSTEM.rrd or FILE.rrd].")
-@option(
-    Heading.RUNNING,
-    "--arguments",
-    "--set",
-    type=NamedType(argument_names),
-    multiple=True,
-    callback=named_values,
-    metavar="NAME=VALUE",
-    help="Argument of the system, such as log=log.csv or robot=urm6.",
-)
-@option(Heading.RUNNING, "--step", type=DURATION, help="Communication step [default: the system's own].")
-@option(
-    Heading.RUNNING,
-    "--duration",
-    type=DURATION,
-    help="Simulated time [default: the system's own, else the length of its longest log].",
-)
-@option(
-    Heading.OUTPUT,
-    "--write-system",
-    metavar="FILE.toml",
-    type=FileType(".toml"),
-    help="Write the file of a built-in system for you to change, and do not run it.",
-)
-@option(
-    Heading.OUTPUT,
-    "--draw",
-    metavar="FILE.svg",
-    type=DRAWING,
-    help="Also draw the system.",
-)
-@option(
-    Heading.RUNNING,
-    "--backend",
-    type=OneOf(["native", "python"]),
-    help="Run the units as compiled C or in Python [default: native if a compiler is found].",
-)
-@option(
-    Heading.RUNNING,
-    "--timeout",
-    type=DURATION,
-    help="Longest time that a call of an FMU may take [default: 60 s].",
-)
-@row_options
-@STRICT_OPTION
-@output_options
+@command(Simulate)
+@operand("system", kinds.SYSTEM, metavar="[SYSTEM|FILE.toml]", required=False)
 def simulate(
+    call: Call,
     system: str | None,
-    listed: bool,
+    list: bool,
     output: Path | None,
-    arguments: dict[str, str],
-    step: float | None,
-    duration: float | None,
     write_system: Path | None,
-    draw: Path | None,
-    terminal: Terminal,
     **options: Any,
-) -> int:
+) -> Answer:
     """Run a system of connected blocks: urmpipe's units, your own, and FMUs of any tool.
 
     SYSTEM is a name of --list, or a system file (TOML) with blocks, connections, start values and inputs
@@ -98,92 +46,78 @@ def simulate(
     Exit codes: 0 done and within tolerance, 1 a delta meter out of tolerance or undecided, 2 bad input or a
     failed FMU.
     """
-    if listed == (system is not None):
-        found = f"{system} and --list" if listed else "neither a system nor --list"
+    if list == (system is not None):
+        found = f"{system} and --list" if list else "neither a system nor --list"
         raise click.UsageError(f"found {found}, allowed: one of the two")
-    if listed or system is None:
-        return _list(terminal)
-    given = {"arguments": arguments, "step": step, "duration": duration, **options}
-    asked = {name: value for name, value in given.items() if value is not None}
+    if system is None:
+        return _list_systems()
     if write_system is not None:
-        _refuse_run_options({"output": output, "draw": draw, **asked})
-        return _write(system, write_system, terminal)
-    target = output or Path(default_name(system))
-    return _run(system, target, draw, terminal, asked)
+        return _write_system(call, system, write_system)
+    return _run(call, system, output or default_output(Path(system).stem), options)
 
 
-def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked: dict[str, Any]) -> int:
-    """Run a system as it is asked, print what it came to, and return the exit code."""
-    from urmpipe.printing.terminal import prints_apart, say
+def _run(call: Call, system: str, output: Path, options: Mapping[str, Any]) -> Answer:
+    """Run a system."""
+    from urmpipe.printing.terminal import prints_apart
     from urmpipe.systems.blocks import ON_PYTHON
 
-    replaces = target.exists()
-    with prints_apart(), terminal.progress(f"Simulating {system}") as progress:
-        result = urmpipe.simulate(
-            system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
-        )
-    terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
-    terminal.answer(result.to_dict, lambda: _print(result, replaces, draw))
-    if result.failed is not None:
-        say(f"error: {result.failed}; the samples until then are in {result.recording}", err=True)
-    return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
+    is_replaced = output.exists()
+    with prints_apart(), call.progress(f"Simulating {system}") as progress:
+        result = urmpipe.simulate(system, output=output, on_message=call.note, progress=progress, **options)
+    failure = f"{result.failed}; the samples until then are in {result.recording}"
+    return Answer(
+        result,
+        _iter_lines(result, is_replaced, options["draw"]),
+        warnings=[one for one in result.warnings if one.kind != ON_PYTHON],  # which is noted already
+        errors=[] if result.failed is None else [Finding(failure)],
+        is_incomplete=result.failed is not None,
+    )
 
 
-def _print(result: Simulation, replaces: bool, draw: Path | None) -> None:
-    """Print what a simulation came to."""
-    from urmpipe.printing.results import print_presentation
-    from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_pipeline.results import present
+def _iter_lines(result: Simulation, is_replaced: bool, drawing: Path | None) -> Iterator[str]:
+    from urmpipe.printing.terminal import recording_line
 
-    print_presentation(present(result))
     if result.loop_seconds:
         factor = result.duration / result.loop_seconds
-        say(f"Simulated in {result.loop_seconds:.2g} s, {factor:.3g} times as fast as real time")
-    if draw:
-        say(f"Drawing: {draw}")
-    print_recording(result.recording, replaced=replaces)
+        yield f"Simulated in {result.loop_seconds:.2g} s, {factor:.3g} times as fast as real time"
+    if drawing:
+        yield f"Drawing: {drawing}"
+    yield recording_line(result.recording, is_replaced)
 
 
-def _list(terminal: Terminal) -> int:
+def _list_systems() -> Answer:
     """List the shipped systems."""
     from urmpipe.printing.units import print_systems
     from urmpipe_fmus.cosim import load_system, system_names
 
     systems = [load_system(name, {}) for name in system_names()]
     rows = [
-        {"name": one.name, "description": one.description, "arguments": dict(one.arguments)}
-        for one in systems
+        {"name": system.name, "description": system.description, "arguments": dict(system.arguments)}
+        for system in systems
     ]
-    terminal.answer(lambda: {"schema": 1, "systems": rows}, lambda: print_systems(systems))
-    return 0
+    return Answer(to_dict=lambda: {"schema": 1, "systems": rows}, print_text=lambda: print_systems(systems))
 
 
-def _refuse_run_options(given: dict[str, Any]) -> None:
-    """Raise a usage error if a file is to be written with options that only a run follows."""
-    allowed = "when the system runs; edit the file instead"
-    found = [name for name, value in given.items() if value]
-    if found:
-        with_file = "found for a system that is only written"
-        raise OptionError(*(Finding(with_file, parameter=name, allowed=allowed) for name in found))
-
-
-def _write(system: str, path: Path, terminal: Terminal) -> int:
-    """Write the file of a shipped system, under a name that is new; the logs that came along stay there."""
-    from urmpipe.api.simulate import own_logs
-    from urmpipe.printing.terminal import say
+def _write_system(call: Call, system: str, path: Path) -> Answer:
+    """Write the file of a shipped system, under a new name; its logs are not copied."""
+    from urmpipe.api.simulate import shipped_logs
     from urmpipe_fmus.cosim import system_text
     from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.outputs import safe_output
 
+    allowed = "when the system runs; edit the file instead"
+    of_runs = [
+        param.name
+        for param in call.ctx.command.params
+        if param.name not in ("write_system", "system", "json", "quiet", "debug")
+        and call.given(str(param.name).__eq__)
+    ]
+    if of_runs:
+        message = "found for a system that is only written"
+        raise OptionError(*(Finding(message, parameter=name, allowed=allowed) for name in of_runs))
     text = system_text(system)
     with safe_output(path, [], "system") as part:
         part.write_text(text, encoding="utf-8")
-    logs = "".join(f" --set {name}=FILE.csv" for name in own_logs(system))
-    said = f"System: {path}  (change it, then: urmpipe simulate {shell_quote(path)}{logs})"
-    terminal.answer(lambda: {"schema": 1, "system": str(path)}, lambda: say(said))
-    return 0
-
-
-def default_name(system: str) -> str:
-    """Return SYSTEM.rrd. Bytes of no text are replaced: Rerun opens no file whose name holds such."""
-    return click.format_filename(f"{Path(system).stem}.rrd")
+    logs = "".join(f" --set {name}=FILE.csv" for name in shipped_logs(system))
+    line = f"System: {path}  (change it, then: urmpipe simulate {shell_quote(path)}{logs})"
+    return Answer(lines=[line], to_dict=lambda: {"schema": 1, "system": str(path)})

@@ -1,4 +1,4 @@
-"""`urmpipe view`."""
+"""Open recordings in the viewer."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from pathlib import Path
 import click
 
 import urmpipe
-from urmpipe.options.output import debug_option, version_option
-from urmpipe.options.types import RECORDING
+from urmpipe.answers import Answer, Call, command
+from urmpipe.command_line import operand
+from urmpipe.parameters import kinds
 
 
-@click.command(short_help="Open recordings in the viewer.")
-@click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=RECORDING)
-@debug_option
-@version_option
-def view(recordings: tuple[Path, ...]) -> int:
+@command(prints=False)
+@operand("recordings", kinds.RECORDING, metavar="RUN.rrd...", nargs=-1, required=True)
+def view(call: Call, recordings: tuple[Path, ...]) -> Answer:
     """Open recordings in Rerun's viewer, each paused at the sample that decided its verdict.
 
     Each recording opens in its own window. The command ends when all windows are closed; Ctrl-C closes
@@ -31,4 +30,4 @@ def view(recordings: tuple[Path, ...]) -> int:
         urmpipe.view(recordings)
     except KeyboardInterrupt:
         click.echo("Closed.", err=True)
-    return 0
+    return Answer()

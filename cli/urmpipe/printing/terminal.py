@@ -51,8 +51,8 @@ def say(line: str, *, err: bool = False) -> None:
     click.echo(escape_line(line), err=err)
 
 
-def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
-    """Print the path of a recording and the command that opens it with the running urmpipe."""
+def recording_line(recording: Path | None, is_replaced: bool = False) -> str:
+    """Return the path of a recording and the command that opens it with the running urmpipe."""
     program = "urmpipe"
     if shutil.which(program) is None:  # not on the path, as in an environment that was not activated
         installed, folder = Path(sys.executable).parent / program, Path.cwd()
@@ -60,8 +60,8 @@ def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     command = shell_quote(program)
     if sys.platform == "win32" and command != program:
         command = f"& {command}"  # PowerShell's call of a quoted name
-    earlier = "; it replaced an earlier one" if replaced else ""
-    say(f"Recording: {recording}  (open it: {command} view {shell_quote(recording)}{earlier})")
+    earlier = "; it replaced an earlier one" if is_replaced else ""
+    return f"Recording: {recording}  (open it: {command} view {shell_quote(recording)}{earlier})"
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:

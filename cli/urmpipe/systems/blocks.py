@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.arm_placing import place_robot
-from urmpipe.reading import resolved
+from urmpipe.reading import resolve_reading
 from urmpipe.systems.logs import LogTable, held_warning, read_table, snap_to_points
 from urmpipe.systems.units import Backend, parse_columns, unit_of
 from urmpipe_datasets import LOGS
@@ -174,8 +174,8 @@ class Blocks:
         self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None
     ) -> LogTable:
         path = LOGS / name if name in self._bundled else Path(name)
-        reading = self._reading if log_map is None else {**self._reading, "log_map": log_map}
-        log = read_table(path, columns, robot=robot, read=resolved(reading).options)
+        reading = self._reading if log_map is None else {**self._reading, "map": log_map}
+        log = read_table(path, columns, robot=robot, read=resolve_reading(reading).options)
         self.files += log.files
         self.warnings += [warning for warning in log.warnings if warning not in self.warnings]
         self.end = max(self.end or 0.0, float(log.table.t_ns[-1]) / 1e9)

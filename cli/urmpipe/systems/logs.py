@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe.keyword_checks import PathLike
-from urmpipe.reading import resolved
+from urmpipe.public_functions import PathLike
+from urmpipe.reading import resolve_reading
 from urmpipe_fmus.block import Table
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
@@ -145,7 +145,7 @@ def read_mapped_table(
         UrmpipeError: With all faults of the map or the files; hints name the map.
     """
     try:
-        table = read_table(log, names, robot=robot, read=resolved({"log_map": log_map}).options)
+        table = read_table(log, names, robot=robot, read=resolve_reading({"map": log_map}).options)
     except LogError as error:
         findings = (replace(finding, hints=tuple(_name_map(finding.hints))) for finding in error.findings)
         raise LogError(*findings) from error
@@ -158,7 +158,7 @@ def _name_map(hints: Sequence[Hint]) -> Iterator[Hint]:
     for hint in hints:
         if not hint.call and hint.parameter in IN_MAP:
             source = f"from urmpipe ingest {hint} {Hint('write_map')}"
-            yield Hint("log_map", None, f"{source} {hint.effect}".strip())
+            yield Hint("map", None, f"{source} {hint.effect}".strip())
         elif hint.call or hint.parameter not in NOT_IN_MAP:
             yield hint
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from urmpipe.arm_placing import Robot, place_robot
-from urmpipe.keyword_checks import PathLike
+from urmpipe.public_functions import PathLike
 from urmpipe.systems.logs import LogTable, read_mapped_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.block import BlockModel

@@ -158,7 +158,7 @@ def test_the_map_and_the_recording_of_a_table(tmp_path: Path) -> None:
     run = urmpipe.ingest(
         frame, "ur5e", joints=joints, unit="rad", write_map=tmp_path / "lab.toml", output=tmp_path / "log.rrd"
     )
-    again = urmpipe.ingest(frame, log_map=tmp_path / "lab.toml")
+    again = urmpipe.ingest(frame, map=tmp_path / "lab.toml")
     assert (again.q == run.q).all()
     stored = urmpipe.read_recording(tmp_path / "log.rrd")
     assert isinstance(stored, urmpipe.Run)
@@ -166,11 +166,11 @@ def test_the_map_and_the_recording_of_a_table(tmp_path: Path) -> None:
     assert run.log.files[0].name == "log"
     assert (
         run.log.files[0].sha256
-        != urmpipe.ingest(frame.iloc[:40], log_map=tmp_path / "lab.toml").log.files[0].sha256
+        != urmpipe.ingest(frame.iloc[:40], map=tmp_path / "lab.toml").log.files[0].sha256
     )
 
 
 def test_the_map_of_arrays_reads_their_table(tmp_path: Path) -> None:
     urmpipe.ingest(t=T, q=Q, names=list("abcdef"), robot="ur5e", write_map=tmp_path / "lab.toml")
     frame = pd.DataFrame(np.column_stack([T, Q]), columns=["t", *"abcdef"])
-    assert (urmpipe.ingest(frame, log_map=tmp_path / "lab.toml").q == Q).all()
+    assert (urmpipe.ingest(frame, map=tmp_path / "lab.toml").q == Q).all()

@@ -111,7 +111,7 @@ def test_a_frame_is_numbers_a_matrix_or_a_transform(given: Any) -> None:
 @pytest.mark.parametrize(
     ("given", "found"),
     [
-        ("0,0,0.15", "found '0,0,0.15'"),
+        ("0,0,0.15kg", "found '0,0,0.15kg'"),
         ([0.0, 0.0], "found [0.0, 0.0] of shape (2,)"),
         (2.0 * np.eye(4), "found a matrix that is not a rigid motion"),
         ([0.0, 0.0, float("nan")], "found [0.0, 0.0, nan] of shape (3,)"),
@@ -143,23 +143,23 @@ def test_a_tool_much_longer_than_its_arm_is_allowed() -> None:
 def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
     wrong: dict[str, Any] = {
         "robot": 6,
-        "tsp": "5ms",
+        "tsp": "5 kg",
         "skip_bad": 1,
-        "log_map": {},
+        "map": {},
         "strict": 1,
         "output": "",
     }
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.ingest("log.csv", progress=True, **wrong)  # type: ignore[arg-type]
     assert str(error.value).splitlines() == [
-        "robot (--robot): found 6, allowed: a name, a TOML or URDF file, or a Chain, such as"
-        " urmpipe.load_robot(NAME)",
-        "tsp (--tsp): found '5ms', allowed: a number, in s",
-        "strict (--strict): found 1, allowed: True or False",
+        "robot (--robot): found 6, allowed: a name, a TOML or URDF file, or a Chain,"
+        " such as urmpipe.load_robot(NAME)",
+        "map (--map): found {}, allowed: a map (TOML), or what `read_map` returned",
+        "skip_bad (--skip-bad): found 1, allowed: true or false",
+        "tsp (--tsp): found '5 kg', allowed: a positive time in s, such as 0.005 or 5ms",
+        "strict (--strict): found 1, allowed: true or false",
         "output (--output): found '', allowed: a path: text or a Path, not empty",
         "progress: found True, allowed: a function of the completed share, 0 to 1, such as print",
-        "log_map (--log-map): found {}, allowed: a map (TOML), or what `read_map` returned",
-        "skip_bad (--skip-bad): found 1, allowed: True or False",
     ]
 
 
@@ -212,7 +212,7 @@ def test_files_may_be_text(folder: Path, run: urmpipe.Run, tmp_path: Path) -> No
     urmpipe.write_recording(run, f"{tmp_path}/log.rrd")
     assert isinstance(urmpipe.read_recording(f"{tmp_path}/log.rrd"), urmpipe.Run)
     urmpipe.write_map(run, f"{tmp_path}/log.toml")
-    again = urmpipe.ingest(folder / "log.csv", "urm6", log_map=f"{tmp_path}/log.toml")
+    again = urmpipe.ingest(folder / "log.csv", "urm6", map=f"{tmp_path}/log.toml")
     assert (again.q == run.q).all()
 
 
@@ -221,7 +221,7 @@ def test_what_was_solved_and_written_is_json(tmp_path: Path) -> None:
     assert json.loads(json.dumps(solved.to_dict()))["output"] == str(tmp_path / "joints.csv")
 
 
-SHARED = ("base", "tool", "read", "tsp", "strict", "output", "inputs", "progress")
+SHARED = ("base", "tool", "strict", "inputs", "progress")
 
 
 def test_shared_keywords_have_one_name_and_one_order() -> None:

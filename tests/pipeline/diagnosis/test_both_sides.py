@@ -215,7 +215,7 @@ def test_a_path_in_mm_is_read_so_and_has_no_exponent(write: Write) -> None:
 def test_all_joints_in_degrees_are_corrected_at_once(write: Write) -> None:
     files = write("one", T, Q), write("two", T, np.degrees(Q))
     asked, done = (urmpipe.ingest(file, "ur5e", unit="rad") for file in files)
-    (run,) = urmpipe.compare(asked, done, diagnose=True).runs
+    (run,) = urmpipe.diagnose(asked, [done]).runs
     (hint,) = remedy_hints(run)
     assert hint.value == dict.fromkeys(run.run.log.joints, "deg")
 

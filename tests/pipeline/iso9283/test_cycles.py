@@ -57,7 +57,7 @@ def thrice(tmp_path: Path) -> Path:
 
 
 def run(reference: Path, done: Path | list[Path]) -> Comparison:
-    return urmpipe.compare(reference, done, iso=True)
+    return urmpipe.iso(reference, done)
 
 
 def kinds(result: Comparison) -> list[tuple[str, int | None]]:
@@ -113,7 +113,7 @@ def test_a_motion_without_return_is_refused(
         log = written(tmp_path / f"{name}.csv", resting(way))
         said = refusal(LogError, run, square, log)
         assert f"{name}.csv" in said and "returns to its start" in said
-        assert command_line(["compare", str(square), str(log), "--iso"]) == 2
+        assert command_line(["iso", str(square), str(log)]) == 2
         assert "returns to its start" in capsys.readouterr().err
 
 
@@ -159,7 +159,7 @@ def test_rows_that_are_said_are_taken(square: Path, thrice: Path) -> None:
     text = f"1:{ROWS},{2 * ROWS + 1}:{3 * ROWS}"
     pairs = [(1, ROWS), (2 * ROWS + 1, 3 * ROWS)]
     for said in (text, pairs):
-        result = urmpipe.compare(square, thrice, iso=True, cycles=said)
+        result = urmpipe.iso(square, thrice, cycles=said)
         assert rows(result) == pairs and not kinds(result)
         assert [len(one.run.t_ns) for one in result.runs] == [ROWS, ROWS]
 
@@ -167,7 +167,7 @@ def test_rows_that_are_said_are_taken(square: Path, thrice: Path) -> None:
 def test_rows_and_offsets_are_in_the_json(
     square: Path, thrice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked = ["compare", str(square), str(thrice), "--iso", "--json", "--cycles", f"6:{ROWS}"]
+    asked = ["iso", str(square), str(thrice), "--json", "--cycles", f"6:{ROWS}"]
     assert command_line(asked) == 0
     (cycle,) = json.loads(capsys.readouterr().out)["iso"]["cycles"]
     assert (cycle["row"], cycle["last_row"]) == (6, ROWS)
@@ -191,16 +191,16 @@ BAD = {
 def test_bad_rows_are_refused_with_all_that_is_wrong(
     said: str, square: Path, thrice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    refused = refusal(OptionError, urmpipe.compare, square, thrice, iso=True, cycles=said)
+    refused = refusal(OptionError, urmpipe.iso, square, thrice, cycles=said)
     assert all(part in refused for part in BAD[said])
-    asked = ["compare", str(square), str(thrice), "--iso", "--cycles", said]
+    asked = ["iso", str(square), str(thrice), "--cycles", said]
     assert command_line(asked) == 2
     printed = capsys.readouterr().err
     assert all(part in printed for part in BAD[said])
 
 
 def test_rows_of_several_logs_are_refused(square: Path, thrice: Path) -> None:
-    said = refusal(OptionError, urmpipe.compare, square, [thrice, thrice], iso=True, cycles="1:841")
+    said = refusal(OptionError, urmpipe.iso, square, [thrice, thrice], cycles="1:841")
     assert "cycles" in said and "one log" in said
 
 
@@ -237,7 +237,7 @@ POSES = np.array([[0.1 * k, 0.05 * k * k, 0.3] for k in range(5)])
 def test_30_visits_of_5_still_poses(tmp_path: Path) -> None:
     visits = np.tile(POSES, (30, 1)) + np.random.default_rng(1).normal(0.0, 1e-4, (150, 3))
     reference = still(tmp_path / "poses.csv", POSES)
-    result = urmpipe.compare(reference, still(tmp_path / "visits.csv", visits), iso=True, poses=True)
+    result = urmpipe.iso(reference, still(tmp_path / "visits.csv", visits), poses=True)
     assert rows(result) == [(5 * k + 1, 5 * k + 5) for k in range(30)] and not kinds(result)
     assert {one.sync_offset for one in judged(result).cycles} == {None}
     assert {one.at for one in judged(result).criteria if one.name == "AP"} == {
@@ -256,7 +256,7 @@ def test_30_visits_of_5_still_poses(tmp_path: Path) -> None:
 def test_a_cut_visit_of_still_poses_is_told(tmp_path: Path) -> None:
     reference = still(tmp_path / "poses.csv", POSES)
     visits = still(tmp_path / "visits.csv", np.tile(POSES, (3, 1))[:-2])
-    result = urmpipe.compare(reference, visits, iso=True, poses=True)
+    result = urmpipe.iso(reference, visits, poses=True)
     assert rows(result) == [(1, 5), (6, 10)] and kinds(result) == [("cut-cycle", 11)]
 
 

@@ -131,7 +131,7 @@ def test_nine_of_ten_cycles_that_are_off_fail(
     if not cases.is_dir():
         pytest.skip("the folder shared has no cases of verdicts")
     out = {name: str(tmp_path / f"out.{name}") for name in ("rrd", "xml", "csv")}
-    command = ["compare", str(cases / "sq.csv"), str(cases / "t10d.csv"), "--iso", "-q", "-o", out["rrd"]]
+    command = ["iso", str(cases / "sq.csv"), str(cases / "t10d.csv"), "-q", "-o", out["rrd"]]
     command += ["--tolerance", "AP=0.4mm,AT=1mm,RP=1mm", "--junit", out["xml"], "--csv", out["csv"]]
     assert run(command) == 1
     printed = capsys.readouterr().err
@@ -171,7 +171,7 @@ def test_a_failed_log_among_the_cycles_is_exit_code_1(
     monkeypatch.chdir(tmp_path)
     written(Path("square.csv"), once())
     files = [str(path) for path in logs(Path(), [once(), once() + OFF, once()])]
-    command = ["compare", "square.csv", *files, "--iso", "--json"]
+    command = ["iso", "square.csv", *files, "--json"]
     assert run([*command, "--tolerance", "AP=1mm"]) == 1
     told = json.loads(capsys.readouterr().out)
     (failed,) = told["iso"]["failed_cycles"]
@@ -187,8 +187,8 @@ def test_a_cycle_that_failed_since_the_baseline_is_worse(tmp_path: Path) -> None
     reference = written(tmp_path / "square.csv", once())
     before = logs(tmp_path, [once()] * 3)
     written(tmp_path / "off.csv", once() + OFF)
-    baseline = urmpipe.compare(reference, before, iso=True)
-    now = urmpipe.compare(reference, [*before[:2], tmp_path / "off.csv"], iso=True, baseline=baseline)
+    baseline = urmpipe.iso(reference, before)
+    now = urmpipe.iso(reference, [*before[:2], tmp_path / "off.csv"], baseline=baseline)
     assert now.verdict == "fail"
     assert [str(one) for one in there(now.baseline).missing] == [f"off of {now.name}"]
 
@@ -203,7 +203,7 @@ def test_a_criterion_that_needs_more_cycles_is_not_judged(
     reference = written(tmp_path / "square.csv", once())
     log = written(tmp_path / "log.csv", once() + OFF / 1000.0)
     output = ["-o", str(tmp_path / "out.rrd"), "--junit", str(tmp_path / "out.xml"), "--json"]
-    assert run(["compare", str(reference), str(log), "--iso", "--tolerance", tolerance, *output]) == code
+    assert run(["iso", str(reference), str(log), "--tolerance", tolerance, *output]) == code
     printed = capsys.readouterr()
     told = json.loads(printed.out)
     assert told["verdict"] == verdict

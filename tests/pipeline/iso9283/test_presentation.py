@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import urmpipe
 from asserting import there
 from made_runs import path_run
 from presented import cells, every_section, facts, scene_of
 from repeated import along, still
-from urmpipe import compare
 from urmpipe.printing.results import print_presentation
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import against_baseline
@@ -254,8 +254,8 @@ def test_one_cycle_has_no_repeatability(tmp_path: Path) -> None:
 def test_still_poses_have_no_path(tmp_path: Path) -> None:
     poses = np.random.default_rng(1).uniform(-0.3, 0.3, (5, 3))
     visits = np.tile(poses, (30, 1)) + np.random.default_rng(2).normal(0.0, 1e-4, (150, 3))
-    result = compare(
-        still(tmp_path / "poses.csv", poses), still(tmp_path / "visits.csv", visits), iso=True, poses=True,
+    result = urmpipe.iso(
+        still(tmp_path / "poses.csv", poses), still(tmp_path / "visits.csv", visits), poses=True,
         tolerance={"AP": 1e-3}, output=tmp_path / "still.rrd",
     )  # fmt: skip
     shown = recorded(result, tmp_path)

@@ -449,7 +449,7 @@ def test_four_logs_take_a_page_each_and_three_for_the_rest(browser: Browser, tmp
     lay_thinned_logs(tmp_path)
     names = ("solidworks", "coppeliasim.csv", "matlab.csv", "counter_rotating.csv")
     logs = [tmp_path / name for name in names]
-    compared = urmpipe.compare(tmp_path / "path.csv", logs, robot="urm6", diagnose=True)
+    compared = urmpipe.diagnose(tmp_path / "path.csv", logs, robot="urm6")
     path = tmp_path / "demo.html"
     path.write_text(render_report([present(compared)]), encoding="utf-8")
     with opened(browser, path) as page:

@@ -195,7 +195,7 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     assert said(vector) == []
 
 
-MAP = '--log-map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = '--map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
 
 
 def _forms(*forms: str) -> str:

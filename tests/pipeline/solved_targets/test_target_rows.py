@@ -18,7 +18,7 @@ Read = Callable[..., TargetFile]
 Wrong = Callable[..., list[str]]
 
 
-MAP = '--log-map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = '--map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
 
 
 def said(targets: TargetFile) -> list[tuple[str, str]]:
@@ -348,7 +348,7 @@ def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
             "t,q1,q2,q3\n0,1,2,3\n1,1,2,3\n",
             [
                 "targets.csv: found no position in q1, q2, q3, allowed: x, y, z; name them so in the"
-                ' header; --log-map FILE.toml names them: [tcp] position = ["A", "B", "C"]'
+                ' header; --map FILE.toml names them: [tcp] position = ["A", "B", "C"]'
             ],
         ),
         (

@@ -28,7 +28,7 @@ ALLOWED = "allowed: a text table; --robot NAME|FILE takes a robot"
     [
         ("arm.urdf", f"the model of a robot, {ALLOWED}"),
         ("arm.csv", f"the model of a robot, {ALLOWED}"),
-        ("arm.toml", f"a TOML file, {ALLOWED}; --log-map FILE.toml takes a map"),
+        ("arm.toml", f"a TOML file, {ALLOWED}; --map FILE.toml takes a map"),
     ],
 )
 def test_a_robot_is_no_log(wrong: Wrong, name: str, said: str) -> None:

@@ -294,7 +294,7 @@ def test_what_looks_like_a_recorded_tcp_and_is_none_is_said(read: Read, names: t
         (
             "tcp-not-read",
             f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x,"
-            f" tcp_y, tcp_z; --log-map FILE.toml names them: [tcp] position = [{quoted}]",
+            f" tcp_y, tcp_z; --map FILE.toml names them: [tcp] position = [{quoted}]",
         )
     ]
 
@@ -304,7 +304,7 @@ def test_two_recorded_tcps_are_said(read: Read) -> None:
     log = read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3,4,5,6\n0.1,0.2,1,2,3,4,5,6\n")
     assert list(map(str, log.warnings)) == [
         f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x, tcp_y,"
-        ' tcp_z; --log-map FILE.toml names them: [tcp] position = ["A", "B", "C"]'
+        ' tcp_z; --map FILE.toml names them: [tcp] position = ["A", "B", "C"]'
     ]
 
 

@@ -210,7 +210,7 @@ def about_pose(pose: Pose) -> list[Inference]:
     groups = {"TCP": ("position", pose.position), "orientation": ("orientation", pose.rotation)}
     for what, (where, group) in groups.items():
         names = tuple(column.name for column in group)
-        hints = (Hint("log_map", None, f"with tcp.{where} in it"),)
+        hints = (Hint("map", None, f"with tcp.{where} in it"),)
         if names:
             said.append(Inference(f"{whose} {what}", ", ".join(names), pose.evidence, "", names, hints))
     return said
@@ -232,7 +232,7 @@ def _path(
         same = [group for group in pose.alternatives if group[0].kind == pose.position[0].kind]
         if same:
             groups = "; ".join(map(listed, (pose.position, *same)))
-            hint = Hint("log_map", None, 'names them: [tcp] position = ["A", "B", "C"]')
+            hint = Hint("map", None, 'names them: [tcp] position = ["A", "B", "C"]')
             raise LogError(
                 Finding(f"found several positions: {groups}; allowed: one x, y, z", file, hints=(hint,))
             )
@@ -244,7 +244,7 @@ def _path(
     if path:
         hints = (
             Hint("", effect="name them so in the header"),
-            Hint("log_map", None, 'names them: [tcp] position = ["A", "B", "C"]'),
+            Hint("map", None, 'names them: [tcp] position = ["A", "B", "C"]'),
         )
         message = f"found no position in {listed(columns)}, allowed: x, y, z"
         raise LogError(Finding(message, file=file, hints=hints))
@@ -343,7 +343,7 @@ def _about_passed_over(
     if passed:
         said = "; ".join(f"{_ends(other)} passed over for {_ends(group)}" for group, other in passed)
         takes = [take(other) for group, other in passed if group == roles.joints]
-        hints = takes[:1] or [Hint("log_map", None, "with tcp.position in it takes others")]
+        hints = takes[:1] or [Hint("map", None, "with tcp.position in it takes others")]
         yield LogWarning(PASSED_OVER, said, hints=tuple(hints))
 
 

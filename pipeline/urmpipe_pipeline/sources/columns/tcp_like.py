@@ -40,7 +40,7 @@ def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
     said = f"{listed(alike)} look like a recorded TCP and are not read as one"
     hints = (
         Hint("", effect="name its columns tcp_x, tcp_y, tcp_z"),
-        Hint("log_map", None, f"names them: {table}"),
+        Hint("map", None, f"names them: {table}"),
     )
     return [LogWarning(TCP_NOT_READ, said, hints=hints)]
 

@@ -24,7 +24,7 @@ UNIT_NORM = 1e-3
 MOST_RAD = 2 * np.pi * 1.01
 """Angles without a given unit, most of them beyond a turn in [rad], are hardly in rad."""
 
-MAP = Hint("log_map", None, 'names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."')
+MAP = Hint("map", None, 'names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."')
 """The remedy where the names of columns show no orientation."""
 
 _OURS = frozenset(("rx", "ry", "rz"))
