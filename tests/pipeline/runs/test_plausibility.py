@@ -1,4 +1,4 @@
-"""Sound logs, at random, bundled and real, have no warning of plausibility; the messages are in plausibility.cases."""
+"""Sound logs have no warning of plausibility; the messages are in plausibility.cases."""
 
 from __future__ import annotations
 

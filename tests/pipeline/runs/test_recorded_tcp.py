@@ -1,4 +1,4 @@
-"""Robots of the catalogue, calibrated and real, against a recorded TCP; the messages are in recorded_tcp.cases."""
+"""Calibrated and real robots against a recorded TCP; the messages are in recorded_tcp.cases."""
 
 from __future__ import annotations
 
