@@ -19,17 +19,15 @@ from made_plans import DOWN, SMALL, limited, planned
 from panda_log import URDF, motion, panda, panda_csv
 from presented import cells, figures, scene_of
 from recorded import rows_of
-from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import energies_over_log, torques_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.presentation.figure import Drawing, Figure
 from urmpipe_pipeline.results import present, read_recording, write_recording
-from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
 from urmpipe_pipeline.text import to_json_value
 
@@ -70,20 +68,6 @@ def run(arm: Chain, tmp_path_factory: pytest.TempPathFactory) -> Run:
     return ingest_log([panda_csv(tmp_path_factory.mktemp("log"), arm.coordinates, 2.2)], robot=arm)
 
 
-def slider(mass: float = 2.0, effort: float = np.inf) -> Chain:
-    """A mass that slides up and down."""
-    joint = Joint("q1", kind="prismatic", effort=effort)
-    return Chain("slider", (joint,), inertials=(Inertial("q1", mass),))
-
-
-def sliding(folder: Path, z: FloatArray, dt: float = 0.01) -> Path:
-    """Write a log of a joint that slides to some places in [m], shape (n,)."""
-    rows = [f"{k * dt:.6f},{value!r}" for k, value in enumerate(z.tolist())]
-    path = folder / "slide.csv"
-    path.write_text("\n".join(["t [s],q1 [m]", *rows]) + "\n", encoding="utf-8")
-    return path
-
-
 def test_the_torques_of_a_log_are_those_of_pinocchio(run: Run, rnea: Rnea) -> None:
     expected = rnea(run.q, run.qd, run.qdd)
     np.testing.assert_allclose(there(run.tau), expected, rtol=0, atol=SAME * np.abs(expected).max())
@@ -118,15 +102,6 @@ def test_recorded_rates_and_accelerations_are_taken(arm: Chain, rnea: Rnea, tmp_
     expected = rnea(*motion(t))
     # 15 digits are written of each value.
     np.testing.assert_allclose(there(run.tau), expected, rtol=0, atol=1e-9)
-
-
-def test_the_table_has_a_column_a_joint_behind_the_accelerations(run: Run) -> None:
-    names = there(run.robot).coordinates
-    frame = run.to_frame()
-    columns = list(frame.columns)
-    first = columns.index(f"dd_{names[-1]}") + 1
-    assert columns[first : first + 8] == [*(f"tau_{name}" for name in names), "px"]
-    np.testing.assert_array_equal(frame[[f"tau_{name}" for name in names]].to_numpy(), run.tau)
 
 
 def test_a_csv_has_every_double_and_the_unit(run: Run, tmp_path: Path) -> None:
@@ -179,46 +154,6 @@ def test_json_has_the_largest_torque_of_each_joint(run: Run) -> None:
     json.dumps(to_json_value(torques), allow_nan=False)
 
 
-def test_a_torque_beyond_the_effort_is_said(run: Run) -> None:
-    tau, limit = there(run.tau)[:, 1], there(run.robot).moving[1].effort
-    beyond = np.flatnonzero(np.abs(tau) > limit)
-    worst = int(np.argmax(np.abs(tau)))
-    (warning,) = (one for one in run.warnings if one.kind == "effort-limit")
-    assert 10 < len(beyond) < 100
-    assert warning.row == beyond[0] + 1
-    assert warning.message == (
-        f"panda_joint2 needs more than its effort of 87 N.m in {len(beyond)} of 801 samples"
-        f" ({100 * len(beyond) / 801:.1f} %), at worst {np.abs(tau[worst]):.4g} N.m in row {worst + 1}:"
-        " check masses, clock and noise of the log"
-    )
-
-
-@pytest.mark.parametrize(("derivative", "count"), [(None, 1), ("central", 1), ("savgol", 0)])
-def test_smoothing_is_advised_where_it_is_not_used(
-    run: Run, derivative: Method | None, count: int, tmp_path: Path
-) -> None:
-    robot = there(run.robot)
-    weak = replace(robot, joints=tuple(replace(one, effort=40.0) for one in robot.joints))
-    path = panda_csv(tmp_path, weak.coordinates, 2.2)
-    for found in (
-        ingest_log([path], robot=weak, derivative=derivative),
-        with_robot(ingest_log([path], robot=run.robot, derivative=derivative), weak),
-    ):
-        (warning,) = (one for one in found.warnings if one.kind == "effort-limit")
-        assert [(one.parameter, one.value) for one in warning.hints] == count * [("derivative", "savgol")]
-
-
-def test_recorded_accelerations_are_not_to_be_smoothed(tmp_path: Path) -> None:
-    z = 0.1 * np.sin(clock(300, 0.01))
-    table = np.column_stack((clock(300, 0.01), z, -z))
-    path = tmp_path / "slide.csv"
-    np.savetxt(path, table, "%.15g", ",", header="t [s],q1 [m],dd_q1 [m/s2]", comments="")
-    (warning,) = (
-        one for one in ingest_log([path], robot=slider(effort=15.0)).warnings if one.kind == "effort-limit"
-    )
-    assert warning.hints == ()
-
-
 def test_several_joints_beyond_their_efforts_are_one_warning(run: Run) -> None:
     robot = there(run.robot)
     weak = replace(robot, joints=tuple(replace(one, effort=40.0) for one in robot.joints))
@@ -228,74 +163,6 @@ def test_several_joints_beyond_their_efforts_are_one_warning(run: Run) -> None:
     others = [f"panda_joint{j + 1} ({counts[j]} samples)" for j in (0, 2, 3) if counts[j]]
     assert warning.message.startswith("panda_joint2 needs more than its effort of 40 N.m in ")
     assert f"; also {' and '.join([', '.join(others[:-1]), others[-1]])}: check masses" in warning.message
-
-
-def test_the_row_is_that_of_the_file_on_another_grid(tmp_path: Path) -> None:
-    t = clock(500, 0.01)
-    z = 0.1 * np.sin(2.0 * np.pi * t**2 / 5.0)
-    path = sliding(tmp_path, z)
-    run = ingest_log([path], robot=slider(effort=25.0), tsp=0.02)
-    (warning,) = (one for one in run.warnings if one.kind == "effort-limit")
-    first = np.flatnonzero(np.abs(there(run.tau)[:, 0]) > 25.0)[0]
-    assert warning.row == 2 * first + 1
-    assert " N in " in warning.message
-
-
-def test_a_sliding_mass_takes_m_times_a_plus_g(tmp_path: Path) -> None:
-    t = clock(300, 0.01)
-    run = ingest_log([sliding(tmp_path, 0.5 * 3.0 * t**2)], robot=slider(2.0))
-    assert run.torque_units == ["N"]
-    # Second differences of 15 digits: 1e-16 / 1e-4.
-    np.testing.assert_allclose(there(run.tau), 2.0 * (3.0 + 9.81), rtol=0, atol=1e-9)
-    assert run.to_dict()["torques"][0]["effort"] is None
-    assert [one for one in run.warnings if one.kind == "effort-limit"] == []
-
-
-def test_rows_without_a_rate_have_no_torque(tmp_path: Path) -> None:
-    z = 0.1 * np.sin(clock(300, 0.05))
-    path = sliding(tmp_path, z)
-    lines = path.read_text(encoding="utf-8").splitlines()
-    lines[101] = lines[101].split(",")[0] + ","
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    run = ingest_log([path], robot=slider())
-    tau = there(run.tau)[:, 0]
-    np.testing.assert_array_equal(np.isnan(tau), np.isnan(run.qdd[:, 0]))
-    assert 0 < np.isnan(tau).sum() < 10
-    assert run.to_dict()["torques"][0]["max"] == np.nanmax(np.abs(tau))
-
-
-@pytest.mark.parametrize("moved", [False, True])
-def test_no_limit_is_applied_where_the_period_of_the_rows_is_assumed(moved: bool, tmp_path: Path) -> None:
-    path = tmp_path / "slide.csv"
-    values = 0.1 * np.sin(0.05 * np.arange(200.0))
-    path.write_text("\n".join(["q1 [m]", *map(repr, values.tolist())]) + "\n", encoding="utf-8")
-    run = ingest_log([path], robot=slider(effort=25.0))
-    run = with_robot(run, slider(effort=24.0)) if moved else run
-    assert run.timed and run.log.period_assumed
-    largest = np.abs(there(run.tau)).max()
-    assert largest > 25.0
-    assert [one for one in run.warnings if one.kind == "effort-limit"] == []
-    (torque,) = run.to_dict()["torques"]
-    assert torque["max"] == largest
-    assert [torque[key] for key in ("effort", "effort_share", "out_fraction")] == [None] * 3
-    table = next(one for one in present(run).body.tables if one.title == "Joint torques")
-    assert "period of the rows is assumed" in table.note
-    shown = figure(run, "Joint torques")
-    assert "period of the rows is assumed" in shown.caption and "Dashed" not in shown.caption
-    assert [panel.limit for view in shown.views for panel in view.panels] == [None, None]
-    given = ingest_log([path], robot=slider(effort=25.0), read=ReadOptions(period=0.005))
-    assert [one.kind for one in given.warnings if one.kind == "effort-limit"] == ["effort-limit"]
-
-
-def test_still_poses_have_no_torques(tmp_path: Path) -> None:
-    run = ingest_log(
-        [sliding(tmp_path, np.linspace(0.0, 1.0, 20))], robot=slider(), read=ReadOptions(poses=True)
-    )
-    assert run.tau is None
-    assert run.to_dict()["torques"] == []
-    shown = present(run)
-    assert [one for one in figures(shown.body) if "orque" in one.title] == []
-    assert [one.title for one in shown.body.blocks() if isinstance(one, Drawing)] == ["Mass centres"]
 
 
 def test_a_robot_without_masses_gives_what_it_gave(run: Run) -> None:
@@ -310,15 +177,6 @@ def test_a_robot_without_masses_gives_what_it_gave(run: Run) -> None:
     ]  # fmt: skip
     assert scene_of(shown).title == "Arm and paths [m]"
     assert [one for one in shown.body.blocks() if isinstance(one, Drawing)] == []
-
-
-def test_another_robot_gets_its_own_torques(run: Run) -> None:
-    robot = there(run.robot)
-    double = with_robot(run, replace(robot, inertials=2 * robot.inertials))
-    np.testing.assert_allclose(there(double.tau), 2.0 * there(run.tau), rtol=0, atol=1e-10)
-    again = with_robot(double, robot)
-    np.testing.assert_array_equal(again.tau, run.tau)
-    assert {one.kind for one in again.warnings} == {one.kind for one in run.warnings}
 
 
 def test_a_plan_has_the_torques_of_its_exact_rates() -> None:
