@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from urmpipe_fmus.si_units import coherent_unit, display_conversion, is_same_unit
 from urmpipe_models.elementwise import Element, FloatArray
-from urmpipe_models.errors import Finding, FmuError, UnitError, format_value
+from urmpipe_models.errors import Finding, FmuError, UnitError, format_count, format_value
 
 Causality = Literal["parameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -119,7 +119,7 @@ class Variable(ABC):
         if self.size is not None and self.size < 1:
             yield f"{self.name}: size {self.size}, allowed: 1 or more"
         elif len(self.starts) != self.width:
-            yield f"{self.name}: found {len(self.starts)} start values, allowed: {self.width}"
+            yield f"{self.name}: found {format_count(len(self.starts), 'start value')}, allowed: {self.width}"
         if not self.minimum <= self.maximum:
             yield f"{self.name}: min {self.minimum:g} above max {self.maximum:g}"
         yield from (f"{self.name}: {fault}" for fault in self._unit_faults())

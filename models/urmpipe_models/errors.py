@@ -451,7 +451,12 @@ def format_names(name: str, allowed: Iterable[str]) -> str:
     if len(names) <= MAX_LISTED:
         return ", ".join(names) or "none"
     first = ((name and _sort_by_similarity(name, names, 0.0)) or names)[:MAX_LISTED]
-    return f"{', '.join(first)} and {len(names) - len(first)} others"
+    return f"{', '.join(first)} and {format_count(len(names) - len(first), 'other')}"
+
+
+def format_count(count: int, noun: str) -> str:
+    """Return a count with its noun: "1 column", "2 columns"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _sort_by_similarity(name: str, allowed: Iterable[str], min_similarity: float) -> list[str]:

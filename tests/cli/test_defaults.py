@@ -240,7 +240,7 @@ def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Ca
     both = ["compare", "log.rrd", "log.rrd", "--unit", "rad", "--repair"]
     assert run(both) == 2
     assert (
-        "--unit, repair (--repair): found with recordings only (log.rrd, log.rrd), allowed: "
+        "--unit, --repair: found with recordings only (log.rrd, log.rrd), allowed: "
         in capsys.readouterr().err
     )
     mixed = ["compare", "log.rrd", "log.csv", "--robot", "ur5e", "--unit", "deg", "--joints", "a,b,c,d,e,f"]

@@ -231,7 +231,7 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ({"tsp": np.nan}, "tsp (--tsp): found nan, allowed: a positive time in s"),
         ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: strictly increasing, by 1 ns or"),
         ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of the two"),
-        ({"start": [0.0]}, "start (--start): found 1 values, allowed: 6, one for each of theta1, "),
+        ({"start": [0.0]}, "start (--start): found 1 value, allowed: 6, one for each of theta1, "),
         (
             {"start": "zero"},
             "start (--start): found 'zero', allowed: joint values in rad and m, or with units, ",

@@ -130,7 +130,7 @@ def test_a_recording_among_files_or_without_a_run_is_refused(run: Run, tmp_path:
     urmpipe.simulate("one-drive", duration=0.02, output=tmp_path / "s.rrd")
     assert refusal(RecordingError, urmpipe.ingest, tmp_path / "s.rrd") == (
         f"{tmp_path / 's.rrd'}: found the recording of a simulation, allowed: one that ingest wrote;"
-        " compare(block=BLOCK) takes the motion of a block"
+        " urmpipe compare --block BLOCK takes the motion of a block"
     )
 
 

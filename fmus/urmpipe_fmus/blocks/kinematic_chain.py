@@ -24,7 +24,7 @@ from urmpipe_fmus.blocks.coordinates import (
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.chain import Parameter as ArmParameter
 from urmpipe_models.arm.denavit_hartenberg import SEGMENT_SOURCE, TILT_SOURCE
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import UnitError, map_collecting_errors
 from urmpipe_models.kinematics.forward import Motion, forward, iter_point_motions
 from urmpipe_models.math3d import Transform, euler_zyx, from_rpy, matrix_to_rpy
 from urmpipe_models.robots.toml import chain_from_dict
@@ -174,9 +174,13 @@ def kinematic_chain(
     """
     check_robot("kinematic_chain", robot)
     names = robot.point_names
-    selected = check_choices("kinematic_chain", "points", names if points is None else points, names)
-    sensor_names = names[-1:] if sensors is None else sensors
-    sensor_names = check_choices("kinematic_chain", "sensors", sensor_names, names)
+    selected, sensor_names = map_collecting_errors(
+        lambda choice: check_choices("kinematic_chain", *choice, names),
+        (
+            ("points", names if points is None else points),
+            ("sensors", names[-1:] if sensors is None else sensors),
+        ),
+    )
     check_flag("kinematic_chain", "rates", rates)
     if not (selected or sensor_names):
         raise UnitError("unit kinematic_chain: options points, sensors: found none, allowed: one of either")

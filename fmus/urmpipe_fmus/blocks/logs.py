@@ -12,7 +12,7 @@ from urmpipe_fmus.blocks.coordinates import check_count, check_flag, option_erro
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.delta import delta, exceeds_tolerance
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import UnitError, format_count, format_value
 from urmpipe_models.wraps import WrapState, repolarize_sample
 
 LOG_SOURCE_OPTIONS: Mapping[str, str] = {
@@ -55,13 +55,17 @@ def log_source(
         UnitError: If the columns are not as many as the table has, or with the errors of their names.
     """
     check_flag("log_source", "interpolate", interpolate)
-    if not isinstance(table, Table) or isinstance(columns, str) or not isinstance(columns, Sequence):
-        raise UnitError("unit log_source: found no table and columns, allowed: a Table, a list of columns")
+    faults = [] if isinstance(table, Table) else [f"table: found {format_value(table)}, allowed: a Table"]
+    if isinstance(columns, str) or not isinstance(columns, Sequence):
+        faults.append(f"columns: found {format_value(columns)}, allowed: a list of columns")
+    if faults:
+        raise UnitError(*(f"unit log_source: option {fault}" for fault in faults))
     outputs = [_read_column(column) for column in columns]
     width = sum(column.size or 1 for column in outputs)
     if width != table.columns or not outputs:
         raise UnitError(
-            f"unit log_source: option columns: found {width} columns, allowed: {table.columns} of the table"
+            f"unit log_source: option columns: found {format_count(width, 'column')},"
+            f" allowed: {table.columns} of the table"
         )
 
     def play(v: Values) -> Mapping[str, Element | Sequence[Element]]:

@@ -319,17 +319,19 @@ def _at_joint_values(network: Network, start: Mapping[str, Any]) -> Network:
 def _read_points(network: Network, points: Any) -> tuple[tuple[str, str, Vector], ...]:
     """Return the points of the option: name, body, and place in the body in [m]."""
     rows: dict[str, tuple[Any, Any]] = {}
+    faults, read = [], []
     if isinstance(points, Mapping):
         for name, table in points.items():
-            entries = table if isinstance(table, Mapping) and {*table} == {"body", "point"} else {}
-            rows[name] = (entries.get("body"), entries.get("point"))
+            if isinstance(table, Mapping) and {*table} == {"body", "point"}:
+                rows[name] = (table["body"], table["point"])
+            else:
+                faults.append(f"{name}: found {format_value(table)}")
     elif points is not None:
         words = points if isinstance(points, (list, tuple)) else [points]
         joined = ",".join(map(str, words))  # the shell's points=A:1,2,3,B:4,5,6 is a list of six words
         for k, text in enumerate(re.split(r",(?=[^,]*:)", joined), 1):
             body, _, place = text.rpartition(":")
             rows[f"p{k}"] = (body, _numbers(place))
-    faults, read = [], []
     for name, (body, place) in rows.items():
         if body not in network.body_names:
             faults.append(f"{name}: body {format_unknown_name(str(body), network.body_names)}")

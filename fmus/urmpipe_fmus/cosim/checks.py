@@ -21,7 +21,7 @@ from urmpipe_fmus.cosim.job import TYPES
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
 from urmpipe_fmus.fmu_file import host_binaries, open_fmu
 from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, is_same_unit, parse_unit
-from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_unknown_name
+from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_count, format_unknown_name
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 
 ELEMENT = re.compile(r"(.+)\[(\d+(?:,\s*\d+)*)\]")  # name of an array's element: `phi[1]`, `M[1,2]`
@@ -447,7 +447,10 @@ class Wiring:
                 continue
             values = value if isinstance(value, list) else [value] * len(elements)
             if len(values) != len(elements):
-                self._fault(table, f"found {len(values)} values, allowed: {len(elements)}, or one for all")
+                self._fault(
+                    table,
+                    f"found {format_count(len(values), 'value')}, allowed: {len(elements)}, or one for all",
+                )
                 continue
             for variable, text_or_number in zip(elements, values, strict=True):
                 start = _in_si(variable, text_or_number)

@@ -20,7 +20,7 @@ from typing import get_args
 import numpy as np
 
 from urmpipe_models.elementwise import Element, FloatArray, Vector, cross, dot, subtract
-from urmpipe_models.errors import Finding, closest_name, format_unknown_name, format_value
+from urmpipe_models.errors import Finding, closest_name, format_count, format_unknown_name, format_value
 from urmpipe_models.networks.joint_motion import TURN
 from urmpipe_models.networks.mechanism import build_graph, build_mechanism
 from urmpipe_models.networks.parts import (
@@ -115,7 +115,7 @@ def _validate_bodies(parts: Parts) -> Iterator[Finding]:
             message = "nothing is tied to it; allowed: bodies with a joint or an element"
             yield Finding(message, about=where, kind="untied")
         if body.start and len(body.start) != len(POSE_UNITS):
-            count = f"{len(body.start)} numbers, allowed: 6: x, y, z and a rotation vector"
+            count = f"{format_count(len(body.start), 'number')}, allowed: 6: x, y, z and a rotation vector"
             yield Finding(f"found {count}", about=f"{where}.start")
         yield from _validate_numbers(f"{where}.start", body.start)
 

@@ -20,6 +20,7 @@ from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
 from urmpipe_pipeline.sources.options import GivenInterval, ReadOptions, is_interval
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
+from urmpipe_pipeline.text import counted
 
 T = TypeVar("T")
 
@@ -202,7 +203,8 @@ def _frame(table: CheckedTable, key: str) -> tuple[float, ...]:
     values = table.numbers(key, None, si=("m", "m", "m", "rad", "rad", "rad"))
     if len(values) not in (3, 6):
         table.add_error(
-            key, f"found {len(values)} numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad"
+            key,
+            f"found {counted(len(values), 'number')}, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
         )
     return values
 

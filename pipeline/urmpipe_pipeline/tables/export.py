@@ -103,7 +103,8 @@ class ExportOptions:
 
 def _check_known(parameter: str, value: str | None, known: Iterable[str], kind: str) -> None:
     if value is not None and value not in known:
-        raise _option_error(parameter, f"{value} with a {kind}", ", ".join(filter(None, known)) or "none")
+        article = "an" if kind[0] in "aeiou" else "a"
+        raise _option_error(parameter, f"{value} with {article} {kind}", ", ".join(filter(None, known)) or "none")
 
 
 def _option_error(parameter: str, value: str, allowed: str, *hints: Hint) -> OptionError:

@@ -14,7 +14,7 @@ import pytest
 from exported import export_result
 from recorded import rows_of
 from same_results import assert_same
-from urmpipe_models.errors import RecordingError
+from urmpipe_models.errors import OptionError, RecordingError
 from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.results import read_recording, write_recording
@@ -56,6 +56,8 @@ def test_its_velocities_leave(accuracy: Callable[..., AccuracyResult], tmp_path:
     result = accuracy(0.5, 1.0, gone=1.0)
     export_result(result, tmp_path / "v.csv", ExportOptions("csv"))
     export_result(result, tmp_path / "v.mat", ExportOptions("mat"))
+    with pytest.raises(OptionError, match="found file with an accuracy, allowed: velocities, samples"):
+        export_result(result, tmp_path / "f.csv", ExportOptions("csv", "file"))
     frame = pd.read_csv(tmp_path / "v.csv")
     names = ["velocity [m/s]", "reached [m/s]", "error [m]", "path_error [m]", "saturated_share"]
     assert list(frame) == names

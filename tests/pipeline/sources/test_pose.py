@@ -216,7 +216,7 @@ def test_named_columns_of_the_pose(read: Read) -> None:
         ({"position": ("a1", "a2")}, "position: found 2 columns, allowed: x, y, z"),
         (
             {"position": ("a1", "a2", "a3"), "orientation": ("b1",)},
-            "orientation: found 1 columns, allowed: 3, 4 or 9",
+            "orientation: found 1 column, allowed: 3, 4 or 9",
         ),
         (
             {"position": ("a1", "a2", "a3"), "orientation": ("b1", "b2", "b3"), "rotation": "matrix"},

@@ -188,7 +188,7 @@ WRONG = [
     ),
     Wrong("time_repeated", [r"^log:10, column t: found 0\.14 s again, allowed: "]),
     Wrong("time_missing", [r"^log:7, column t: found no time, allowed: a time in every row"]),
-    Wrong("time_of_one_second", [r"(?=.*rows repeat a time)(?=.*period=)"]),
+    Wrong("time_of_one_second", [r"(?=.*rows repeat a time)(?=.*--period )"]),
     Wrong("time_in_steps", [r"15\.6\d* ms|0\.0156\d* s"], stops=False),
     Wrong("gap_of_two_seconds", [r"row 16: 2\.02 s"], stops=False),
     Wrong("gap_with_a_possible_turn", [r"(?=.*q5)(?=.*\b16\b)(?=.*(ambiguous|turn))"], stops=False),
@@ -233,7 +233,7 @@ WRONG = [
     # the units
     Wrong(
         "angles_of_unknown_unit",
-        [r"values up to 4[23]\.?\d* in q1, .* no unit, allowed: rad or deg; .*unit="],
+        [r"values up to 4[23]\.?\d* in q1, .* no unit, allowed: rad or deg; .*--unit "],
     ),
     Wrong("header_says_rad", [r"(?=.*J1)(?=.*found)(?=.*rad)(?=.*(deg|360))"]),
     Wrong("header_says_deg_krc", [r"(?=.*AxisPos_Act1)(?=.*rad)(?=.*(deg|°))(?=.*\d mm)"], "ur5e", None),

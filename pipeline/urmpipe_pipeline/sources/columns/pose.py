@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.columns.families import Family, drop_unknown, find
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import FEW, Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
+from urmpipe_pipeline.text import counted
 
 ORTHOGONAL = 1e-2
 """Entries of R R^T may differ from those of I by this: matrices are printed with three digits or more."""
@@ -95,8 +96,8 @@ def find_pose(
     measured = not position
     if measured:
         position, alternatives = _xyz(find_families(numeric, vocabulary().measured, 0))
-    if not position and (counted := _counted_pose(numeric, layouts, form)):
-        return counted
+    if not position and (numbered := _counted_pose(numeric, layouts, form)):
+        return numbered
     rest = [column for column in numeric if column not in position]
     if measured and position:
         stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
@@ -141,7 +142,7 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
     position = tuple(find_column(columns, text, about="position") for text in options.position)
     rotation = tuple(find_column(columns, text, about="orientation") for text in options.orientation)
     if len(position) != 3:
-        raise OptionError(f"position: found {len(position)} columns, allowed: x, y, z")
+        raise OptionError(f"position: found {counted(len(position), 'column')}, allowed: x, y, z")
     forms = _forms_of(rotation, options)
     if rotation and not forms:
         allowed = (
@@ -149,7 +150,7 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
             if options.rotation
             else "3, 4 or 9"
         )
-        raise OptionError(f"orientation: found {len(rotation)} columns, allowed: {allowed}")
+        raise OptionError(f"orientation: found {counted(len(rotation), 'column')}, allowed: {allowed}")
     return Pose(position, rotation, forms if rotation else (), "given as an option")
 
 
@@ -161,7 +162,7 @@ def _measured_pose(columns: Sequence[Column], options: ReadOptions) -> Pose:
     if len(position) != 3 or (rotation and not forms):
         widths = f"{column_count(options.rotation)}" if options.rotation else "3, 4 or 9"
         allowed = f"x, y, z, and {widths} of the orientation behind them, or none"
-        raise OptionError(Finding(parameter="measured", found=f"{len(named)} columns", allowed=allowed))
+        raise OptionError(Finding(parameter="measured", found=counted(len(named), "column"), allowed=allowed))
     return Pose(position, rotation, forms, "given as an option", measured=True)
 
 
@@ -365,5 +366,5 @@ def _numbers(family: Family) -> range | None:
     """Return range(n) if the n numbers of a family count up from 0, or from 1, without a gap."""
     count = range(len(family.columns))
     lowest = min(family.columns)
-    counted = lowest in (0, 1) and sorted(family.columns) == [lowest + k for k in count]
-    return count if counted else None
+    is_numbered = lowest in (0, 1) and sorted(family.columns) == [lowest + k for k in count]
+    return count if is_numbered else None
