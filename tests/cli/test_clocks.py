@@ -99,7 +99,9 @@ def test_without_stamps_in_both_logs_start_together(tmp_path: Path, name: str) -
     done = write(tmp_path / "done.csv", times(0, 10 * MS), other, off=1e-5, first=BEGIN + later)
     assert api.compare(wanted, done, "ur5e").runs[0].sync.mode == "start"
     said = refusal(LogError, api.compare, wanted, done, "ur5e", sync="stamps")
-    assert f"sync (--sync): stamps: found {why}, allowed: Unix times or dates on both sides that overlap" in said
+    assert (
+        f"sync (--sync): stamps: found {why}, allowed: Unix times or dates on both sides that overlap" in said
+    )
 
 
 @pytest.mark.slow

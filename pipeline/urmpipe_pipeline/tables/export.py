@@ -104,7 +104,9 @@ class ExportOptions:
 def _check_known(parameter: str, value: str | None, known: Iterable[str], kind: str) -> None:
     if value is not None and value not in known:
         article = "an" if kind[0] in "aeiou" else "a"
-        raise _option_error(parameter, f"{value} with {article} {kind}", ", ".join(filter(None, known)) or "none")
+        raise _option_error(
+            parameter, f"{value} with {article} {kind}", ", ".join(filter(None, known)) or "none"
+        )
 
 
 def _option_error(parameter: str, value: str, allowed: str, *hints: Hint) -> OptionError:
