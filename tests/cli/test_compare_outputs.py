@@ -23,7 +23,7 @@ from urmpipe.main import cli, run
 from urmpipe.parameters.kinds import SYNC
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import Statistics
-from urmpipe_pipeline.comparison.verdict import LEAST_SHARES
+from urmpipe_pipeline.comparison.verdict import MIN_SHARES
 
 
 @pytest.fixture(autouse=True)
@@ -91,10 +91,10 @@ def in_json_of(told: dict[str, Any], one: Statistics) -> dict[str, Any]:
 @pytest.mark.slow
 def test_what_is_given_replaces_the_default_tolerance_whole(capsys: Captured) -> None:
     assert compare("bad.csv", "--json") == 1
-    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.0035, **LEAST_SHARES}
+    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.0035, **MIN_SHARES}
     assert compare("bad.csv", "--tolerance", "angle=5deg", "--json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["tolerance"] == {"angle": np.radians(5.0), **LEAST_SHARES}
+    assert told["tolerance"] == {"angle": np.radians(5.0), **MIN_SHARES}
     assert told["runs"][0]["delta"]["x"]["verdict"] is None
 
 
@@ -123,7 +123,7 @@ def test_a_lab_says_its_tolerance_as_text_or_as_a_table(
 ) -> None:
     (folder / "urmpipe.toml").write_text(text)
     compare("good.csv", "--json")
-    assert json.loads(capsys.readouterr().out)["tolerance"] == LEAST_SHARES | tolerance
+    assert json.loads(capsys.readouterr().out)["tolerance"] == MIN_SHARES | tolerance
 
 
 def test_a_lab_says_its_noise_for_the_calls_that_have_a_baseline(folder: Path, capsys: Captured) -> None:
@@ -232,7 +232,7 @@ def test_a_path_held_against_a_log_is_not_said_to_have_joints(capsys: Captured) 
 
 def test_tolerances_add_up(capsys: Captured) -> None:
     assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "norm=2mm", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002, **LEAST_SHARES}
+    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002, **MIN_SHARES}
     assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "axis=2mm") == 2
 
 

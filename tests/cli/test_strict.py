@@ -15,7 +15,7 @@ import urmpipe
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.verdict import LEAST_SHARES
+from urmpipe_pipeline.comparison.verdict import MIN_SHARES
 
 Spoil = Callable[[FloatArray], FloatArray]
 
@@ -130,7 +130,7 @@ def test_in_python_a_tolerance_with_units_is_a_text(tmp_path: Path) -> None:
     text = "axis=500mm,angle=15deg"
     result = urmpipe.compare(logs[0], logs[1], robot="ur5e", tolerance=text, strict=True)
     assert result.verdict == "pass"
-    assert result.tolerance == {"axis": 0.5, "angle": pytest.approx(np.pi / 12), **LEAST_SHARES}
+    assert result.tolerance == {"axis": 0.5, "angle": pytest.approx(np.pi / 12), **MIN_SHARES}
     for text, allowed in (("'foo'", "a length in m, or axis="), ("3.5", "a unit: 3.5mm or 3.5m")):
         with pytest.raises(
             OptionError, match=rf"^tolerance \(--tolerance\): found {text}, allowed: {allowed}"

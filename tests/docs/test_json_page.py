@@ -21,7 +21,7 @@ from urmpipe.main import cli, find_commands, run
 from urmpipe_datasets import LOGS
 from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.verdict import delta_verdict
+from urmpipe_pipeline.comparison.verdict import judge_delta_meter
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simulation
@@ -101,7 +101,7 @@ def test_each_key_of_a_simulation_is_named() -> None:
         signals=(Signal("meter", "energy_in", np.zeros(2), "J"),),
         system_svg="", system_text="", blocks=(block,), failed=None, warnings=(LogWarning("gap", "a gap"),),
         provenance=build_provenance("simulate", {}, ()),
-        verdicts=tuple(filter(None, [delta_verdict("meter", t_ns, np.zeros((2, 3)), {"axis": 1.0})])),
+        verdicts=tuple(filter(None, [judge_delta_meter("meter", t_ns, np.zeros((2, 3)), {"axis": 1.0})])),
     )  # fmt: skip
     found = keys(simulation.to_dict())
     assert found - NAMED == set()

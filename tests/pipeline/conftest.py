@@ -13,7 +13,7 @@ from asserting import refusal
 from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_pipeline.comparison.verdict import delta_verdict
+from urmpipe_pipeline.comparison.verdict import judge_delta_meter
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedArm, SimulatedBlock, Simulation
@@ -50,7 +50,7 @@ def build_simulation(
     q = 0.4 * np.sin(np.outer(t, [0.31, 0.23, 0.41, 0.17, 0.53, 0.37]) + np.arange(6))
     delta = np.column_stack((1e-3 * np.cos(t), 4e-3 * np.sin(0.4 * math.pi * t), np.zeros(samples)))
     norm = np.linalg.norm(delta, axis=1)
-    verdict = delta_verdict("meter", t_ns, delta, {"axis": tolerance})
+    verdict = judge_delta_meter("meter", t_ns, delta, {"axis": tolerance})
     return Simulation(
         name=name,
         description="A log through an arm",

@@ -13,7 +13,7 @@ from urmpipe import ingest
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import point_over_log
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.run import Run
@@ -34,7 +34,7 @@ def diagnosed(reference: Run, log: Run) -> Diagnosis:
 
 def diagnosed_record(log: Run) -> Diagnosis:
     """Return why the joints of a log do not lead where it was measured."""
-    found = compare_recorded(log, CompareOptions(diagnose=True)).runs[0].diagnosis
+    found = compare_with_recorded_tcp(log, CompareOptions(diagnose=True)).runs[0].diagnosis
     assert found is not None
     return found
 

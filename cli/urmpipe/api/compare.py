@@ -22,9 +22,14 @@ from urmpipe.public_functions import (
 )
 from urmpipe.reading import map_files, resolve_reading
 from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, map_collecting_errors
-from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog, judge_others
+from urmpipe_pipeline.comparison.baseline import compare_with_baseline, complete_noise
+from urmpipe_pipeline.comparison.compare import (
+    CompareOptions,
+    compare_runs,
+    compare_with_recorded_tcp,
+    skip_failed_logs,
+)
+from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.comparison.warnings import CLOCKS_DIFFER, LARGE_NOISE, SWAPPED, large_noises
 from urmpipe_pipeline.operands import (
     BASELINE_HINT,
@@ -145,7 +150,7 @@ def run_comparison(
         failed: list[FailedLog] | None = [] if values.get("keep_going") else None
         result = checked(ready) if ready else _compare(operands, load, options, checked, failed)
         if earlier is not None:
-            result = replace(result, baseline=against_baseline(result, earlier, noise))
+            result = replace(result, baseline=compare_with_baseline(result, earlier, noise))
         shown = present(result)
         written.write("junit", lambda part, path: write_junit(shown, part, path))
         if (rows := shown.rows) is not None:
@@ -197,14 +202,14 @@ def _compare(
     if options.iso is not None and not others:
         raise OptionError(Finding(about="logs", found="none", allowed="a reference and its cycles"))
     if not others:
-        return checked(compare_recorded(first, options))
+        return checked(compare_with_recorded_tcp(first, options))
 
     def judge(runs: Sequence[Run]) -> Comparison:
         return checked(compare_runs(first, runs, options))
 
     if unjudged is None:
         return judge(others)
-    return replace(judge_others(judge, others, unjudged), failed_logs=tuple(unjudged))
+    return replace(skip_failed_logs(judge, others, unjudged), failed_logs=tuple(unjudged))
 
 
 def _load_made(reference: Operand | Comparison, output: PathLike | None) -> Comparison | None:

@@ -25,7 +25,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.measure_units import readings
 from urmpipe_models.toml_tables import quote_toml
-from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, delta_verdict
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, judge_delta_meter
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.coupling import coupling_warnings
@@ -247,7 +247,7 @@ def _iter_verdicts(
         columns = [recorded.column(name, f"delta[{i}]") for i in (1, 2, 3)]
         tolerance = {"axis": _start_value(plan, Port(name, TOLERANCE))}
         reasons = tuple(_iter_uncertainties(plan, recorded, non_finite, name))
-        verdict = delta_verdict(name, recorded.t_ns, np.column_stack(columns), tolerance, reasons)
+        verdict = judge_delta_meter(name, recorded.t_ns, np.column_stack(columns), tolerance, reasons)
         if verdict is not None:
             yield verdict
 

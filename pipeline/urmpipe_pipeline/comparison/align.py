@@ -1,4 +1,12 @@
-"""Space: moving a log so that what remains is what the question is about."""
+"""Space: a log is moved rigidly before it is compared, p' = R p + t + R' d with R' = R R_log.
+
+`align` finds the motion, by mode:
+
+- start: R = R_reference R_log^T, t = p_reference - R p_log of the first poses.
+- rigid: the R, t of the least sum |p_reference - R p - t|^2 (Umeyama 1991, eq. 38-42, without scale).
+- tool: the d of the least sum |p_reference - p - R_log d|^2, the mean of R_log^T (p_reference - p).
+- base+tool: base and tool of the least residuals of hand-eye calibration.
+"""
 
 from __future__ import annotations
 
@@ -25,24 +33,17 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import ORIENTED, Alignment, AlignMode, Matched, run_finding
 
-RESOLVED = 1e-4
-"""Positions that leave a line by less than this, root mean square in [m], leave the rotation about it open: a
-joint angle of four digits puts a point as far off."""
-
-TURNED = np.radians(1.0)
-"""A tool that turns by less in [rad] is not told from a base: 1 mm of the base is 0.02 mm off as one of the
-tool, as much as the best arms repeat to."""
-
-LEAST_POSES = 4
-"""Three positions have the nine numbers that a base and the offset of a tool have: they fit whatever is."""
-
-IN_COMMON = 1e-9
-"""Two motions across a line have nothing in common if their covariance is below this share of their sizes:
-rounding leaves as much."""
+MIN_BREADTH = 1e-4  # m rms across a line: a joint angle of four digits puts a point as far off
+# Below, an offset of the tool is not distinguishable from one of the base: 1 mm of the base is 0.02 mm off as
+# one of the tool, which the best arms repeat to.
+MIN_TURN = np.radians(1.0)  # rad, of the tool over the log
+MIN_POSES = 4  # three positions have the nine numbers of a base and the offset of a tool: they always fit
+# Covariance of two motions across a line / their sizes, below which they are unrelated: rounding leaves it.
+MIN_COVARIANCE = 1e-9
 
 
 def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:
-    """Return both sides with the log moved in space, and how it was moved (`alignment`).
+    """Return both sides with the log moved in space, and the motion (`alignment`).
 
     Args:
         matched: Both sides at the same times, at least one.
@@ -53,23 +54,23 @@ def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:
         run: The log, for messages.
 
     Raises:
-        LogError: If the positions leave the rotation open; a tool, by orientations that hardly turn; or
-            base and tool, by too few poses.
+        LogError: If the positions do not determine the rotation; orientations that barely turn, the tool; or
+            too few poses, base and tool.
     """
     match mode:
         case "none":
             return matched
         case "start":
-            return _moved(matched, _start(matched))
+            return _apply_rigid(matched, _start(matched))
         case "rigid":
-            return _moved(matched, _rigid(matched, run))
+            return _apply_rigid(matched, _rigid(matched, run))
         case "tool":
-            return _with_tool(matched, run)
-    return _with_base_and_tool(matched, run)
+            return _align_tool(matched, run)
+    return _align_base_and_tool(matched, run)
 
 
-def placed(robot: Chain, alignment: Alignment) -> Chain:
-    """Return an arm whose kinematics are where an alignment put those of a robot."""
+def apply_alignment(robot: Chain, alignment: Alignment) -> Chain:
+    """Return a robot whose kinematics are those of the log after an alignment."""
     if alignment.mode == "none":
         return robot
     base, tool = (
@@ -82,119 +83,104 @@ def placed(robot: Chain, alignment: Alignment) -> Chain:
     return robot.placed(base @ robot.base, robot.tool @ tool)
 
 
-def as_option(frame: Transform) -> tuple[float, ...]:
-    """Return a frame as `base` and `tool` take it: X, Y, Z in [m]; RX, RY, RZ in [rad] if it is turned."""
+def frame_to_option(frame: Transform) -> tuple[float, ...]:
+    """Return a frame as `base` and `tool` take it: X, Y, Z in [m]; RX, RY, RZ in [rad] if it is rotated."""
     x, y, z = (float(value) for value in frame.translation)
-    turned = matrix_to_rpy(frame.rotation)
-    return (x, y, z, *turned) if any(turned) else (x, y, z)
+    angles = matrix_to_rpy(frame.rotation)
+    return (x, y, z, *angles) if any(angles) else (x, y, z)
 
 
 def _start(matched: Matched) -> Alignment:
-    """Return the motion that joins the first poses: R = R_reference R_log^T, t = p_reference - R p_log."""
     first, turn = 0, np.array([[0.0, 0.0, 0.0, 1.0]])
     if matched.reference_quat is not None and matched.actual_quat is not None:
-        there = np.isfinite(matched.reference_quat).all(axis=1) & np.isfinite(matched.actual_quat).all(axis=1)
-        if there.any():
-            first = int(np.argmax(there))
-            turn = quaternion_product(
-                matched.reference_quat[[first]], conjugate(matched.actual_quat[[first]])
-            )
+        both = np.isfinite(matched.reference_quat).all(axis=1) & np.isfinite(matched.actual_quat).all(axis=1)
+        if both.any():
+            first = int(np.argmax(both))
+            inverse = conjugate(matched.actual_quat[[first]])
+            turn = quaternion_product(matched.reference_quat[[first]], inverse)
     rotation = to_matrices(turn)[0]
-    return _alignment("start", rotation, matched.reference[first] - rotation @ matched.actual[first])
+    return _build_alignment("start", rotation, matched.reference[first] - rotation @ matched.actual[first])
 
 
 def _rigid(matched: Matched, run: Run) -> Alignment:
-    """Return the rigid motion with the least squared distances, if the positions tell it.
-
-    Source: Umeyama 1991, eq. 38-42, without scale.
-    """
-    wanted, done = (side - side.mean(axis=0) for side in (matched.reference, matched.actual))
-    rotation, common = fit_rotation(wanted.T @ done / len(done))
-    size, breadth = zip(*map(_extent, (wanted, done)), strict=True)
-    if min(breadth) < RESOLVED or common[1] + common[2] <= IN_COMMON * breadth[0] * breadth[1]:
-        raise LogError(run_finding(run, _open_rotation(min(size), min(breadth)), parameter="align"))
-    shift = matched.reference.mean(axis=0) - rotation @ matched.actual.mean(axis=0)
-    return _alignment("rigid", rotation, shift)
-
-
-def _extent(centred: FloatArray) -> tuple[float, float]:
-    """Return the root mean square of positions about their middle, along their main line and across it."""
-    sizes = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(centred))
-    along, across = [*sizes.tolist(), 0.0][:2]  # a position alone has one
-    return along, across
-
-
-def _open_rotation(size: float, breadth: float) -> str:
-    """Say why positions leave the rotation open, and what is allowed."""
-    if size < RESOLVED:
-        found = f"compared positions in one point (within {size * 1e3:.4f} mm rms)"
-    elif breadth < RESOLVED:
-        found = f"compared positions on one line (within {breadth * 1e3:.4f} mm rms)"
-    else:
+    """Return the rigid motion of the least squared distances, if the positions determine it."""
+    sides = matched.reference, matched.actual
+    reference, actual = (side - side.mean(axis=0) for side in sides)
+    rotation, covariance = fit_rotation(reference.T @ actual / len(actual))
+    # Root mean squares about the mean, along the main line and across it; one position has no breadth.
+    rms = [np.append(np.linalg.svd(side, compute_uv=False), 0.0) for side in (reference, actual)]
+    (size, breadth), (other_size, other_breadth) = (side[:2] / np.sqrt(len(actual)) for side in rms)
+    related = covariance[1] + covariance[2] > MIN_COVARIANCE * breadth * other_breadth
+    if min(breadth, other_breadth) < MIN_BREADTH or not related:
         found = "two motions without anything in common"
-    return f"rigid: found {found}, which leaves the rotation open, allowed: start, tool, none"
+        if min(size, other_size) < MIN_BREADTH:
+            found = f"compared positions in one point (within {min(size, other_size) * 1e3:.4f} mm rms)"
+        elif min(breadth, other_breadth) < MIN_BREADTH:
+            found = f"compared positions on one line (within {min(breadth, other_breadth) * 1e3:.4f} mm rms)"
+        allowed = "which leaves the rotation open, allowed: start, tool, none"
+        raise LogError(run_finding(run, f"rigid: found {found}, {allowed}", parameter="align"))
+    shift = matched.reference.mean(axis=0) - rotation @ matched.actual.mean(axis=0)
+    return _build_alignment("rigid", rotation, shift)
 
 
-def _alignment(mode: AlignMode, rotation: FloatArray, shift: FloatArray) -> Alignment:
-    """Return an alignment of plain numbers."""
+def _build_alignment(mode: AlignMode, rotation: FloatArray, shift: FloatArray) -> Alignment:
     x, y, z = (float(value) for value in shift)
-    return Alignment(mode, _rows(rotation), (x, y, z))
+    return Alignment(mode, _to_rows(rotation), (x, y, z))
 
 
-def _rows(rotation: FloatArray) -> tuple[tuple[float, ...], ...]:
-    """Return a rotation matrix as plain numbers."""
+def _to_rows(rotation: FloatArray) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in rotation.tolist())
 
 
-def _moved(matched: Matched, alignment: Alignment) -> Matched:
+def _apply_rigid(matched: Matched, alignment: Alignment) -> Matched:
     """Return both sides with the log moved by the rotation and translation of an alignment."""
     rotation = np.array(alignment.rotation)
-    done = matched.actual @ rotation.T + np.array(alignment.translation)
+    actual = matched.actual @ rotation.T + np.array(alignment.translation)
     quat = matched.actual_quat
     if quat is not None:
         quat = quaternion_product(to_quaternions(rotation.reshape(1, 9), "matrix"), quat)
-    return matched._replace(actual=done, actual_quat=quat, alignment=alignment)
+    return matched._replace(actual=actual, actual_quat=quat, alignment=alignment)
 
 
-def _with_tool(matched: Matched, run: Run) -> Matched:
-    """Move the log by the d of the least |p_reference - p - R d|^2, the mean of R^T (p_reference - p)."""
-    posed, quat = _oriented(matched, "tool", run)
-    turned = float(rotation_angle(quat, np.broadcast_to(quat[0], quat.shape)).max())
-    if turned < TURNED:
-        found = f"tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
-        said = "which an offset of the base explains as well, allowed: a log that turns it; start, none"
-        raise LogError(run_finding(run, f"{found}, {said}", parameter="align"))
+def _align_tool(matched: Matched, run: Run) -> Matched:
+    posed, quat = _with_orientation(matched, "tool", run)
+    turn = float(rotation_angle(quat, np.broadcast_to(quat[0], quat.shape)).max())
+    if turn < MIN_TURN:
+        found = f"tool: found a tool that turns by {np.degrees(turn):.4f} deg in all"
+        allowed = "which an offset of the base explains as well, allowed: a log that turns it; start, none"
+        raise LogError(run_finding(run, f"{found}, {allowed}", parameter="align"))
     rotation = to_matrices(quat)
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()
-    moved = posed.actual + rotation @ np.array((x, y, z))
-    return posed._replace(actual=moved, alignment=Alignment("tool", tool=(x, y, z)))
+    actual = posed.actual + rotation @ np.array((x, y, z))
+    return posed._replace(actual=actual, alignment=Alignment("tool", tool=(x, y, z)))
 
 
-def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
-    """Move the log by the base and the tool of the least misses: p' = Z (p + R d), R' = Z R X."""
-    posed, quat = _oriented(matched, "base+tool", run)
-    if len(quat) < LEAST_POSES:
-        few = text.counted(len(quat), "compared pose")
-        said = f"base+tool: found {few}, which some base and tool fit, allowed: {LEAST_POSES} or more"
-        raise LogError(run_finding(run, said, parameter="align"))
-    rotation, wanted = to_matrices(quat), posed.reference_quat
-    found = solve_hand_eye(
-        posed.actual, rotation, posed.reference, None if wanted is None else to_matrices(wanted)
-    )
-    moved = _alignment("base+tool", found.base_rotation, found.base_position)
-    x, y, z = found.tool_position.tolist()
+def _align_base_and_tool(matched: Matched, run: Run) -> Matched:
+    """Move the log by the base Z and the tool X, d of the least residuals: p' = Z (p + R d), R' = Z R X."""
+    posed, quat = _with_orientation(matched, "base+tool", run)
+    if len(quat) < MIN_POSES:
+        poses = text.counted(len(quat), "compared pose")
+        message = f"base+tool: found {poses}, which some base and tool fit, allowed: {MIN_POSES} or more"
+        raise LogError(run_finding(run, message, parameter="align"))
+    rotation, reference_quat = to_matrices(quat), posed.reference_quat
+    reference_rotation = None if reference_quat is None else to_matrices(reference_quat)
+    frames = solve_hand_eye(posed.actual, rotation, posed.reference, reference_rotation)
+    x, y, z = frames.tool_position.tolist()
     alignment = replace(
-        moved, tool=(x, y, z), tool_rotation=_rows(found.tool_rotation), unobservable=found.unobservable
+        _build_alignment("base+tool", frames.base_rotation, frames.base_position),
+        tool=(x, y, z),
+        tool_rotation=_to_rows(frames.tool_rotation),
+        unobservable=frames.unobservable,
     )
-    tool = np.broadcast_to(found.tool_rotation.reshape(1, 9), (len(quat), 9))
+    tool = np.broadcast_to(frames.tool_rotation.reshape(1, 9), (len(quat), 9))
     with_tool = posed._replace(
-        actual=posed.actual + rotation @ found.tool_position,
+        actual=posed.actual + rotation @ frames.tool_position,
         actual_quat=quaternion_product(quat, to_quaternions(tool, "matrix")),
     )
-    return _moved(with_tool, alignment)
+    return _apply_rigid(with_tool, alignment)
 
 
-def _oriented(matched: Matched, mode: AlignMode, run: Run) -> tuple[Matched, FloatArray]:
+def _with_orientation(matched: Matched, mode: AlignMode, run: Run) -> tuple[Matched, FloatArray]:
     """Return the samples of which the log has an orientation, and these.
 
     Raises:
@@ -203,6 +189,6 @@ def _oriented(matched: Matched, mode: AlignMode, run: Run) -> tuple[Matched, Flo
     quat = matched.actual_quat
     known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
     if quat is None or not len(known):
-        said = f"{mode}: found no orientation of the log, allowed: {ORIENTED}"
-        raise LogError(run_finding(run, said, parameter="align"))
+        message = f"{mode}: found no orientation of the log, allowed: {ORIENTED}"
+        raise LogError(run_finding(run, message, parameter="align"))
     return matched if len(known) == len(quat) else matched.at(known), quat[known]

@@ -1,16 +1,35 @@
-"""Compare: the deviation of some logs from a reference, and the verdict on it."""
+"""Compare: the deviation of some logs from a reference, and the verdict on it.
+
+`compare_runs` compares logs with a reference, `compare_with_recorded_tcp` a log's kinematics with its own
+record. Each log goes through these chapters:
+
+1. `trajectories`: the sides, by kinematics, as recorded, or by joints alone.
+2. `sync`, `trajectories.match`, `align`: the same times, then the same frame.
+3. `measure`: deviations, statistics, shares and the verdict.
+4. `diagnosis`, if requested: why it deviates.
+5. `warnings`: assumptions of the verdict, and warnings about it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
 
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, check_choice, map_collecting_errors
+from urmpipe_models.errors import (
+    Finding,
+    Hint,
+    LogError,
+    OptionError,
+    UrmpipeError,
+    check_choice,
+    map_collecting_errors,
+)
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import align
-from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.iso import evaluate_test
 from urmpipe_pipeline.comparison.measure import joints_not_compared, measure
@@ -21,7 +40,7 @@ from urmpipe_pipeline.comparison.sync import (
     sync_warnings,
     synchronise,
 )
-from urmpipe_pipeline.comparison.verdict import check_tolerance, complete_tolerance, deviations_of
+from urmpipe_pipeline.comparison.verdict import check_tolerance, complete_tolerance, deviation_tolerances
 from urmpipe_pipeline.comparison.warnings import (
     clocks_differ,
     is_late,
@@ -48,7 +67,6 @@ from urmpipe_pipeline.trajectories import (
     NO_ROBOT_FITS,
     AlignMode,
     Side,
-    Sync,
     Trajectory,
     fk_trajectory,
     joint_trajectory,
@@ -63,37 +81,34 @@ from urmpipe_pipeline.trajectories import (
 
 Tcp = Literal["fk", "recorded"]
 
-RECORDED_APART = 1e-3
-"""Distance in [m] between kinematics and recorded tool centre point that is told where neither is judged: a
-third of the default tolerance."""
-
+MAX_RECORDED_DISTANCE = 1e-3  # m from the recorded TCP, if not judged: a third of the default tolerance
 
 NO_ALIGNMENT_ISO = "none with iso: an alignment would hide AP and AT"
-
 CYCLES_CLOCKS = "auto, start or an offset with iso: each cycle is put beside one reference"
-
 NO_ALIGNMENT = "none with a diagnosis: base and tool are possible causes"
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True)
 class CompareOptions:
-    """How logs are held against a reference.
+    """How logs are compared with a reference.
 
     Attributes:
         tolerance: Largest deviation allowed in [m] or [rad], by kind: axis, norm, path, angle, joint, or one
-            coordinate. What is not named has no tolerance. Least shares 0..1: coverage (0.9 unless given)
-            and judged (0.5).
-        tcp: Where a log was: by forward kinematics of its joints, or as it recorded itself.
-        sync: How the clocks are put together: stamps (Unix times or dates on both sides), start (both start
+            coordinate. Other kinds have no tolerance. Least shares 0..1: coverage (0.9 by default) and judged
+            (0.5).
+        tcp: Which tool centre point: by forward kinematics of the joints, or as recorded.
+        sync: How the clocks are aligned: stamps (Unix times or dates on both sides), start (both start
             together), auto (by the motion), or the offset in [s]: t_reference = t_log + offset, both from
             their first samples. None: stamps where both sides have them and overlap, else start.
         align: How a log is moved in space before it is compared: none, start, rigid, tool or base+tool.
         from_text: Whether the tolerance was read from a text, in which a large value has its unit.
-        diagnose: Whether it is asked why each log deviates. Base and tool are causes then: no alignment may
-            be asked for, and only a log that was measured in a frame of its own, whose base and tool are
-            always unknown, is moved first.
+        diagnose: Whether the causes of each deviation are searched for. Base and tool are causes then: no
+            alignment may be given, and only a log that was measured in a separate frame, whose base and tool
+            are always unknown, is moved first.
         iso: How the logs are evaluated as the cycles of a test after ISO 9283, whose criteria the tolerance
-            is for; None: each log is judged for itself.
+            is for; None: each log is judged alone.
         defaults: Options that a file set, for the line of the verdict: "sync=auto from ../urmpipe.toml".
     """
 
@@ -108,7 +123,15 @@ class CompareOptions:
 
     def __post_init__(self) -> None:
         if self.iso is not None:
-            self._refuse_with_iso()
+            errors = []
+            if self.align != "none":
+                errors.append(Finding(parameter="align", found=self.align, allowed=NO_ALIGNMENT_ISO))
+            if self.sync == "stamps":
+                errors.append(Finding(parameter="sync", found=self.sync, allowed=CYCLES_CLOCKS))
+            if self.diagnose:
+                errors.append(Finding(parameter="diagnose", found="with iso", allowed="one of the two"))
+            if errors:
+                raise OptionError(*errors)
         check_tolerance(self.tolerance, iso=self.iso is not None)
         check_choice("tcp", self.tcp, get_args(Tcp))
         check_sync(self.sync)
@@ -116,176 +139,150 @@ class CompareOptions:
         if self.iso is None:  # of a test the criteria are judged, and of each cycle the shares
             object.__setattr__(self, "tolerance", complete_tolerance(self.tolerance))
 
-    def _refuse_with_iso(self) -> None:
-        """Raise an `OptionError` with what does not go with criteria after ISO 9283."""
-        faults = []
-        if self.align != "none":
-            faults.append(Finding(parameter="align", found=self.align, allowed=NO_ALIGNMENT_ISO))
-        if self.sync == "stamps":
-            faults.append(Finding(parameter="sync", found=self.sync, allowed=CYCLES_CLOCKS))
-        if self.diagnose:
-            faults.append(Finding(parameter="diagnose", found="with iso", allowed="one of the two"))
-        if faults:
-            raise OptionError(*faults)
 
+def tcp_trajectory(run: Run, tcp: Tcp = "fk", *, joints_alone: bool = False) -> Trajectory:
+    """Return the trajectory of a run's tool centre point, on its log's own rows.
 
-def trajectory(run: Run, tcp: Tcp = "fk", *, alone: bool = False) -> Trajectory:
-    """Return where a run's tool centre point was, on its log's own rows.
-
-    A log without joints (a path) is where it recorded itself; one with joints goes by `tcp`, or nowhere where
+    A log without joints (a path) has the recorded one; one with joints that of `tcp`, or no positions where
     the joints alone are compared.
 
     Raises:
-        LogError: If the run has neither kinematics nor a recorded position to go by.
+        LogError: If the run has neither kinematics nor a recorded position.
     """
-    if _goes_by_record(run, tcp):
+    if _is_recorded(run, tcp):
         return recorded_trajectory(run)
-    return joint_trajectory(run) if alone else fk_trajectory(run)
+    return joint_trajectory(run) if joints_alone else fk_trajectory(run)
 
 
-def _goes_by_record(run: Run, tcp: Tcp) -> bool:
-    """Tell whether a run is where it recorded itself."""
+def _is_recorded(run: Run, tcp: Tcp) -> bool:
     return not run.log.joints or tcp == "recorded"
 
 
 def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | None = None) -> Comparison:
-    """Hold runs against a reference run: delta on the rows of each log, statistics, verdict.
+    """Compare runs with a reference run: deviation at the rows of each log, statistics, verdict.
 
     The reference is interpolated linearly between its rows; rows of a log outside its time, inside a gap of
-    it, or without a value of their own are left out and counted.
+    it, or without a value are left out and counted.
 
     Args:
-        reference: A path, or a run of its own.
+        reference: A path, or a run.
         runs: The logs to judge, at least one.
-        options: Tolerance, which tool centre point, how time and space are put together.
+        options: Tolerance, tool centre point, alignment of time and space.
 
     Raises:
-        LogError: If a run has no position to go by, shares no time with the reference, or lacks what a
-            tolerance is for; if still poses are held against a motion, or against more or fewer of them; if
-            a side was measured in a frame of its own, and nothing joins it to the other's.
-        OptionError: If the clocks of still poses are to be put together, or a log that is to be diagnosed is
-            to be moved in space.
+        LogError: If a run has no positions to compare, shares no time with the reference, or lacks the
+            quantity of a tolerance; if static poses are compared with a motion, or with more or fewer of
+            them; if a side was measured in a separate frame, and nothing joins it to the other's.
+        OptionError: If the clocks of static poses are to be aligned, or a log that is to be diagnosed is to
+            be moved in space.
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    chosen = options or CompareOptions()
+    options = options or CompareOptions()
     if not runs:
         raise OptionError("compare: no log to compare with the reference; at least one is needed")
-    if chosen.iso is None or len(runs) > 1:
-        _refuse_poses_as_motion(reference, runs, chosen)
-    chosen = _joined([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
-    alone = _joints_alone(reference, runs, chosen)
-    reference, *runs = _named_apart((reference, *runs))
-    sides = [_side(run, chosen.tcp, alone=alone) for run in runs]
-    asked = _side(reference, chosen.tcp, alone=alone)
-    wanted = asked.trajectory
-    same = [warning for done in sides for warning in same_data(asked, done)]
-    if chosen.iso is not None:
-        return _test(asked, sides, chosen, same)
-    deviations = map_collecting_errors(lambda done: _deviation(asked, done, chosen), sides)
-    told = [
-        *(one.of(reference.name) for one in reference.warnings),
-        *swapped_operands(reference, runs),
-        *same,
-    ]
-    for done, one in zip(sides, deviations, strict=True):
-        told += clocks_differ(wanted, done.trajectory, one) if is_late(one) else ()
-    if chosen.tcp == "fk":
-        told += _differing_robots([reference, *runs])
-    if chosen.tcp == "fk" and wanted.joints:
-        told += recorded_tcp_mismatch((reference, *runs), RECORDED_APART)
-    elif chosen.tcp == "fk":
-        failed = [one for one in deviations if one.worst_statistics.verdict == "fail"]
-        told += [
-            hint.of(one.name) for one in failed for hint in missing_tool_warning(one.run.robot, one.run.log)
-        ]
-    return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
-
-
-def _test(
-    asked: Side, done: Sequence[Side], options: CompareOptions, same: Sequence[LogWarning]
-) -> Comparison:
-    """Return the comparison of the cycles of a test after ISO 9283."""
-    assert options.iso is not None
-    sync = "start" if options.sync is None else options.sync
-    found = evaluate_test(asked, done, options.iso, sync, options.tolerance)
-    reference, runs = asked.run, [one.run for one in done]
-    told = [*(one.of(reference.name) for one in reference.warnings), *found.warnings, *same]
-    if len(runs) == 1:  # its cycles are parts of it
-        told = [*(one.of(runs[0].name) for one in runs[0].warnings), *told]
-    assumed = _taken_for_granted(reference, runs, options)
-    made = _comparison(found.command, found.deviations, options, told, assumed)
-    log = f"{runs[0].name}-" if len(runs) == 1 else ""
-    return replace(made, name=f"{log}against-{reference.name}", iso=found.test)
-
-
-def _side(run: Run, tcp: Tcp, *, alone: bool) -> Side:
-    """Return one side of a comparison."""
-    return Side(run, trajectory(run, tcp, alone=alone), not _goes_by_record(run, tcp))
-
-
-def _named_apart(runs: Sequence[Run]) -> list[Run]:
-    """Return runs of which no two have one name, so that what is said of one is not said of another."""
-    names = text.unique([run.name for run in runs])
-    return [
+    if options.iso is None or len(runs) > 1:
+        _check_static_poses(reference, runs, options)
+    options = _join_frames([(run, _is_recorded(run, options.tcp)) for run in (reference, *runs)], options)
+    alone = _compares_joints_alone((reference, *runs), options)
+    runs = [reference, *runs]
+    names = text.unique([run.name for run in runs])  # warnings name their log
+    runs = [
         run if run.name == name else replace(run, name=name) for name, run in zip(names, runs, strict=True)
     ]
+    reference_side, *sides = (
+        Side(run, tcp_trajectory(run, options.tcp, joints_alone=alone), not _is_recorded(run, options.tcp))
+        for run in runs
+    )
+    reference, *runs = runs
+    warnings = [warning.of(reference.name) for warning in reference.warnings]
+    same = [warning for side in sides for warning in same_data(reference_side, side)]
+    if options.iso is not None:
+        sync = "start" if options.sync is None else options.sync
+        cycles = evaluate_test(reference_side, sides, options.iso, sync, options.tolerance)
+        own = [warning.of(runs[0].name) for warning in runs[0].warnings] if len(runs) == 1 else []
+        warnings = [*own, *warnings, *cycles.warnings, *same]  # the cycles are parts of a single log
+        assumed = _assumptions(reference, runs, options)
+        result = _build_comparison(cycles.command, cycles.deviations, options, warnings, assumed)
+        log = f"{runs[0].name}-" if len(runs) == 1 else ""
+        return replace(result, name=f"{log}against-{reference.name}", iso=cycles.test)
+    deviations = map_collecting_errors(lambda side: _deviation(reference_side, side, options), sides)
+    warnings += [*swapped_operands(reference, runs), *same]
+    for side, deviation in zip(sides, deviations, strict=True):
+        if is_late(deviation):
+            warnings += clocks_differ(reference_side.trajectory, side.trajectory, deviation)
+    if options.tcp == "fk":
+        robots = [(run.name, run.robot.name) for run in (reference, *runs) if run.log.joints and run.robot]
+        if len({robot for _, robot in robots}) > 1:
+            names_and_robots = ", ".join(f"{name} as {robot}" for name, robot in robots)
+            message = f"the kinematics are those of different robots: {names_and_robots}"
+            warnings.append(LogWarning("robots-differ", message))
+        if reference_side.trajectory.joints:
+            warnings += recorded_tcp_mismatch((reference, *runs), MAX_RECORDED_DISTANCE)
+        else:
+            for run, deviation in zip(runs, deviations, strict=True):
+                if deviation.worst_statistics.verdict == "fail":
+                    warnings += [hint.of(run.name) for hint in missing_tool_warning(run.robot, run.log)]
+    assumed = _assumptions(reference, runs, options)
+    return _build_comparison(reference_side.trajectory, deviations, options, warnings, assumed)
 
 
-def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) -> bool:
-    """Tell whether joints are held against joints without a place in space: nothing else is judged.
+def _compares_joints_alone(runs: Sequence[Run], options: CompareOptions) -> bool:
+    """Return whether joints are compared with joints without positions: nothing else is judged.
 
     Raises:
-        LogError: If a place is judged, and a run with joints has no kinematics.
+        LogError: If a position is judged, and a run with joints has no kinematics.
     """
-    every = (reference, *runs)
-    lacks = [run for run in every if run.log.joints and run.tcp is None and not traces_point(run)]
-    if not lacks or options.tcp == "recorded" or not all(run.log.joints for run in every):
+    without = [run for run in runs if run.log.joints and run.tcp is None and not traces_point(run)]
+    if not without or options.tcp == "recorded" or not all(run.log.joints for run in runs):
         return False
-    if options.align == "none" and set(deviations_of(options.tolerance)) == {"joint"}:
+    if options.align == "none" and set(deviation_tolerances(options.tolerance)) == {"joint"}:
         return True
     hints = (JOINTS_ALONE,) if options.align == "none" else ()
-    raise LogError(*dict.fromkeys(kinematics_missing(run, *hints) for run in lacks))
+    raise LogError(*dict.fromkeys(kinematics_missing(run, *hints) for run in without))
 
 
-def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:
-    """Return what a verdict on runs assumes of them and the reference; raise what has to be told first."""
-    sides = [(run, _compared_roles(run, options)) for run in (reference, *runs)]
-    without = all(any(w.role == "time" and w.assumption for w in run.warnings) for run, _ in sides)
-    alike = len({run.log.rows for run, _ in sides}) == 1 and not isinstance(options.sync, (int, float))
-    if not (without and alike):  # else the rows are compared one by one, whatever their period
+def _assumptions(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:
+    """Return what a verdict assumes of runs and the reference.
+
+    Raises:
+        LogError: With each reading that needs an answer first.
+    """
+    sides = []
+    for run in (reference, *runs):
+        by_joints = bool(run.log.joints) and options.tcp == "fk"
+        roles: set[Role] = {"joint"} if by_joints or "joint" in options.tolerance else set()
+        sides.append(
+            (run, roles if by_joints else roles | _recorded_roles(options, "start", "tool", "base+tool"))
+        )
+    untimed = all(any(w.role == "time" and w.assumption for w in run.warnings) for run, _ in sides)
+    same_rows = len({run.log.rows for run, _ in sides}) == 1 and not isinstance(options.sync, (int, float))
+    if not (untimed and same_rows):  # else the rows are compared one by one, whatever their period
         sides = [(run, {*roles, "time"} if run.timed else roles) for run, roles in sides]
     return verdict_assumptions(sides)
 
 
-def _compared_roles(run: Run, options: CompareOptions) -> set[Role]:
-    """Return the roles of what is compared of a run: joints, or recorded positions and orientations."""
-    by_joints = bool(run.log.joints) and options.tcp == "fk"
-    roles: set[Role] = {"joint"} if by_joints or "joint" in options.tolerance else set()
-    return roles if by_joints else roles | _recorded_roles(options, "start", "tool", "base+tool")
+def _recorded_roles(options: CompareOptions, *oriented: AlignMode) -> set[Role]:
+    """Return the roles of recorded poses that a verdict needs; `oriented` alignments use orientations."""
+    use_orientations = "angle" in options.tolerance or options.align in oriented
+    return {"position", "rotation"} if use_orientations else {"position"}
 
 
-def _recorded_roles(options: CompareOptions, *turning: AlignMode) -> set[Role]:
-    """Return what a verdict on recorded poses rests on, if some alignments go by their orientations."""
-    turned = "angle" in options.tolerance or options.align in turning
-    return {"position", "rotation"} if turned else {"position"}
+def _check_static_poses(reference: Run, runs: Sequence[Run], options: CompareOptions) -> None:
+    """Raise if static poses are compared with a motion, or with more or fewer poses.
 
-
-def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], options: CompareOptions) -> None:
-    """Raise if still poses are held against a motion, or against more or fewer poses.
-
-    Still poses are held against still poses row by row; any other offset would interpolate between them.
+    They are compared row by row; any other offset would interpolate between them.
     """
-    single = [run for run in (reference, *runs) if not run.timed]
-    if not single:
+    static = [run for run in (reference, *runs) if not run.timed]
+    if not static:
         return
-    if len(single) <= len(runs):
-        raise LogError(*map(_no_motion, single))
-    wanted = reference.log.rows
-    if others := [run for run in runs if run.log.rows != wanted]:
-        allowed = f"{wanted}, as {reference.name} has: still poses are compared row by row"
+    if len(static) <= len(runs):
+        raise LogError(*map(_no_motion, static))
+    rows = reference.log.rows
+    if unequal := [run for run in runs if run.log.rows != rows]:
+        allowed = f"{rows}, as {reference.name} has: still poses are compared row by row"
         raise LogError(
-            *(run_finding(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in others)
+            *(run_finding(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in unequal)
         )
     if options.sync not in (None, "start") and not (options.iso and options.sync == "auto"):
         found = f"{options.sync} of still poses"
@@ -293,20 +290,19 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], options: Compar
 
 
 def _no_motion(run: Run) -> Finding:
-    """Return that still poses are held against a motion."""
     if run.log.source == SOLVED:
-        said = (
+        message = (
             "found targets without times, which are not a motion, allowed: a log or a path of its own times"
         )
-        return run_finding(run, said, Hint("tsp", None, "sets their sample period", call="ik"))
-    said = "found still poses beside a motion, allowed: still poses on both sides, or motions"
-    return run_finding(run, said, Hint("poses", True, "takes the rows of every log as still poses"))
+        return run_finding(run, message, Hint("tsp", None, "sets their sample period", call="ik"))
+    message = "found still poses beside a motion, allowed: still poses on both sides, or motions"
+    return run_finding(run, message, Hint("poses", True, "takes the rows of every log as still poses"))
 
 
-def _joined(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> CompareOptions:
-    """Return options that join sides of which some stand in a frame of their own, others in the base's.
+def _join_frames(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> CompareOptions:
+    """Return options that join sides of which some are in a separate frame, others in the base's.
 
-    Each side is a run, and whether it is where it recorded itself.
+    Each side is a run, and whether its recorded tool centre point is compared.
 
     Raises:
         LogError: If nothing joins them: a diagnosis moves base and tool, else an alignment has to be given.
@@ -314,94 +310,93 @@ def _joined(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> Compa
     """
     if options.diagnose and options.align != "none":
         raise OptionError(Finding(parameter="align", found=options.align, allowed=NO_ALIGNMENT))
-    apart = [run for run, recorded in sides if recorded and run.log.measured]
-    if not apart or len(apart) == len(sides) or options.align not in ("none", "tool"):
+    measured = [run for run, recorded in sides if recorded and run.log.measured]
+    if not measured or len(measured) == len(sides) or options.align not in ("none", "tool"):
         return options
     if options.diagnose:
         return replace(options, align="base+tool")
-    hint, findings = Hint("align", "base+tool", "finds the frames of base and tool"), []
-    for run in apart:
+    hint, errors = Hint("align", "base+tool", "finds the frames of base and tool"), []
+    for run in measured:
         names = ", ".join(column.name for column in run.log.columns if column.role == "position")
         found = f"a tool that was measured in a frame of its own ({names})"
-        finding = run_finding(run, "", hint, parameter="align")
-        findings.append(replace(finding, found=found, allowed="base+tool, rigid, start"))
-    raise LogError(*findings)
+        error = run_finding(run, "", hint, parameter="align")
+        errors.append(replace(error, found=found, allowed="base+tool, rigid, start"))
+    raise LogError(*errors)
 
 
-def _differing_robots(runs: Sequence[Run]) -> list[LogWarning]:
-    """Return a warning if the runs were held against each other by the kinematics of different arms."""
-    arms = [(run.name, run.robot.name) for run in runs if run.log.joints and run.robot]
-    if len({arm for _, arm in arms}) < 2:
-        return []
-    said = ", ".join(f"{name} as {arm}" for name, arm in arms)
-    return [LogWarning("robots-differ", f"the kinematics are those of different robots: {said}")]
+def compare_with_recorded_tcp(run: Run, options: CompareOptions | None = None) -> Comparison:
+    """Compare the forward kinematics of a log with its recorded tool centre point.
 
-
-def compare_recorded(run: Run, options: CompareOptions | None = None) -> Comparison:
-    """Hold the forward kinematics of a log against the tool centre point that the same log recorded.
-
-    Both stand in the same rows of one file. Their joints are the same and are not compared. Where samples
-    left on a wrap were repaired, the repaired ones count.
+    Both are in the same rows of one file. Their joints are the same and are not compared. Where samples on a
+    wrap were repaired, the repaired ones are used.
 
     Raises:
-        OptionError: If another time than its own is asked for, or as of `compare_runs`.
+        OptionError: If another alignment of the clocks is requested, or as of `compare_runs`.
         LogError: If the log has no joints, no robot, or recorded no position.
     """
-    chosen = options or CompareOptions()
-    if chosen.sync not in (None, "start"):
+    options = options or CompareOptions()
+    if options.sync not in (None, "start"):
         allowed = "start, since its joints and its recorded tool centre point share the same rows"
-        raise OptionError(Finding(parameter="sync", found=f"{chosen.sync} for one log", allowed=allowed))
-    chosen = replace(chosen, sync="start")
+        raise OptionError(Finding(parameter="sync", found=f"{options.sync} for one log", allowed=allowed))
     log = run.log
     if not log.joints:
-        raise LogError(
-            run_finding(run, "a path alone, which has no joints; allowed: a log to compare with it")
-        )
+        message = "a path alone, which has no joints; allowed: a log to compare with it"
+        raise LogError(run_finding(run, message))
     if run.robot is None:
         raise LogError(run_finding(run, *(NO_ROBOT if log.tcp_position is None else NO_ROBOT_FITS)))
     if log.tcp_position is None:
-        said = "one log, which recorded no tool centre point; allowed: a reference before the log"
-        doubts = [one.as_finding() for one in log.warnings if one.kind == TCP_NOT_READ]
-        raise LogError(run_finding(run, said), *(replace(one, file=run_label(run)) for one in doubts))
-    chosen = _joined([(run, True), (run, False)], chosen)
-    recorded = replace(
-        recorded_trajectory(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None
+        message = "one log, which recorded no tool centre point; allowed: a reference before the log"
+        unread = [warning.as_finding() for warning in log.warnings if warning.kind == TCP_NOT_READ]
+        raise LogError(
+            run_finding(run, message), *(replace(finding, file=run_label(run)) for finding in unread)
+        )
+    options = _join_frames([(run, True), (run, False)], replace(options, sync="start"))
+    recorded, computed = (
+        replace(side, joints=(), joint_units=(), q=None)
+        for side in (recorded_trajectory(run), fk_trajectory(run))
     )
-    computed = replace(fk_trajectory(run), joints=(), joint_units=(), q=None)
-    # Others go by the orientations of the joints.
-    assumed = verdict_assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])
+    recorded = replace(recorded, name=f"{run.name} (recorded)")
+    # Alignments other than start use the orientations of the joints.
+    assumed = verdict_assumptions([(run, {"joint", *_recorded_roles(options, "start")})])
     sides = Side(run, recorded, by_joints=False), Side(run, computed, by_joints=True)
-    found = _comparison(recorded, [_deviation(*sides, chosen)], chosen, (), assumed)
-    failed = any(one.worst_statistics.verdict == "fail" for one in found.runs)
-    asked, turned = failed and "tool" not in chosen.align, "angle" in chosen.tolerance
-    lacks = missing_tool_warning(run.robot, log, turned=turned) if asked else []
-    return replace(found, warnings=(*found.warnings, *lacks))
+    result = _build_comparison(recorded, [_deviation(*sides, options)], options, (), assumed)
+    if "tool" in options.align or result.runs[0].worst_statistics.verdict != "fail":
+        return result
+    warnings = missing_tool_warning(run.robot, log, turned="angle" in options.tolerance)
+    return replace(result, warnings=(*result.warnings, *warnings))
 
 
-def _comparison(
+def _build_comparison(
     reference: Trajectory,
     deviations: Sequence[Deviation],
     options: CompareOptions,
-    told: Sequence[LogWarning],
+    warnings: Sequence[LogWarning],
     assumed: tuple[str, ...],
 ) -> Comparison:
-    deviations_allowed = () if options.from_text else large_tolerances(deviations_of(options.tolerance))
-    warnings = [*deviations_allowed, *told]
-    for one in deviations if options.iso is None else ():
-        warnings += sync_warnings(one.name, one.sync, one.run.tsp)
-        warnings += left_out_warnings(one, reference)
-        warnings += [*weak_evidence(one), *undetermined_frames(one)]
-        if reference.joints and one.run.log.joints and one.joint_delta is None:
-            said = f"no joint is compared: {joints_not_compared(reference, one.run)}"
-            warnings.append(LogWarning("joints-not-compared", said, about=one.name))
-    warnings += _shapes_gone([one.run for one in deviations])
-    inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
-    made = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
-    if options.sync is None and not any(one.sync.mode == "stamps" for one in deviations):
-        made["sync"] = "start"
-    made |= {"diagnose": True} if options.diagnose else {}
+    warnings = [*warnings]
+    if not options.from_text:
+        warnings[:0] = large_tolerances(deviation_tolerances(options.tolerance))
+    for deviation in deviations if options.iso is None else ():
+        run = deviation.run
+        warnings += sync_warnings(deviation.name, deviation.sync, run.tsp)
+        warnings += left_out_warnings(deviation, reference)
+        warnings += [*weak_evidence(deviation), *undetermined_frames(deviation)]
+        if reference.joints and run.log.joints and deviation.joint_delta is None:
+            message = f"no joint is compared: {joints_not_compared(reference, run)}"
+            warnings.append(LogWarning("joints-not-compared", message, about=deviation.name))
+    runs = [deviation.run for deviation in deviations]
+    # A recording has the names of mesh files only.
+    lost_meshes = dict.fromkeys(w for run in runs if run.robot for w in mesh_warnings(run.robot))
+    warnings += [w for w in lost_meshes if not any(w in run.warnings for run in runs)]
+    inputs = [*reference.files, *(file for run in runs for file in run.log.files)]
+    settings = {name: getattr(options, name) for name in ("tolerance", "tcp", "sync", "align")}
+    settings["tolerance"] = dict(options.tolerance)
+    if options.sync is None and not any(deviation.sync.mode == "stamps" for deviation in deviations):
+        settings["sync"] = "start"
+    settings |= {"diagnose": True} if options.diagnose else {}
     if options.iso is not None:
-        made |= {"iso": True, **{name: getattr(options.iso, name) for name in ("cycles", "planes", "band")}}
+        test = {name: getattr(options.iso, name) for name in ("cycles", "planes", "band")}
+        settings |= {"iso": True, **test}
     name = f"{deviations[0].name}-" if len(deviations) == 1 else ""
     return Comparison(
         f"{name}against-{reference.name}",
@@ -409,45 +404,56 @@ def _comparison(
         tuple(deviations),
         dict(options.tolerance),
         tuple(warnings),
-        build_provenance("compare", {"tolerance": dict(options.tolerance), **made}, inputs, options.defaults),
+        build_provenance("compare", settings, inputs, options.defaults),
         assumptions=assumed,
         on_rows=True,
     )
 
 
-def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
-    """Return what cannot be drawn of the arms any more: a recording keeps the names of mesh files only."""
-    gone = dict.fromkeys(warning for run in runs if run.robot for warning in mesh_warnings(run.robot))
-    return [warning for warning in gone if not any(warning in run.warnings for run in runs)]
-
-
-def _deviation(asked: Side, done: Side, options: CompareOptions) -> Deviation:
-    """Return the deviation of one trajectory, at its own samples; why it deviates, if asked for."""
-    run, reference, actual = done.run, reference_rows(asked, done), done.trajectory
-    stamped = stamp_offset(asked.run, run)
-    sync = synchronise(reference, actual, options.sync, options.align, stamped)
-    matched = match(reference, actual, sync)
+def _deviation(reference: Side, log: Side, options: CompareOptions) -> Deviation:
+    """Return the deviation of one log, at its own samples, and its causes if requested."""
+    run, target, actual = log.run, reference_rows(reference, log), log.trajectory
+    sync = synchronise(target, actual, options.sync, options.align, stamp_offset(reference.run, run))
+    matched = match(target, actual, sync)
     if not len(matched.sample):
-        said = f"no sample in common with {reference.name} (time offset {sync.offset} s)"
-        raise LogError(run_finding(run, said))
-    found = measure(run, reference, actual, align(matched, options.align, run), options.tolerance)
+        message = f"no sample in common with {target.name} (time offset {sync.offset} s)"
+        raise LogError(run_finding(run, message))
+    deviation = measure(run, target, actual, align(matched, options.align, run), options.tolerance)
     if not options.diagnose:
-        return found
-    lag = _moves_alike(asked, done, sync)
+        return deviation
+    lag = None
+    if run.timed and reference.run is not run:
+        with suppress(LogError):  # the motions do not determine it
+            lag = synchronise(reference.trajectory, actual, "auto").offset - sync.offset
     compared = Compared(
-        found.name,
-        found.verdict,
-        tuple(Limit(one.quantity, one.kind, one.tolerance) for one in found.all_statistics),
-        {name: share.value for name, share in found.shares.items()},
+        deviation.name,
+        deviation.verdict,
+        tuple(Limit(of.quantity, of.kind, of.tolerance) for of in deviation.all_statistics),
+        {name: share.value for name, share in deviation.shares.items()},
     )
-    return replace(found, diagnosis=diagnose(compared, matched, asked, done, lag))
+    return replace(deviation, diagnosis=diagnose(compared, matched, reference, log, lag))
 
 
-def _moves_alike(asked: Side, done: Side, sync: Sync) -> float | None:
-    """Return the offset in [s], besides how clocks were put together, at which two logs move alike."""
-    if not done.run.timed or asked.run is done.run:
-        return None
+def skip_failed_logs(
+    compare: Callable[[Sequence[Run]], Made], runs: Sequence[Run], failed: list[FailedLog]
+) -> Made:
+    """Return what a function makes of those runs that it accepts, and add the others to a list.
+
+    Raises:
+        UrmpipeError: With all errors, if it accepts none, or not all together that it accepts alone.
+    """
     try:
-        return synchronise(asked.trajectory, done.trajectory, "auto").offset - sync.offset
-    except LogError:  # the motions do not tell it
-        return None
+        return compare(runs)
+    except UrmpipeError:
+        accepted, errors = [], []
+        for run in runs:
+            try:
+                compare([run])
+            except UrmpipeError as error:
+                errors.append(FailedLog(run.name, error.findings))
+            else:
+                accepted.append(run)
+        if not accepted or not errors:
+            raise
+    failed += errors
+    return compare(accepted)

@@ -1,14 +1,14 @@
-"""What `compare` returns: the deviations of some logs and the verdict on all, as tables and JSON."""
+"""Results of `compare`: the deviations of some logs, the verdict on all, and the changes since a baseline."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from urmpipe_models.display import format_count, format_headline
-from urmpipe_models.errors import Finding, UrmpipeError
+from urmpipe_models.errors import Finding
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, Verdict
 from urmpipe_pipeline.iso9283.criteria import Criterion
 from urmpipe_pipeline.iso9283.result import IsoTest
@@ -16,18 +16,18 @@ from urmpipe_pipeline.iso9283.tables import not_judged_findings
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.run import SCHEMA, Run
+from urmpipe_pipeline.runs.run import SCHEMA
 from urmpipe_pipeline.trajectories import Trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
 
-ROW = ("run", "sync_offset", *(one.name for one in fields(Statistics)), "value")
-"""The columns of `Comparison.rows`: of a share its `value`, of a deviation its statistics."""
+# The columns of `Comparison.rows`: of a share its `value`, of a deviation its statistics.
+ROW = ("run", "sync_offset", *(column.name for column in fields(Statistics)), "value")
 
 
-def by_tolerance(run: Deviation) -> tuple[bool, float, float]:
-    """Return how far out of its tolerance a log is, the furthest last: share used up, then the rms norm."""
+def tolerance_sort_key(run: Deviation) -> tuple[bool, float, float]:
+    """Return verdict, utilisation of the tolerance and rms norm of a log: the best sorts first."""
     return (
         run.verdict == "fail",
         run.decisive.utilisation or 0.0,
@@ -36,27 +36,31 @@ def by_tolerance(run: Deviation) -> tuple[bool, float, float]:
 
 
 def _decided(run: Deviation) -> str:
-    one = run.decisive
-    return f"{one.quantity} {one.value:.1%}" if isinstance(one, Share) else f"{one.max:.4g} {one.unit}"
+    quantity = run.decisive
+    return (
+        f"{quantity.quantity} {quantity.value:.1%}"
+        if isinstance(quantity, Share)
+        else f"{quantity.max:.4g} {quantity.unit}"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Comparison(Result):
-    """Some logs held against one reference.
+    """Some logs compared with one reference.
 
     Attributes:
         name: Its name.
-        reference: Where the arm was asked to be.
-        runs: One deviation a log.
+        reference: The commanded trajectory.
+        runs: One deviation per log.
         tolerance: Largest absolute deviation allowed in [m] or [rad], by kind, or by x, y, z.
-        warnings: What a person should know about the comparison itself.
+        warnings: Warnings about the comparison.
         provenance: How to repeat it.
-        recording: Where it was written.
-        baseline: What changed since an earlier comparison, if it was held against one.
-        assumptions: What the verdict takes for granted, each as the end of "assuming ...".
-        on_rows: Whether the logs were judged on their own rows; before that was so, on the grid.
+        recording: The file it was written to.
+        baseline: What changed since an earlier comparison, if there is one.
+        assumptions: Assumptions of the verdict, each as the end of "assuming ...".
+        on_rows: Whether the logs were judged on their rows; in old recordings on the grid.
         iso: The test after ISO 9283 whose cycles the runs are; its criteria are judged, the runs are not.
-        failed_logs: The logs without a verdict, where the others were judged all the same.
+        failed_logs: The failed logs, without a verdict.
     """
 
     name: str
@@ -99,72 +103,78 @@ class Comparison(Result):
         return (*(error for log in self.failed_logs for error in log.errors), *criteria)
 
     def warnings_of(self, run: Deviation) -> tuple[LogWarning, ...]:
-        """Return the warnings of a log: those from before, and what the comparison says of it."""
-        return (*run.run.warnings, *(one for one in self.warnings if one.about == run.name))
+        """Return the warnings of a log, and those of the comparison about it."""
+        return (*run.run.warnings, *(warning for warning in self.warnings if warning.about == run.name))
 
     @property
     def general_warnings(self) -> tuple[LogWarning, ...]:
-        """The warnings that are about no single log."""
-        return tuple(one for one in self.warnings if one.about not in [run.name for run in self.runs])
+        """The warnings that are not about a single log."""
+        return tuple(
+            warning for warning in self.warnings if warning.about not in [run.name for run in self.runs]
+        )
 
     @property
     def ranking(self) -> tuple[Deviation, ...]:
         """The logs from best to worst.
 
-        Those that pass come first, and among them (as among the others) those that were seen as a whole; then
-        the share of a tolerance that is used up decides, then the rms norm.
+        Those that pass come first, and among them (as among the others) those with full shares; then the
+        utilisation of the tolerance decides, then the rms norm.
         """
-        by_used = sorted(self.runs, key=by_tolerance)
+        by_used = sorted(self.runs, key=tolerance_sort_key)
         return tuple(sorted(by_used, key=lambda run: (run.verdict == "fail", bool(run.incomplete_shares))))
 
     @property
     def worst(self) -> Deviation:
-        """The log that is furthest out of its tolerance, or closest to it: by it the verdict is told.
+        """The log of the largest utilisation of its tolerance, which the verdict line names.
 
-        It need not be the last of the ranking, where logs that were seen in part stand behind.
+        It need not be the last of the ranking, where logs without full shares come last.
         """
-        return sorted(self.runs, key=by_tolerance)[-1]
+        return sorted(self.runs, key=tolerance_sort_key)[-1]
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield one row a log and quantity: the offset of the clocks, the statistics and the verdict.
+        """Yield one row per log and quantity: the offset of the clocks, the statistics and the verdict.
 
-        Of a test after ISO 9283 one row a criterion and place.
+        Of a test after ISO 9283 one row per criterion and place.
         """
         if self.iso is not None:
             yield from self.iso.rows()
             return
         for run in self.runs:
-            for one in run.quantities:
+            for quantity in run.quantities:
                 offset = run.sync.offset if run.run.timed else None
-                yield dict.fromkeys(ROW) | {"run": run.name, "sync_offset": offset} | one.fields()
+                yield dict.fromkeys(ROW) | {"run": run.name, "sync_offset": offset} | quantity.fields()
 
     def _headline(self) -> str:
-        """Return its verdict, and that of each log: the worst first, so that it is not what is cut."""
+        """Return its verdict, and that of each log: the worst first, because the end may be truncated."""
         if self.iso is not None:
             worst = (
-                f"{one.name} {one.value:.4g} {one.unit}" for one in self.iso.overall if one.value is not None
+                f"{criterion.name} {criterion.value:.4g} {criterion.unit}"
+                for criterion in self.iso.overall
+                if criterion.value is not None
             )
             return format_headline(
                 f"{self.name}: {self.verdict or 'not judged'}", self.iso.cycle_count, *worst
             )
-        logs = (f"{one.name} {one.verdict} ({_decided(one)})" for one in reversed(self.ranking))
-        failed = sum(one.verdict == "fail" for one in self.runs)
+        logs = (
+            f"{deviation.name} {deviation.verdict} ({_decided(deviation)})"
+            for deviation in reversed(self.ranking)
+        )
+        failed = sum(deviation.verdict == "fail" for deviation in self.runs)
         share = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
         worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""
         count = len(self.assumptions)
         assumed = f", on {format_count(count, 'assumption')}" if count else ""
-        lost = (f"{one.name} not judged" for one in self.failed_logs)
+        lost = (f"{log.name} not judged" for log in self.failed_logs)
         return format_headline(
             f"{self.name}: {self.verdict or 'incomplete'}{share}{worse}{assumed}", *lost, *logs
         )
 
     def _notes(self) -> list[str]:
-        """Return what is to be known of it, and of its logs."""
-        of_logs = [one.of(run.name) for run in self.runs for one in run.run.warnings]
-        return [str(one) for one in (*self.errors, *self.warnings, *of_logs)]
+        of_logs = [warning.of(run.name) for run in self.runs for warning in run.run.warnings]
+        return [str(warning) for warning in (*self.errors, *self.warnings, *of_logs)]
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a log and quantity, as `rows`."""
+        """Return one row per log and quantity, as `rows`."""
         import pandas as pd
 
         return pd.DataFrame(list(self.rows()))
@@ -179,11 +189,11 @@ class Comparison(Result):
             "reference": self.reference.name,
             "runs": [run.to_dict() for run in self.runs],
             "ranking": [run.name for run in self.ranking],
-            "warnings": [one.to_dict() for one in self.warnings],
+            "warnings": [warning.to_dict() for warning in self.warnings],
             "baseline": None if self.baseline is None else self.baseline.to_dict(),
             "iso": None if self.iso is None else self.iso.to_dict(),
             "failed_logs": [
-                {"name": log.name, "errors": [one.to_dict() for one in log.errors]}
+                {"name": log.name, "errors": [error.to_dict() for error in log.errors]}
                 for log in self.failed_logs
             ],
             "recording": str(self.recording) if self.recording else None,
@@ -192,28 +202,27 @@ class Comparison(Result):
 
 Worse: TypeAlias = Literal["max", "rms", "out_fraction", "samples"]
 
-KEPT = 0.9
-"""A log that keeps a smaller share of its samples lost some: one program, recorded by hand, varies less.
-
-Samples count by the time that they stand for: another rate of recording loses nothing."""
+# Share of the samples, counted by the time that each covers, below which a log lost some: one program that is
+# recorded by hand varies less.
+MIN_SAMPLES_KEPT = 0.9
 
 
 @dataclass(frozen=True, slots=True)
 class QuantityChange:
-    """How one quantity of one log stands to the baseline.
+    """Change of one quantity of one log since the baseline.
 
     Attributes:
         run: The log's name now.
         before: The statistics of the baseline.
         now: The statistics now.
-        noise: What means nothing, in the unit of the statistics.
+        noise: Change to ignore, in the unit of the statistics.
         out_fraction_noise: Fraction of the samples, 0..1, that the noise can have put out of tolerance,
             before and now: those that are out by no more than it, and one sample where the times differ;
-            None where the fractions do not compare (no tolerance, or another one than before).
-        periods: Periods of the samples before and now in [ns]: of another rate, they stand for another time.
+            None where the fractions are not comparable (no tolerance, or another one than before).
+        periods: Periods of the samples before and now in [ns], the time that each covers.
         samples_shared: Samples at times that both have, with a value on both sides.
         largest_change: Largest absolute change at one of them; None without any.
-        t_largest_change: When that was, in [s] of the log; None without times.
+        t_largest_change: Its time in [s] of the log; None without times.
     """
 
     run: str
@@ -228,12 +237,12 @@ class QuantityChange:
 
     @property
     def worse(self) -> tuple[Worse, ...]:
-        """What of it is larger than before by more than the noise; samples: it rests on far fewer."""
+        """Statistics that are larger than before by more than the noise; samples: far fewer than before."""
         return self._grown(before=0, now=1)
 
     @property
     def better(self) -> tuple[Worse, ...]:
-        """What of it is smaller than before by more than the noise; samples: it rests on far more."""
+        """Statistics that are smaller than before by more than the noise; samples: far more than before."""
         return self._grown(before=1, now=0)
 
     @property
@@ -243,21 +252,17 @@ class QuantityChange:
         return bool(self.worse or self.better or moved or self.before.verdict != self.now.verdict)
 
     def _grown(self, *, before: int, now: int) -> tuple[Worse, ...]:
-        """Return what is larger on one side (0 the baseline, 1 now) than on the other, or rests on less."""
-        one, other = ((self.before, self.now)[side] for side in (before, now))
-        noise, count, lasted = (
-            self.out_fraction_noise,
-            other.samples,
-            (one.samples or 0) * self.periods[before],
-        )
+        """Return the statistics that are larger on side `now` (0 the baseline, 1 now) than on `before`."""
+        old, new = ((self.before, self.now)[side] for side in (before, now))
+        noise, count, lasted = self.out_fraction_noise, new.samples, (old.samples or 0) * self.periods[before]
         grown: dict[Worse, bool] = {
-            "max": other.max > one.max + self.noise,
-            "rms": other.rms > one.rms + self.noise,
+            "max": new.max > old.max + self.noise,
+            "rms": new.rms > old.rms + self.noise,
             "out_fraction": noise is not None
-            and (other.out_fraction or 0.0) > (one.out_fraction or 0.0) + noise[now],
-            "samples": count is not None and count * self.periods[now] < KEPT * lasted,
+            and (new.out_fraction or 0.0) > (old.out_fraction or 0.0) + noise[now],
+            "samples": count is not None and count * self.periods[now] < MIN_SAMPLES_KEPT * lasted,
         }
-        return tuple(name for name, more in grown.items() if more)
+        return tuple(name for name, is_larger in grown.items() if is_larger)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
@@ -283,12 +288,12 @@ class QuantityChange:
 
 @dataclass(frozen=True, slots=True)
 class CriterionChange:
-    """How a criterion after ISO 9283, over all, stands to the baseline.
+    """Change of a criterion after ISO 9283, over all, since the baseline.
 
     Attributes:
-        before: That of the baseline.
-        now: That of now.
-        noise: What means nothing, in its unit.
+        before: The criterion of the baseline.
+        now: The criterion now.
+        noise: Change to ignore, in its unit.
     """
 
     before: Criterion
@@ -320,11 +325,11 @@ class CriterionChange:
 
 @dataclass(frozen=True, slots=True)
 class UnmatchedQuantity:
-    """What only one of the two comparisons has.
+    """A log or quantity that only one of the two comparisons has.
 
     Attributes:
-        run: The log's name; of a quantity, that which the log has now.
-        quantity: A quantity of it that both logs should have; None if the log itself is absent.
+        run: The log's name; of a quantity, its name now.
+        quantity: The quantity that one of the logs lacks; None if the log is absent.
     """
 
     run: str
@@ -336,7 +341,7 @@ class UnmatchedQuantity:
 
 @dataclass(frozen=True, slots=True)
 class SettingDifference:
-    """What differs in the way the two comparisons were made, as JSON has it."""
+    """A difference in how the two comparisons were made, as in the JSON."""
 
     what: str
     before: Any
@@ -345,18 +350,18 @@ class SettingDifference:
 
 @dataclass(frozen=True, slots=True)
 class BaselineComparison:
-    """A comparison held against an earlier one.
+    """The changes of a comparison since an earlier one.
 
     Attributes:
         name: The name of the earlier one.
-        recording: Where that stands.
-        noise: Changes in [m] and [rad] that mean nothing, by kind.
-        changes: One a log and quantity that both have.
-        new: What the earlier one did not have.
-        missing: What only the earlier one had.
-        differences: What differs in the way the two were made.
-        criteria: Of tests after ISO 9283: one a criterion that has a value in both; the cycles themselves are
-            not held against each other.
+        recording: Its file.
+        noise: Changes in [m] and [rad] to ignore, by kind.
+        changes: One per log and quantity that both have.
+        new: Logs and quantities that the earlier one lacks.
+        missing: Logs and quantities that only the earlier one has.
+        differences: Differences in how the two were made.
+        criteria: Of tests after ISO 9283: one per criterion that has a value in both; the cycles are not
+            compared.
     """
 
     name: str
@@ -375,13 +380,13 @@ class BaselineComparison:
 
     @property
     def verdict(self) -> Verdict:
-        """Fail if a quantity is worse, or something that was compared before is compared no more."""
+        """Fail if a quantity is worse, or a log or quantity of the baseline is no longer compared."""
         return "fail" if self.worse or self.worse_criteria or self.missing else "pass"
 
     @property
     def worse_criteria(self) -> tuple[CriterionChange, ...]:
         """The criteria that are worse than before, beyond the noise."""
-        return tuple(one for one in self.criteria if one.worse)
+        return tuple(change for change in self.criteria if change.worse)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
@@ -391,52 +396,21 @@ class BaselineComparison:
             "verdict": self.verdict,
             "noise": dict(self.noise),
             "changes": [change.to_dict() for change in self.changes],
-            "new": [asdict(one) for one in self.new],
-            "missing": [asdict(one) for one in self.missing],
-            "differences": [asdict(one) for one in self.differences],
-            "criteria": [one.to_dict() for one in self.criteria],
+            "new": [asdict(absent) for absent in self.new],
+            "missing": [asdict(absent) for absent in self.missing],
+            "differences": [asdict(difference) for difference in self.differences],
+            "criteria": [change.to_dict() for change in self.criteria],
         }
-
-
-Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True)
 class FailedLog:
-    """A log that was to be compared, and could not be.
+    """A failed log, which could not be compared.
 
     Attributes:
         name: Its name.
-        errors: All that is wrong with it, at least one.
+        errors: Its errors, at least one.
     """
 
     name: str
     errors: tuple[Finding, ...]
-
-
-def judge_others(
-    judge: Callable[[Sequence[Run]], Made], runs: Sequence[Run], failed_logs: list[FailedLog]
-) -> Made:
-    """Return what a function makes of those runs that it takes, and add the others to a list.
-
-    Raises:
-        UrmpipeError: With everything that is wrong, if it takes none, or not all that it takes alone.
-    """
-    try:
-        return judge(runs)
-    except UrmpipeError:
-        alone = [_lost(judge, run) for run in runs]
-        kept = [run for run, lost in zip(runs, alone, strict=True) if lost is None]
-        if not kept or len(kept) == len(runs):
-            raise
-    failed_logs += [lost for lost in alone if lost is not None]
-    return judge(kept)
-
-
-def _lost(judge: Callable[[Sequence[Run]], object], run: Run) -> FailedLog | None:
-    """Return why a run cannot be judged, even alone; None if it can."""
-    try:
-        judge([run])
-    except UrmpipeError as error:
-        return FailedLog(run.name, error.findings)
-    return None

@@ -21,43 +21,37 @@ if TYPE_CHECKING:
 
 Verdict = Literal["pass", "fail"]
 
+# Of a coordinate, the distance at one time, the distance from the path, the orientation, a joint.
 Kind = Literal["axis", "norm", "path", "angle", "joint"]
-"""What a deviation is measured of: a coordinate, the distance at one time, the distance from the path,
-the orientation, a joint."""
-
 ShareKind = Literal["coverage", "judged"]
 
-AXES = ("x", "y", "z", "norm")
-"""The columns of `Deviation.delta`."""
-
+AXES = ("x", "y", "z", "norm")  # columns of `Deviation.delta`
 KINDS: dict[str, Kind] = {"x": "axis", "y": "axis", "z": "axis", "norm": "norm"}
-"""What these are measured of."""
-
-WHOLE = 0.99
-"""A smaller share stands in the verdict's line: by hand, starts and ends of logs vary by less."""
+# A smaller share is in the verdict's line: starts and ends of logs that are recorded by hand vary by less.
+COMPLETE = 0.99
 
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """How one quantity deviates; max, rms and p95 are of absolute values, mean and std signed.
+    """Statistics of one quantity; max, rms and p95 are of absolute values, mean and std signed.
 
     Attributes:
         quantity: x, y, z, norm, path, angle, or a joint's name.
-        kind: What it is measured of; a tolerance of that name holds for it.
-        unit: m or rad, that of all lengths and angles here.
+        kind: Its kind; a tolerance of that name applies to it.
+        unit: m or rad, of all lengths and angles here.
         max: Largest absolute value.
         rms: Root mean square.
         mean: Mean.
         std: Standard deviation about the mean, of the samples themselves (n, not n - 1).
         p95: 95th percentile of the absolute values.
-        t_max: When the largest stands, in [s] of the log; NaN without times.
+        t_max: Time of the largest in [s] of the log; NaN without times.
         sample_max: Row of the log with the largest, from 0.
         tolerance: Largest absolute value allowed, or None.
         out_of_tolerance: Compared samples above it or without a value; None without a tolerance.
-        out_fraction: Their fraction of the compared samples, 0..1; None without a tolerance.
+        out_fraction: Their share of the compared samples, 0..1; None without a tolerance.
         verdict: pass or fail, None without a tolerance.
         samples: Compared samples that have a value; None in a recording made before they were counted.
-        missing: Compared samples that have none: they cannot be shown to be within a tolerance.
+        missing: Compared samples without a value: they cannot be shown to be within a tolerance.
     """
 
     quantity: str
@@ -79,7 +73,7 @@ class Statistics:
 
     @property
     def utilisation(self) -> float | None:
-        """Share of the tolerance that the largest value uses up; None without one, inf if one is missing."""
+        """Utilisation of the tolerance by the largest value; None without one, inf if a value is missing."""
         if not self.tolerance:
             return None
         return math.inf if self.missing else self.max / self.tolerance
@@ -89,18 +83,18 @@ class Statistics:
         return {key: value for key, value in self.fields().items() if key not in ("quantity", "kind")}
 
     def fields(self) -> dict[str, Any]:
-        """Return every field by its name; without times there is no `t_max`."""
+        """Return every field by its name; `t_max` is None without times."""
         return asdict(self) | {"t_max": None if math.isnan(self.t_max) else self.t_max}
 
 
 @dataclass(frozen=True, slots=True)
 class SampleInterval:
-    """Samples in a row that are out of tolerance, or unseen.
+    """Interval of consecutive samples that are out of tolerance, or unseen.
 
     Attributes:
-        samples: How many.
-        sample: The first of them, by its row of the log from 0; of coverage by that of the reference.
-        t: When it begins, in [s] of the log, of coverage in [s] of the reference; None without times.
+        samples: Number of samples.
+        sample: The first, by its row of the log from 0; of coverage by that of the reference.
+        t: Its start in [s] of the log, of coverage in [s] of the reference; None without times.
         duration: From its first to its last sample in [s]; None without times.
     """
 
@@ -112,7 +106,7 @@ class SampleInterval:
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """How much of a motion a verdict rests on, as `comparison.coverage` defines it.
+    """How much of a motion a verdict is based on, as `comparison.measure` defines it.
 
     Attributes:
         quantity: coverage or judged.
@@ -134,21 +128,21 @@ class Share:
 
     @property
     def kind(self) -> ShareKind:
-        """What it is measured of: a tolerance of that name holds for it."""
+        """Its kind: a tolerance of that name applies to it."""
         return self.quantity
 
     @property
     def utilisation(self) -> float | None:
-        """Part of what may be unseen that is; None without a tolerance, inf if nothing may be."""
+        """Unseen share / allowed unseen share; None without a tolerance, inf if nothing may be unseen."""
         if self.tolerance is None:
             return None
         unseen, allowed = 1.0 - self.value, 1.0 - self.tolerance
         return unseen / allowed if allowed else math.inf if unseen else 0.0
 
     def fields(self) -> dict[str, Any]:
-        """Return the fields of `Statistics` that it has, its share as `value`."""
-        own = {name: getattr(self, name) for name in ("quantity", "kind", "value", "tolerance", "verdict")}
-        return own | {"unit": "1", "samples": self.samples, "missing": self.total - self.samples}
+        """Return its fields by the names of `Statistics`, its share as `value`."""
+        shared = {name: getattr(self, name) for name in ("quantity", "kind", "value", "tolerance", "verdict")}
+        return shared | {"unit": "1", "samples": self.samples, "missing": self.total - self.samples}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -160,30 +154,30 @@ class Deviation(Displayable):
         run: The ingested log.
         sample: Rows of the log that were compared, from 0, shape (m,).
         t_ns: Their times on the log's clock in integer [ns], shape (m,).
-        reference: Where the reference was, in [m], shape (m, 3).
-        actual: Where the log was, aligned, in [m], shape (m, 3).
+        reference: Position of the reference in [m], shape (m, 3).
+        actual: Position of the log in [m], aligned, shape (m, 3).
         delta: x, y, z and norm of reference - actual, in [m], shape (m, 4).
         path: Distance of `actual` from the nearest point of the reference's path, in [m], shape (m,).
-        speed: Speed of the log's tool centre point in [m/s], shape (m,); NaN where it is not known.
-        angle: Angle between the orientations in [rad], shape (m,); None where a side has none.
+        speed: Speed of the log's tool centre point in [m/s], shape (m,); NaN where it is unknown.
+        angle: Angle between the orientations in [rad], shape (m,); None if a side has no orientation.
         joint_delta: reference - log of each joint, turns included, in [rad] or [m], shape (m, joints); None
-            where a side has none.
-        joint_turns: Whole turns that two motions count apart for the pose they start in, one a joint; they
-            are taken out of `joint_delta`.
+            if a side has no joints.
+        joint_turns: Difference of the whole turns that two motions count for the pose they start in, one per
+            joint; they are subtracted from `joint_delta`.
         out_of_tolerance: Where any quantity with a tolerance is out of it, shape (m,).
-        sync: How the clocks were put together.
+        sync: How the clocks are aligned.
         alignment: How the log was moved in space.
         left_out: Samples of the log without a reference or without a value.
         reference_left_out: Samples of the reference outside the log's time.
-        statistics: One for each of x, y, z, norm and path, and for angle where there is one; none where
-            joints alone are compared.
-        joint_statistics: One a joint, by its name in the log; none where a side has no joints.
+        statistics: Of x, y, z, norm and path, and of angle if there is one; empty if joints alone are
+            compared.
+        joint_statistics: Of each joint, by its name in the log; empty if a side has no joints.
         start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
         speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
         verdict: pass or fail; None of a cycle, which is not judged alone.
-        diagnosis: Why it deviates, where that was asked for.
-        shares: How much was seen: `coverage` of the reference, `judged` of the log's motion; none in a
-            recording made before they were measured.
+        diagnosis: Why it deviates, if a diagnosis was requested.
+        shares: `coverage` of the reference, `judged` of the log's motion; empty in a recording made before
+            they were measured.
     """
 
     name: str
@@ -218,7 +212,7 @@ class Deviation(Displayable):
 
     @property
     def axis_ns(self) -> IntArray | None:
-        """What it is drawn over: times of the compared samples in [ns], shape (m,); None for the rows."""
+        """Axis of plots: times of the compared samples in [ns], shape (m,); None for the rows."""
         return self.t_ns if self.run.timed else None
 
     @property
@@ -238,8 +232,8 @@ class Deviation(Displayable):
 
     @property
     def longest_out_interval(self) -> SampleInterval | None:
-        """The longest stretch out of tolerance, the first of equally long ones; None without any."""
-        edges = np.flatnonzero(np.diff(self.sample) > 1) + 1  # a stretch ends where samples are left out
+        """The longest interval out of tolerance, the first of equally long ones; None without any."""
+        edges = np.flatnonzero(np.diff(self.sample) > 1) + 1  # an interval ends where samples are left out
         changes = np.flatnonzero(np.diff(self.out_of_tolerance)) + 1
         starts = np.unique(np.concatenate(([0], edges, changes)))
         ends = np.append(starts[1:], len(self.sample))
@@ -261,7 +255,7 @@ class Deviation(Displayable):
 
     @property
     def quantities(self) -> tuple[Statistics | Share, ...]:
-        """Whatever may have a tolerance: every deviation, then the shares."""
+        """Everything that may have a tolerance: every deviation, then the shares."""
         return (*self.all_statistics, *self.shares.values())
 
     @property
@@ -272,78 +266,78 @@ class Deviation(Displayable):
         return (*self.delta.T, self.path, *angle, *joints) if self.statistics else joints
 
     def worst_joint(self, unit: str) -> Statistics | None:
-        """Return the joint in rad or m that is furthest off; None without one."""
-        joints = [one for one in self.joint_statistics.values() if one.unit == unit]
-        return max(joints, key=lambda one: one.max, default=None)
+        """Return the joint in rad or m with the largest deviation; None without one."""
+        joints = [statistics for statistics in self.joint_statistics.values() if statistics.unit == unit]
+        return max(joints, key=lambda joint: joint.max, default=None)
 
-    def peak(self, one: Statistics) -> int:
-        """Return the index into the compared samples at which one of its quantities is largest."""
-        return int(np.searchsorted(self.sample, one.sample_max))
+    def peak(self, statistics: Statistics) -> int:
+        """Return the index into the compared samples at which a quantity of it is largest."""
+        return int(np.searchsorted(self.sample, statistics.sample_max))
 
     @property
     def worst_statistics_index(self) -> int:
-        """Index into the compared samples of the furthest quantity; the norm need not be largest there."""
+        """Index into the compared samples of the worst statistics; the norm need not be largest there."""
         return self.peak(self.worst_statistics)
 
-    def place(self, one: Statistics) -> tuple[float, float, float] | None:
-        """Return where the log was when one of its quantities was largest, in [m]; None without a place."""
-        x, y, z = (float(value) for value in self.actual[self.peak(one)])
+    def place(self, statistics: Statistics) -> tuple[float, float, float] | None:
+        """Return the log's position at the largest value of a quantity in [m]; None without positions."""
+        x, y, z = (float(value) for value in self.actual[self.peak(statistics)])
         return (x, y, z) if self.statistics else None
 
-    def row(self, one: Statistics) -> int:
-        """Return the log's row of numbers, from 1, in which a quantity was largest."""
-        if self.run.rows is None and self.run.resampled:  # judged on the grid, as it once was: the nearest
-            return int(np.argmin(np.abs(self.run.log.t_ns - self.t_ns[self.peak(one)]))) + 1
-        return one.sample_max + 1
+    def row(self, statistics: Statistics) -> int:
+        """Return the log's data row, from 1, of the largest value of a quantity."""
+        if (
+            self.run.rows is None and self.run.resampled
+        ):  # of an old recording, judged on the grid: the nearest
+            return int(np.argmin(np.abs(self.run.log.t_ns - self.t_ns[self.peak(statistics)]))) + 1
+        return statistics.sample_max + 1
 
     @property
     def worst_statistics(self) -> Statistics:
-        """The deviation that uses up most of its tolerance; the norm where nothing has one."""
-        held = [one for one in self.all_statistics if one.utilisation is not None]
-        otherwise = self.statistics.get("norm", self.all_statistics[0])
-        return max(held, key=lambda one: one.utilisation or 0.0, default=otherwise)
+        """The deviation of the largest utilisation of its tolerance; the norm if nothing has one."""
+        judged = [statistics for statistics in self.all_statistics if statistics.utilisation is not None]
+        default = self.statistics.get("norm", self.all_statistics[0])
+        return max(judged, key=lambda statistics: statistics.utilisation or 0.0, default=default)
 
     @property
     def decisive(self) -> Statistics | Share:
-        """What decides the verdict: the furthest deviation; if none fails, a share that is too small."""
-        small = [one for one in self.shares.values() if one.verdict == "fail"]
+        """The quantity that decides the verdict: the worst statistics; if these pass, a share that fails."""
+        small = [share for share in self.shares.values() if share.verdict == "fail"]
         if self.worst_statistics.verdict == "fail" or not small:
             return self.worst_statistics
-        return max(small, key=lambda one: one.utilisation or 0.0)
+        return max(small, key=lambda share: share.utilisation or 0.0)
 
     @property
     def incomplete_shares(self) -> tuple[Share, ...]:
-        """The shares that are not nearly whole, which its verdict has to name."""
-        return tuple(one for one in self.shares.values() if one.value < WHOLE)
+        """The shares that are not nearly 1, which its verdict has to name."""
+        return tuple(share for share in self.shares.values() if share.value < COMPLETE)
 
     def _headline(self) -> str:
-        """Return its verdict, and by what it is decided."""
-        one, samples = self.worst_statistics, format_count(len(self.sample), "sample")
-        largest = f"{one.quantity} up to {one.max:.4g} {one.unit}"
+        critical, samples = self.worst_statistics, format_count(len(self.sample), "sample")
+        largest = f"{critical.quantity} up to {critical.max:.4g} {critical.unit}"
         shares = (f"{share.quantity} {share.value:.1%}" for share in self.incomplete_shares)
         return format_headline(self.name, self.verdict, largest, f"{samples} compared", *shares)
 
     def _notes(self) -> list[str]:
-        """Return what is to be known of the log."""
         return [str(warning) for warning in self.run.warnings]
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a compared sample: t [s], then every quantity, in [m] or [rad].
+        """Return one row per compared sample: t [s], then every quantity, in [m] or [rad].
 
-        Of still poses the number of the row stands for t, from 1. Its columns are called as
-        its statistics: x, y, z, norm, path, angle where there is one, the joints.
+        Static poses have the number of the row, from 1, instead of t. The columns are named as the
+        statistics: x, y, z, norm, path, angle if there is one, the joints.
         """
         import pandas as pd
 
-        names = [one.quantity for one in self.all_statistics]
+        names = [statistics.quantity for statistics in self.all_statistics]
         axis = {"t": self.t} if self.run.timed else {"row": self.sample + 1}
         return pd.DataFrame({**axis, **dict(zip(names, self.values, strict=True))})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of one run."""
         worst, longest, timed = self.worst, self.longest_out_interval, self.run.timed
-        told = {name: one.to_dict() for name, one in self.statistics.items()}
-        norm = float(self.delta[worst, 3]) if told else None
+        in_space = {name: statistics.to_dict() for name, statistics in self.statistics.items()}
+        norm = float(self.delta[worst, 3]) if in_space else None
         return {
             "name": self.name,
             "samples": len(self.sample),
@@ -353,14 +347,14 @@ class Deviation(Displayable):
             "sync_offset": self.sync.offset if timed else None,
             "sync": self.sync.to_dict() if timed else None,
             "alignment": self.alignment.to_dict(),
-            "delta": {axis: told[axis] for axis in AXES if told},
-            "path": told.get("path"),
-            "angle": told.get("angle"),
-            "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
+            "delta": {axis: in_space[axis] for axis in AXES if in_space},
+            "path": in_space.get("path"),
+            "angle": in_space.get("angle"),
+            "joints": {name: statistics.to_dict() for name, statistics in self.joint_statistics.items()},
             **dict.fromkeys(get_args(ShareKind)),
             **{name: asdict(share) for name, share in self.shares.items()},
             "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
-            "start": dict(zip(AXES, self.start, strict=True)) if told else {},
+            "start": dict(zip(AXES, self.start, strict=True)) if in_space else {},
             "worst": {
                 "t": float(self.t[worst]) if timed else None,
                 "sample": int(self.sample[worst]),
@@ -371,6 +365,6 @@ class Deviation(Displayable):
             "longest_out_interval": None if longest is None else asdict(longest),
             "speed_correlation": self.speed_correlation,
             "verdict": self.verdict,
-            "warnings": [one.to_dict() for one in self.run.warnings],
+            "warnings": [warning.to_dict() for warning in self.run.warnings],
             "diagnosis": None if self.diagnosis is None else self.diagnosis.to_dict(),
         }

@@ -12,7 +12,7 @@ from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.identification import Twist, apply_twists_to_frames
 from urmpipe_models.math3d import Transform
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.align import as_option, placed
+from urmpipe_pipeline.comparison.align import apply_alignment, frame_to_option
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics
 from urmpipe_pipeline.comparison.warnings import is_stationary
@@ -221,7 +221,7 @@ def _alignment(one: Deviation) -> Iterator[Fact]:
     mode = one.alignment.mode
     yield Fact("Alignment", *alignment_words(one), brief=mode != "none")
     if mode in ("tool", "base+tool") and one.run.robot is not None:
-        arm = placed(one.run.robot, one.alignment)
+        arm = apply_alignment(one.run.robot, one.alignment)
         hints = [Hint("tool", _given(arm.tool))]
         if mode == "base+tool":
             moved = Hint("base", _given(arm.base), "moves the arm")
@@ -271,7 +271,7 @@ def _corrected_frames(causes: Sequence[Cause], base: Transform, tool: Transform)
 
 def _given(frame: Transform) -> list[float]:
     """Return a frame as an option takes it, to a tenth of a micrometre."""
-    return [round(value, 7) + 0.0 for value in as_option(frame)]  # + 0.0: no -0.0
+    return [round(value, 7) + 0.0 for value in frame_to_option(frame)]  # + 0.0: no -0.0
 
 
 def _sliding(one: Deviation) -> str:

@@ -23,7 +23,7 @@ from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.measure import measure, measure_shares
 from urmpipe_pipeline.comparison.path_distance import distance_from_path
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, deviations_of
+from urmpipe_pipeline.comparison.verdict import MIN_SHARES, deviation_tolerances
 from urmpipe_pipeline.comparison.wording import share_words
 from urmpipe_pipeline.iso9283.command_path import Planes
 from urmpipe_pipeline.iso9283.criteria import euler_angles, min_cycles
@@ -121,8 +121,8 @@ def evaluate_test(
     command = _build_motion(reference)
     candidates, warnings = _find_candidates(command, logs, options)
     stations = command_to_stations(command, options)
-    least_shares = {name: tolerance.get(name, share) for name, share in LEAST_SHARES.items()}
-    tolerance = deviations_of(tolerance)
+    least_shares = {name: tolerance.get(name, share) for name, share in MIN_SHARES.items()}
+    tolerance = deviation_tolerances(tolerance)
     kept, failed = _match_cycles(command, stations, candidates, reference, least_shares)
     if not kept and stations.path is not None and len(stations.poses) and options.targets is None:
         stations = stations._replace(poses=Poses(np.empty((0, 3)), None))

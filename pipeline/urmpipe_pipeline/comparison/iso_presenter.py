@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.align import placed
+from urmpipe_pipeline.comparison.align import apply_alignment
 from urmpipe_pipeline.comparison.baseline_section import baseline_section, criterion_checks, worse_facts
 from urmpipe_pipeline.comparison.comparison import BaselineComparison, Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
@@ -315,7 +315,7 @@ def _arm(cycle: Deviation) -> Iterator[Arm]:
     if cycle.run.robot is not None:
         t_ns = times_of(cycle.run)
         since_start = None if t_ns is None else t_ns[:] - t_ns[0]
-        yield Arm(placed(cycle.run.robot, cycle.alignment), cycle.run.q, since_start, CYCLES_COLOUR)
+        yield Arm(apply_alignment(cycle.run.robot, cycle.alignment), cycle.run.q, since_start, CYCLES_COLOUR)
 
 
 def _cycle_point(cycle: Deviation) -> Path:

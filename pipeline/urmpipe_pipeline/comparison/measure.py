@@ -49,7 +49,7 @@ from urmpipe_pipeline.comparison.deviation import (
     Verdict,
 )
 from urmpipe_pipeline.comparison.path_distance import distance_from_path
-from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, allowed_for
+from urmpipe_pipeline.comparison.verdict import MIN_SHARES, tolerance_for
 from urmpipe_pipeline.iso9283.criteria import combine_verdicts
 from urmpipe_pipeline.joint_log import has_gap_after, ns_to_seconds
 from urmpipe_pipeline.runs.grid import interpolate
@@ -92,7 +92,7 @@ class Quantity(NamedTuple):
 
         A missing value cannot be shown to be within its tolerance: it is out of it.
         """
-        allowed = allowed_for(self.name, self.kind, tolerance)
+        allowed = tolerance_for(self.name, self.kind, tolerance)
         if allowed is None:
             return np.zeros(len(self.values), bool)
         return ~np.asarray(np.abs(self.values) <= allowed)
@@ -270,7 +270,7 @@ def compute_statistics(
     values = quantity.values[known]
     size = np.abs(values)
     worst = int(np.argmax(size))
-    allowed = allowed_for(quantity.name, quantity.kind, tolerance)
+    allowed = tolerance_for(quantity.name, quantity.kind, tolerance)
     out = None if allowed is None else int(np.count_nonzero(quantity.out_of_tolerance(tolerance)))
     mean = _mean(values)
     return Statistics(
@@ -388,9 +388,9 @@ def _share(
 
 def _limits(tolerance: Mapping[str, float]) -> _Limits:
     """Return the tolerance of each quantity, inf without one; the default tolerance if nothing has one."""
-    if not set(tolerance) - set(LEAST_SHARES):
+    if not set(tolerance) - set(MIN_SHARES):
         tolerance = {"axis": DEFAULT_TOLERANCE}
-    axes = [allowed_for(axis, "axis", tolerance) for axis in "xyz"]
+    axes = [tolerance_for(axis, "axis", tolerance) for axis in "xyz"]
     return _Limits(
         np.array([math.inf if limit is None else limit for limit in axes]),
         min(tolerance.get("norm", math.inf), tolerance.get("path", math.inf)),

@@ -8,8 +8,8 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_pipeline.comparison.align import placed
-from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
+from urmpipe_pipeline.comparison.align import apply_alignment
+from urmpipe_pipeline.comparison.comparison import Comparison, tolerance_sort_key
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.mended import cause_marks, mended_path
 from urmpipe_pipeline.comparison.wording import amount_words, when
@@ -77,7 +77,7 @@ def allowed_norm(one: Deviation) -> float | None:
 
 def shown_log(result: Comparison) -> Deviation:
     """Return the compared log whose arm is drawn: the worst that has kinematics, else the worst."""
-    worst_first = sorted(result.runs, key=by_tolerance)[::-1]
+    worst_first = sorted(result.runs, key=tolerance_sort_key)[::-1]
     return next((one for one in worst_first if one.run.tcp is not None), worst_first[0])
 
 
@@ -88,7 +88,7 @@ def _arm(one: Deviation, colour: str) -> Iterator[Arm]:
         return
     decided = int(one.t_ns[one.worst_statistics_index])
     row = min(int(np.searchsorted(run.t_ns, decided)), len(run.t_ns) - 1)
-    chain = placed(run.robot, one.alignment)
+    chain = apply_alignment(run.robot, one.alignment)
     yield Arm(chain, run.q, times_of(run), colour, kept=(row,), marks=cause_marks(one, chain))
 
 

@@ -20,7 +20,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import align
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.sync import BY_HAND, BY_MOTION, synchronise
-from urmpipe_pipeline.comparison.verdict import UNITS, allowed_for
+from urmpipe_pipeline.comparison.verdict import UNITS, tolerance_for
 from urmpipe_pipeline.comparison.wording import unseen_words
 from urmpipe_pipeline.diagnosis.problem import AT_REST
 from urmpipe_pipeline.joint_log import LogWarning, Role
@@ -107,7 +107,7 @@ def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> 
     The noise is in [m] or [rad], of every kind, perhaps of a coordinate; so is the tolerance.
     """
     for kind, allowed in tolerance.items():
-        level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
+        level = tolerance_for(kind, "axis" if kind in AXES else kind, noise)
         if level is not None and level >= allowed:
             unit = UNITS[kind]
             message = f"a noise of {text.allowed(level, unit)} ({kind}) reaches the tolerance of"

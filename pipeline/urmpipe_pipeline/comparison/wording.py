@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, SampleInterval, Share, Statistics
-from urmpipe_pipeline.comparison.verdict import LEAST_SHARES, DeltaMeterResult
+from urmpipe_pipeline.comparison.verdict import MIN_SHARES, DeltaMeterResult
 from urmpipe_pipeline.presentation.digits import held, written
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.provenance import format_assumptions, format_defaults
@@ -202,15 +202,15 @@ def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = (
         "angle": "{} of orientation",
         "joint": "±{} per joint",
         **{axis: f"±{{}} {axis}" for axis in "xyz"},
-        **{share: f"{share} {{}}" for share in LEAST_SHARES},
+        **{share: f"{share} {{}}" for share in MIN_SHARES},
     }
     units = {"angle": ["rad"], "joint": sorted(set(joint_units), reverse=True)}
     return ", ".join(
         words[kind].format(
             written(Value(value, "%", given=True), unit=True)
-            if kind in LEAST_SHARES
+            if kind in MIN_SHARES
             else " or ±".join(text.allowed(value, unit) for unit in units.get(kind, ["m"]))
         )
         for kind, value in allowed.items()
-        if value != LEAST_SHARES.get(kind)
+        if value != MIN_SHARES.get(kind)
     )

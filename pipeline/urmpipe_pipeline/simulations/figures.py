@@ -9,7 +9,7 @@ import numpy as np
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
-from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, allowed_for
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, tolerance_for
 from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
@@ -148,7 +148,7 @@ def _judged(simulation: Simulation, group: Group, verdict: DeltaMeterResult) -> 
     for axis, values in zip(AXES, columns.T, strict=False):
         kind, symbol = KINDS[axis], SYMBOLS[axis]
         line = Line(values, (symbol,), (AXIS_COLOURS[axis],))
-        allowed = allowed_for(axis, kind, verdict.tolerance)
+        allowed = tolerance_for(axis, kind, verdict.tolerance)
         peaks = (verdict.sample,) if verdict.quantity == axis else ()
         signed = kind == "axis"
         panels.append(Panel(symbol, group.unit, (line,), simulation.t_ns, allowed, signed, peaks, small=True))

@@ -19,8 +19,8 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import Transform, from_offset, from_rpy
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.align import RESOLVED, as_option, placed
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.align import MIN_BREADTH, apply_alignment, frame_to_option
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import deviation_facts
 from urmpipe_pipeline.joint_log import LogWarning
@@ -172,7 +172,7 @@ def test_motions_without_anything_in_common_leave_the_rotation_open() -> None:
 
 def test_what_just_leaves_a_line_is_aligned() -> None:
     position = np.column_stack(
-        [np.linspace(-1, 1, 100), np.tile([2 * RESOLVED, -2 * RESOLVED], 50), np.zeros(100)]
+        [np.linspace(-1, 1, 100), np.tile([2 * MIN_BREADTH, -2 * MIN_BREADTH], 50), np.zeros(100)]
     )
     found = aligned(path_run(position), path_run(FRAME.apply(position), name="log"), "rigid")
     assert found.statistics["norm"].max < ROUNDING
@@ -250,19 +250,19 @@ def arm_run(recorded_with: Transform, tool: Transform | None = None) -> Run:
 def test_the_tool_that_is_advised_takes_the_deviation_away(own: tuple[float, ...]) -> None:
     recorded_with = from_offset((0.02, -0.01, 0.17, *own[3:]))
     run = arm_run(recorded_with, from_offset(own) if own else None)
-    found = compare_recorded(run, CompareOptions(align="tool")).runs[0]
+    found = compare_with_recorded_tcp(run, CompareOptions(align="tool")).runs[0]
     assert found.statistics["norm"].max < ROUNDING
-    advised = as_option(placed(there(run.robot), found.alignment).tool)
+    advised = frame_to_option(apply_alignment(there(run.robot), found.alignment).tool)
     np.testing.assert_allclose(advised, (0.02, -0.01, 0.17, *own[3:]), atol=ROUNDING)
     told = arm_run(recorded_with, from_offset(advised))
-    assert compare_recorded(told).runs[0].statistics["norm"].max < ROUNDING
+    assert compare_with_recorded_tcp(told).runs[0].statistics["norm"].max < ROUNDING
 
 
 def test_one_log_alone_has_an_angle_between_kinematics_and_record() -> None:
     run = arm_run(from_rpy(0.0, 0.0, 0.25))
-    found = compare_recorded(run).runs[0]
+    found = compare_with_recorded_tcp(run).runs[0]
     np.testing.assert_allclose(there(found.angle), 0.25, atol=ROUNDING)
-    start = compare_recorded(run, CompareOptions(align="start")).runs[0]
+    start = compare_with_recorded_tcp(run, CompareOptions(align="start")).runs[0]
     assert (there(start.angle)[0], start.delta[0, 3]) == pytest.approx((0.0, 0.0), abs=ROUNDING)
     assert start.alignment.angle == pytest.approx(0.25, abs=ROUNDING)
 
@@ -270,8 +270,10 @@ def test_one_log_alone_has_an_angle_between_kinematics_and_record() -> None:
 def test_one_log_alone_without_a_recorded_orientation_has_no_angle() -> None:
     run = arm_run(Transform())
     run = replace(run, log=replace(run.log, tcp_rotation=None, rotation_form=None))
-    assert compare_recorded(run).runs[0].angle is None
-    assert compare_recorded(run, CompareOptions(align="tool")).runs[0].statistics["norm"].max < ROUNDING
+    assert compare_with_recorded_tcp(run).runs[0].angle is None
+    assert (
+        compare_with_recorded_tcp(run, CompareOptions(align="tool")).runs[0].statistics["norm"].max < ROUNDING
+    )
 
 
 def test_orientations_turn_with_the_log() -> None:
@@ -300,7 +302,7 @@ def measured_run(noise: float = 0.0, *, turned: bool = True, base: Transform = O
 
 @pytest.mark.parametrize("turned", [True, False])
 def test_base_and_tool_are_found_at_once(turned: bool) -> None:
-    found = compare_recorded(measured_run(turned=turned), CompareOptions(align="base+tool")).runs[0]
+    found = compare_with_recorded_tcp(measured_run(turned=turned), CompareOptions(align="base+tool")).runs[0]
     np.testing.assert_allclose(found.alignment.rotation, OFFICE.rotation, atol=1e-9)
     np.testing.assert_allclose(found.alignment.translation, OFFICE.translation, atol=1e-9)
     np.testing.assert_allclose(found.alignment.tool, PROBE.translation, atol=1e-9)
@@ -325,7 +327,7 @@ def test_a_log_is_moved_onto_the_pose_that_a_reference_measured() -> None:
 
 def test_the_base_and_the_tool_that_are_advised_give_the_same_deviation() -> None:
     run = measured_run(1e-3)
-    result = compare_recorded(run, CompareOptions(align="base+tool"))
+    result = compare_with_recorded_tcp(run, CompareOptions(align="base+tool"))
     found = result.runs[0]
     assert found.statistics["norm"].rms == pytest.approx(np.sqrt(3) * 1e-3, rel=0.1)
     facts = {fact.name: fact.value for fact in deviation_facts(found, result)}
@@ -334,7 +336,7 @@ def test_the_base_and_the_tool_that_are_advised_give_the_same_deviation() -> Non
     base, tool = (from_offset(cast("list[float]", hint.value)) for hint in advice.hints)
     assert [hint.parameter for hint in advice.hints] == ["base", "tool"]
     told = with_robot(run, there(run.robot).placed(base, tool))
-    after = compare_recorded(told).runs[0]
+    after = compare_with_recorded_tcp(told).runs[0]
     np.testing.assert_allclose(after.delta, found.delta, atol=5e-7)  # 7 digits, of angles on an arm of 1 m
     np.testing.assert_allclose(there(after.angle), there(found.angle), atol=5e-7)
 
@@ -349,9 +351,9 @@ def test_a_doubtful_recorded_orientation_is_asked_for_where_the_alignment_goes_b
     run = replace(measured_run(base=Transform()), warnings=(doubt,))
     options = CompareOptions(align=align)
     if asked:
-        assert "rx may be a rotation vector" in refusal(LogError, compare_recorded, run, options)
+        assert "rx may be a rotation vector" in refusal(LogError, compare_with_recorded_tcp, run, options)
     else:
-        assert compare_recorded(run, options).assumptions == ()
+        assert compare_with_recorded_tcp(run, options).assumptions == ()
 
 
 @pytest.mark.parametrize(("rows", "found"), [(1, "1 compared pose"), (3, "3 compared poses")])
@@ -359,7 +361,7 @@ def test_poses_that_any_base_and_tool_fit_are_refused(rows: int, found: str) -> 
     run = measured_run()
     position, rotation = there(run.log.tcp_position), there(run.log.tcp_rotation)
     few = run_of(run.q[:rows], run.robot, position[:rows], rotation[:rows], "matrix")
-    assert refusal(LogError, compare_recorded, few, CompareOptions(align="base+tool")) == (
+    assert refusal(LogError, compare_with_recorded_tcp, few, CompareOptions(align="base+tool")) == (
         f"log.csv: align (--align): base+tool: found {found}, which some base and tool fit, allowed: 4 or"
         " more"
     )
@@ -414,7 +416,7 @@ def test_a_probe_at_the_flange_of_a_real_arm_is_found_by_a_laser_tracker() -> No
     angles = np.radians(values[:, probe + 3 : probe + 6])
     for rotation in (angles, None):
         run = run_of(q, load_robot("ur10"), position, rotation, "xyz")
-        result = compare_recorded(run, CompareOptions(align="base+tool"))
+        result = compare_with_recorded_tcp(run, CompareOptions(align="base+tool"))
         found = result.runs[0]
         assert len(found.sample) == 11911
         assert result.warnings == ()

@@ -15,7 +15,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.math3d import translation
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.joint_log import LogColumn, LogWarning
 from urmpipe_pipeline.presentation.meshes import mesh_warnings
 from urmpipe_pipeline.repolarization.audit import audit_log
@@ -125,7 +125,7 @@ def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
 def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
     log = run_of(q, recorded=positions_over_log(URM6, q))
     for sync in ("auto", 0.25):
-        assert refusal(OptionError, compare_recorded, log, CompareOptions(sync=sync)) == (
+        assert refusal(OptionError, compare_with_recorded_tcp, log, CompareOptions(sync=sync)) == (
             f"sync (--sync): found {sync} for one log, allowed: start, since its joints and its recorded"
             " tool centre"
             " point share the same rows"
@@ -142,18 +142,18 @@ def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
 def test_one_log_is_held_against_what_it_recorded_itself(q: FloatArray) -> None:
     recorded = positions_over_log(URM6, q) + np.array([0.001, 0.0, 0.0])
     recorded[3] = np.nan
-    result = compare_recorded(run_of(q, recorded=recorded))
+    result = compare_with_recorded_tcp(run_of(q, recorded=recorded))
     assert result.runs[0].statistics["x"].mean == pytest.approx(0.001, abs=1e-15)
     assert result.runs[0].left_out == 1
 
 
 def test_a_verdict_that_fails_for_want_of_a_tool_says_so(q: FloatArray) -> None:
     recorded = positions_over_log(URM6.placed(tool=translation(0.0, 0.0, 0.15)), q)
-    result = compare_recorded(run_of(q, recorded=recorded))
+    result = compare_with_recorded_tcp(run_of(q, recorded=recorded))
     assert result.runs[0].verdict == "fail"
     assert [warning.kind for warning in result.warnings] == ["recorded-tcp-tool"]
     told = run_of(q, robot=URM6.placed(tool=translation(0.0, 0.0, 0.15)), recorded=recorded)
-    assert compare_recorded(told).warnings == ()
+    assert compare_with_recorded_tcp(told).warnings == ()
 
 
 def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> None:
@@ -191,7 +191,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
         compare_runs(wanted, [run_of(q, robot=None)])
     assert str(error.value) == ("log.csv: no robot, so no forward kinematics; --robot NAME|FILE sets one")
     with pytest.raises(LogError) as error:
-        compare_recorded(run_of(q))
+        compare_with_recorded_tcp(run_of(q))
     assert str(error.value) == (
         "log.csv: one log, which recorded no tool centre point; allowed: a reference before the log"
     )
@@ -199,7 +199,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     with pytest.raises(
         LogError, match=r"a reference before the log\nlog\.csv: tcp_xx, tcp_yy look like a recorded TCP$"
     ):
-        compare_recorded(replace(run := run_of(q), log=replace(run.log, warnings=(doubt,))))
+        compare_with_recorded_tcp(replace(run := run_of(q), log=replace(run.log, warnings=(doubt,))))
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [run_of(q)], CompareOptions(sync=99.0))
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
@@ -261,8 +261,11 @@ def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
     assert [entry.kind for entry in found.entries] == ["repaired", "wrap"]
     run = replace(run_of(found.q), log=log, audit=found.entries)
     # A straight line between samples 5 ms apart misses a sine of 1 rad/s2 by 1e-5 rad at the most.
-    assert compare_recorded(run).runs[0].delta.max() < 1e-5
-    assert compare_recorded(run_of(there, recorded=positions_over_log(URM6, true))).runs[0].delta.max() > 0.1
+    assert compare_with_recorded_tcp(run).runs[0].delta.max() < 1e-5
+    assert (
+        compare_with_recorded_tcp(run_of(there, recorded=positions_over_log(URM6, true))).runs[0].delta.max()
+        > 0.1
+    )
 
 
 def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:

@@ -14,7 +14,7 @@ from made_runs import off
 from presented import Untouched, cells, every_section, facts, figures, scene_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_pipeline.comparison.baseline import against_baseline
+from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES
 from urmpipe_pipeline.comparison.scene import LEAST_SEEN
@@ -145,7 +145,7 @@ def test_a_single_log_is_not_ranked(paths: Compared) -> None:
 
 def test_what_changed_since_the_baseline_is_a_section(paths: Compared) -> None:
     before, now = paths({"a": off(0.001), "old": off(0.0)}), paths({"a": off(0.0015), "new": off(0.0)})
-    found = against_baseline(now, before)
+    found = compare_with_baseline(now, before)
     shown = present(replace(now, baseline=found))
     section = shown.body.sections[-1]
     assert (section.verdict, shown.verdict) == ("fail", "fail")

@@ -15,7 +15,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
 from urmpipe_pipeline.comparison.measure import Quantity, compute_statistics
-from urmpipe_pipeline.comparison.verdict import delta_verdict
+from urmpipe_pipeline.comparison.verdict import judge_delta_meter
 from urmpipe_pipeline.comparison.wording import meter_words
 from urmpipe_pipeline.iso9283.criteria import combine_verdicts
 
@@ -24,7 +24,7 @@ DELTA = np.array([[1e-3, 0.0, 0.0], [0.0, -4e-3, 3e-3], [3.5e-3, 0.0, 0.0]])
 
 
 def test_the_component_that_uses_up_most_is_the_worst() -> None:
-    found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 0.0035}))
+    found = there(judge_delta_meter("meter", T_NS, DELTA, {"axis": 0.0035}))
     assert (found.quantity, found.worst, found.t, found.sample) == ("y", 4e-3, 0.005, 1)
     assert (found.samples, found.out_of_tolerance, found.verdict) == (3, 1, "fail")  # what is allowed passes
     assert (found.utilisation, found.out_fraction) == (4e-3 / 0.0035, 1 / 3)
@@ -35,9 +35,9 @@ def test_the_component_that_uses_up_most_is_the_worst() -> None:
 
 
 def test_a_tolerance_of_one_coordinate_or_of_the_norm_holds_for_that_alone() -> None:
-    of_z = delta_verdict("meter", T_NS, DELTA, {"z": 0.003})
-    of_norm = delta_verdict("meter", T_NS, DELTA, {"norm": 0.0045})
-    both = delta_verdict("meter", T_NS, DELTA, {"axis": 0.005, "x": 0.001})
+    of_z = judge_delta_meter("meter", T_NS, DELTA, {"z": 0.003})
+    of_norm = judge_delta_meter("meter", T_NS, DELTA, {"norm": 0.0045})
+    both = judge_delta_meter("meter", T_NS, DELTA, {"axis": 0.005, "x": 0.001})
     assert of_z is not None and of_norm is not None and both is not None
     assert (of_z.quantity, of_z.worst, of_z.verdict) == ("z", 3e-3, "pass")
     assert (of_norm.quantity, of_norm.worst, of_norm.verdict) == ("norm", 5e-3, "fail")
@@ -47,7 +47,7 @@ def test_a_tolerance_of_one_coordinate_or_of_the_norm_holds_for_that_alone() -> 
 def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
     lacking = DELTA.copy()
     lacking[0, 2] = np.nan
-    found = there(delta_verdict("meter", T_NS, lacking, {"axis": 1.0}))
+    found = there(judge_delta_meter("meter", T_NS, lacking, {"axis": 1.0}))
     assert (found.sample, found.out_of_tolerance, found.verdict, found.utilisation) == (0, 1, "fail", None)
     assert math.isnan(found.worst) and found.to_dict()["worst"] is None
     assert (found.missing, found.coverage) == (1, 1.0 - 1.0 / len(lacking))
@@ -58,7 +58,7 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
 
 
 def test_a_doubt_keeps_it_from_passing_and_is_told() -> None:
-    found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 1.0}, ("a.y was nan", "it ended early")))
+    found = there(judge_delta_meter("meter", T_NS, DELTA, {"axis": 1.0}, ("a.y was nan", "it ended early")))
     assert (found.out_of_tolerance, found.verdict, found.utilisation) == (0, "fail", 4e-3)
     assert found.to_dict()["caveats"] == ["a.y was nan", "it ended early"]
     assert meter_words(found) == (
@@ -68,15 +68,15 @@ def test_a_doubt_keeps_it_from_passing_and_is_told() -> None:
 
 
 def test_of_nothing_allowed_no_share_is_told() -> None:
-    found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 0.0}))
+    found = there(judge_delta_meter("meter", T_NS, DELTA, {"axis": 0.0}))
     assert meter_words(found) == (
         "|Δy| = 4.000 mm of 0 mm allowed at t = 0.005 s; out of tolerance: 3 of 3 samples (100 %)"
     )
 
 
 def test_nothing_allowed_is_a_tolerance() -> None:
-    found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0})
-    still = delta_verdict("meter", T_NS, np.zeros((3, 3)), {"axis": 0.0})
+    found = judge_delta_meter("meter", T_NS, DELTA, {"axis": 0.0})
+    still = judge_delta_meter("meter", T_NS, np.zeros((3, 3)), {"axis": 0.0})
     assert found is not None and still is not None
     assert (found.out_of_tolerance, found.verdict, found.utilisation) == (3, "fail", math.inf)
     assert (found.quantity, found.worst, found.sample) == ("y", 4e-3, 1)  # not the first that is out
@@ -84,7 +84,7 @@ def test_nothing_allowed_is_a_tolerance() -> None:
 
 
 def test_without_a_sample_there_is_no_verdict() -> None:
-    assert delta_verdict("meter", T_NS[:0], DELTA[:0], {"axis": 1.0}) is None
+    assert judge_delta_meter("meter", T_NS[:0], DELTA[:0], {"axis": 1.0}) is None
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_without_a_sample_there_is_no_verdict() -> None:
     ],
 )
 def test_what_is_no_tolerance_is_refused(tolerance: dict[str, float], message: str) -> None:
-    assert refusal(OptionError, delta_verdict, "meter", T_NS, DELTA, tolerance) == message
+    assert refusal(OptionError, judge_delta_meter, "meter", T_NS, DELTA, tolerance) == message
 
 
 def length(delta: FloatArray) -> FloatArray:
@@ -112,7 +112,7 @@ ROWS = st.lists(st.tuples(*(st.floats(-1.0, 1.0),) * 3), min_size=1, max_size=8)
 def test_it_passes_if_and_only_if_every_quantity_of_every_sample_is_allowed(
     delta: FloatArray, axis: float, norm: float
 ) -> None:
-    found = there(delta_verdict("meter", np.arange(len(delta)), delta, {"axis": axis, "norm": norm}))
+    found = there(judge_delta_meter("meter", np.arange(len(delta)), delta, {"axis": axis, "norm": norm}))
     out = (np.abs(delta) > axis).any(axis=1) | (length(delta) > norm)
     assert found.out_of_tolerance == np.count_nonzero(out)
     assert (found.verdict == "pass") == (not out.any())
@@ -133,7 +133,7 @@ def test_it_is_the_verdict_of_compare(delta: FloatArray, which: list[str], row: 
     sizes = dict(zip(("x", "y", "z", "norm"), np.abs(values[row % len(values)]).tolist(), strict=True))
     tolerance = {kind: share * sizes.get(kind, sizes["y"]) for kind in which}
     assume(min(tolerance.values()) > 0.0)  # compare tells no share of nothing
-    found = delta_verdict("meter", np.arange(len(delta)), delta, tolerance)
+    found = judge_delta_meter("meter", np.arange(len(delta)), delta, tolerance)
     measured = [Quantity(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
     every = [
         compute_statistics(one, np.arange(len(delta)) / 1e9, np.arange(len(delta)), tolerance)

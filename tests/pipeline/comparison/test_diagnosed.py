@@ -12,7 +12,7 @@ from diagnoses import LENGTH, SIGN, diagnosis_of
 from made_runs import off, path_run, run_of
 from presented import cells, facts, figures, scene_of
 from urmpipe_models.errors import Hint, OptionError
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.facts import decisive_facts
 from urmpipe_pipeline.comparison.mended import cause_marks
@@ -167,4 +167,4 @@ def test_an_alignment_is_refused_with_a_diagnosis() -> None:
     options = CompareOptions(align="rigid", diagnose=True)
     path, arm = path_run(off(0.1)), run_of(np.zeros((100, 6)), recorded=off(0.1))
     assert refusal(OptionError, compare_runs, path, [path], options) == ALIGNED
-    assert refusal(OptionError, compare_recorded, arm, options) == ALIGNED
+    assert refusal(OptionError, compare_with_recorded_tcp, arm, options) == ALIGNED

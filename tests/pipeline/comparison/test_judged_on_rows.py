@@ -14,7 +14,7 @@ import urmpipe
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, trajectory
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, tcp_trajectory
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.provenance import build_provenance
@@ -66,7 +66,7 @@ def test_a_spike_of_one_row_keeps_its_height_to_the_bit(
     run = log_to_run(log, UR5E, ReadOptions(), provenance=build_provenance("ingest", {}, ()), tsp=tsp)
     assert run.resampled
     one = compare_runs(path(t, wanted), [run]).runs[0]
-    exact = np.abs(wanted - trajectory(run).position)
+    exact = np.abs(wanted - tcp_trajectory(run).position)
     assert one.statistics["z"].max == exact[row, 2]
     assert one.statistics["z"].sample_max == row
     assert one.row(one.statistics["z"]) == row + 1
@@ -121,7 +121,7 @@ def test_nothing_is_interpolated_across_gaps_and_steps_of_the_reference() -> Non
     lost = np.setdiff1d(np.arange(99), one.sample)
     np.testing.assert_array_equal(lost, [*range(19, 30), 49])
     at = 49  # a point on the straight line across the step: no way leads through it
-    wanted = trajectory(reference)
+    wanted = tcp_trajectory(reference)
     assert wanted.discontinuities is not None
     row = int(wanted.discontinuities[0])
     point = wanted.position[row : row + 2].mean(axis=0)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from asserting import refusal, there
 from made_runs import off
 from urmpipe_models.errors import Finding, LogError, OutputError
-from urmpipe_pipeline.comparison.baseline import against_baseline
+from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.results import present
@@ -117,7 +117,7 @@ def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path
 def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, tmp_path: Path) -> None:
     before = paths({"a": off(0.001), "old": off(0.0)})
     now = paths({"a": off(0.0015)})
-    result = replace(now, baseline=against_baseline(now, before))
+    result = replace(now, baseline=compare_with_baseline(now, before))
     root = written(result, tmp_path / "verdict.xml")
     failures = {
         (case.get("classname"), case.get("name")): case[0] for case in root.iter("testcase") if len(case)
@@ -134,7 +134,7 @@ def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, 
         "old: a log of the baseline, not compared any more"
     )
     with_joints = arms({"a": np.zeros((100, 6))})
-    result = replace(now, baseline=against_baseline(now, with_joints))
+    result = replace(now, baseline=compare_with_baseline(now, with_joints))
     lost = written(result, tmp_path / "verdict.xml").findall(".//testcase[@name='angle is there']/failure")
     assert [one.text for one in lost] == ["angle: in the baseline, not compared any more"]
 
@@ -143,7 +143,7 @@ def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(
     paths: Compared, arms: Compared, tmp_path: Path
 ) -> None:
     before, now = arms({"monday": np.zeros((100, 6))}), paths({"tuesday": off(0.0)})
-    result = replace(now, baseline=against_baseline(now, before))
+    result = replace(now, baseline=compare_with_baseline(now, before))
     gone = ["angle", *(f"q{number}" for number in range(1, 7))]
     assert [str(one) for one in there(result.baseline).missing] == [f"{name} of tuesday" for name in gone]
     root = written(result, tmp_path / "verdict.xml")

@@ -19,7 +19,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.math3d import RotationForm, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, trajectory
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, tcp_trajectory
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.measure import MIN_STD, Quantity, compute_statistics, correlation, measure
@@ -321,7 +321,7 @@ def test_no_size_of_the_blocks_changes_a_bit(kind: str, block_rows: int) -> None
         "poses": tuple(path_run(position, quat, tsp=tsp, name=name) for tsp, name in TWO),
         "path": tuple(path_run(position, tsp=tsp, name=name) for tsp, name in TWO),
     }[kind]
-    reference, log = (replace(trajectory(run), discontinuities=np.array([40, 41])) for run in runs)
+    reference, log = (replace(tcp_trajectory(run), discontinuities=np.array([40, 41])) for run in runs)
     late = np.where(np.arange(300) < 200, 0, 300_000_000)
     reference, log = (replace(side, t_ns=side.t_ns + late) for side in (reference, log))
     missing = log.position.copy()

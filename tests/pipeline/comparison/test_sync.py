@@ -16,7 +16,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison import sync as sync_chapter
-from urmpipe_pipeline.comparison.compare import trajectory
+from urmpipe_pipeline.comparison.compare import tcp_trajectory
 from urmpipe_pipeline.comparison.sync import (
     iter_channels,
     linearise,
@@ -390,7 +390,7 @@ def test_similarity_is_that_of_the_best_turn_where_frames_may_be_turned() -> Non
 def demo() -> dict[str, Trajectory]:
     names = ("path.csv", "coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv")
     runs = load_runs([LOGS / name for name in names], robot=load_robot("urm6"))
-    return {run.name: trajectory(run) for run in runs}
+    return {run.name: tcp_trajectory(run) for run in runs}
 
 
 @pytest.mark.slow

@@ -13,11 +13,11 @@ from four_logs import ALLOWED, NOISE
 from urmpipe_models.errors import OptionError
 from urmpipe_models.measure_units import DEGREE
 from urmpipe_pipeline.comparison.verdict import (
-    LEAST_SHARES,
+    MIN_SHARES,
     UNITS,
-    allowed_for,
     check_tolerance,
     parse_tolerance,
+    tolerance_for,
 )
 
 NUMBERS = (
@@ -50,7 +50,7 @@ def test_what_is_written_is_found_in_si(text: str, found: dict[str, float]) -> N
     assert parse_tolerance(text) == found
 
 
-@given(st.floats(1e-9, 1e3), st.sampled_from(sorted(UNITS.keys() - LEAST_SHARES)))
+@given(st.floats(1e-9, 1e3), st.sampled_from(sorted(UNITS.keys() - MIN_SHARES)))
 def test_a_number_in_si_comes_back_bit_for_bit(value: float, kind: str) -> None:
     unit = UNITS[kind].removesuffix("1")  # a share has none
     value = value if unit else min(value, 1.0)
@@ -160,7 +160,7 @@ def test_a_tolerance_in_numbers_is_checked_whole() -> None:
 
 def test_a_coordinate_goes_before_the_axes_and_a_joint_of_that_name_does_not() -> None:
     tolerance = {"axis": 1.0, "z": 2.0, "joint": 3.0}
-    assert allowed_for("x", "axis", tolerance) == 1.0
-    assert allowed_for("z", "axis", tolerance) == 2.0
-    assert allowed_for("z", "joint", tolerance) == 3.0
-    assert allowed_for("norm", "norm", tolerance) is None
+    assert tolerance_for("x", "axis", tolerance) == 1.0
+    assert tolerance_for("z", "axis", tolerance) == 2.0
+    assert tolerance_for("z", "joint", tolerance) == 3.0
+    assert tolerance_for("norm", "norm", tolerance) is None

@@ -18,7 +18,7 @@ from presented import cells, every_section, facts, scene_of
 from repeated import along, still
 from urmpipe.printing.results import print_presentation
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.baseline import against_baseline
+from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.exports import exports
@@ -97,7 +97,7 @@ def test_without_a_tolerance_nothing_is_judged(tmp_path: Path) -> None:
     assert all(one.verdict is None and not one.checks for one in every_section(shown.body))
     assert [one.title for one in shown.body.tables] == ["Criteria", "Cycles"]
     assert "MEASURED" in render_report([shown])
-    held = against_baseline(result, result)
+    held = compare_with_baseline(result, result)
     with_baseline = present(replace(result, baseline=held))
     assert with_baseline.verdict == "pass" and with_baseline.word == ""
     known = [one.name for one in there(result.iso).overall if one.value is not None]

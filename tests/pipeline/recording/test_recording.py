@@ -18,8 +18,8 @@ import made_runs
 from asserting import there
 from same_results import assert_same
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.comparison.baseline import against_baseline
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.baseline import compare_with_baseline
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.presentation.result import Result
@@ -127,7 +127,7 @@ def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_
     earlier = replace(
         make_comparison(("matlab", "old")), tolerance={"axis": 0.002}, recording=Path("before.rrd")
     )
-    baseline = against_baseline(comparison, earlier, {"axis": 1e-5})
+    baseline = compare_with_baseline(comparison, earlier, {"axis": 1e-5})
     assert baseline.changes and baseline.new and baseline.missing and baseline.differences
     comparison = replace(comparison, baseline=baseline)
     assert_same(round_trip(comparison, tmp_path), comparison)
@@ -145,7 +145,7 @@ def test_a_comparison_with_samples_left_out_comes_back_as_it_was(make_run: MakeR
 
 def test_comparisons_with_recorded_poses_come_back_as_they_were(make_run: MakeRun, tmp_path: Path) -> None:
     reference, log = full(make_run("asked for")), full(make_run("log"))
-    own = compare_recorded(log)
+    own = compare_with_recorded_tcp(log)
     assert_same(round_trip(own, tmp_path), own)
     comparison = compare_runs(reference, [log], CompareOptions(tcp="recorded"))
     assert (comparison.runs[0].angle is None, comparison.runs[0].left_out) == (False, 1)

@@ -15,7 +15,7 @@ from asserting import there
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_with_recorded_tcp
 from urmpipe_pipeline.runs.derivatives import WINDOW, Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions
@@ -71,7 +71,7 @@ def test_real_jumps_that_are_no_wraps_stay(shared: Path) -> None:
 def test_a_real_controller_log_agrees_with_the_catalogue(shared: Path) -> None:
     log = shared / "logs" / "ur5e-rtde-static" / "robot_data.csv"
     run = ingest_log([log], robot=load_robot("ur5e"))
-    result = compare_recorded(run, CompareOptions({"axis": 0.002}))
+    result = compare_with_recorded_tcp(run, CompareOptions({"axis": 0.002}))
     assert result.verdict == "pass"
     assert 0.001 < result.runs[0].statistics["norm"].max < 0.002  # nominal geometry: within 1.6 mm
 
