@@ -47,7 +47,7 @@ def format_cause(cause: Cause) -> str:
 
 
 def short_name(cause: Cause) -> str:
-    """Return what a cause is called among twins: "offset of q3", "tool shift x", "segment 4 sideways y"."""
+    """Return the name of a cause in lists: "offset of q3", "tool shift x", "segment 4 sideways y"."""
     return KIND_TEXTS[cause.kind].short(cause)
 
 
@@ -84,14 +84,12 @@ def _undetermined(cause: Cause) -> list[str]:
     return [f"±{half * factor:.2g} {unit}" if half > largest else "" for half in half_widths.tolist()]
 
 
-DIRECTIONS = {
+DIRECTIONS = {  # text of a value above and below 0 in a clause; others keep their sign
     "joint_offset": ("too low", "too high"),  # the value is what has to be added
     "time_lag": ("early", "late"),
     "joint_lag": ("early", "late"),
     "clock_drift": ("slow", "fast"),
 }
-"""What a value above and below 0 is called in a clause; others keep their sign."""
-
 UNSIGNED = ("servo_lag", "backlash", "sag", "outliers")
 
 
@@ -208,7 +206,7 @@ class KindText(NamedTuple):
 
     Attributes:
         label: What the kind is called.
-        short: Returns what a cause is called among twins.
+        short: Returns the name of a cause in lists.
         clause: Returns a cause as a clause.
         remedy: Returns what removes it.
     """

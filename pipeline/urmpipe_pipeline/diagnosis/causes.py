@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 
-Kind = Literal[
+Kind = Literal[  # of a cause
     "time_lag", "clock_drift", "servo_lag", "joint_lag",
     "base_shift", "base_rotation", "base_mirrored", "tool_shift", "tool_rotation", "path_unit",
     "joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored", "turns",
@@ -17,8 +17,6 @@ Kind = Literal[
     "link_length", "link_shift", "tilt", "own_geometry",
     "other_robot", "outliers",
 ]  # fmt: skip
-"""What may make two sides deviate."""
-
 STRUCTURE = ("link_length", "link_shift", "tilt")
 CLOCKS = ("time_lag", "clock_drift")
 TOO_LARGE = "more than any arm differs by"  # reasons of refusals
@@ -28,29 +26,29 @@ NOT_CONSTANT = "what would fit changes during the log"
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One cause: what is added to the robot or to the reading of the log so that the sides agree.
+    """One cause: a change of the robot or of the reading of the log with which the sides agree.
 
     Attributes:
-        kind: What it is.
-        name: What it is of: a joint as the arm calls it, two with " and " between them, a parameter or
+        kind: Its kind.
+        name: What it is of: a joint by the arm's name, two with " and " between them, a parameter or
             segment of the chain, base or tool, the side and unit of a path, the axes of a mirrored base
             ("(x, y, -z)"), the clock, all joints, another robot, rows.
-        joints: The joints it is of, as the log calls them; none of other causes.
-        segment: The point p1..pn that ends the segment it is of; None of other causes.
-        axis: Unit vector along or about which it acts, in the frame of segment, base or tool [-]; None of
-            other causes, and of a base or tool with three numbers.
-        value: One number, three of base and tool, none of signs and exchanges, in `unit`. Of a backlash the
-            whole play, of a sag 1 / stiffness, of a coupling -1 if the first joint includes the second, of
-            outliers their least and their largest distance, or one of about both.
+        joints: Its joints, by the log's names; empty for other causes.
+        segment: The point p1..pn that ends its segment; None for other causes.
+        axis: Unit vector along or about which it acts, in the frame of segment, base or tool [-]; None for
+            other causes, and for a base or tool with three numbers.
+        value: One number, three for base and tool, empty for signs and exchanges, in `unit`. Of a backlash
+            the full play, of a sag 1 / stiffness, of a coupling -1 if the first joint includes the second, of
+            outliers their least and their largest distance, or one if both are similar.
         unit: m, rad, s, s2 (of q'' in q), s/s, turns, rad/(N m), m/N, rad/kg, m/kg (of a sag without masses:
-            of each kg at the tool centre point), or empty of a factor.
-        low: Lower end of the 95 % interval of each number; none where nothing was fitted.
+            of each kg at the tool centre point), or empty for a factor.
+        low: Lower end of the 95 % interval of each number; empty if nothing was fitted.
         high: Upper end.
         from_sample: Row of the log, from 0, from which on it holds; None for all of them.
-        rows: Rows of the log, from 0, that are outliers; none of other causes.
+        rows: Rows of the log, from 0, that are outliers; empty for other causes.
         equivalents: Short names of equivalent causes: they move the tool centre point in the same way.
         rms_before: Root mean square of the deviation in the unit of the diagnosis, without the causes that
-            stand before this one.
+            precede this one.
         rms_after: The same without this one, too.
         rms_alone: Root mean square without this cause alone.
         effect: Largest deviation that this cause alone makes, in the unit of the diagnosis.
@@ -105,7 +103,7 @@ class Alternative:
     """One of several explanations between which the log does not decide.
 
     Attributes:
-        causes: What it takes; none for the explanation that nothing of the kind is there.
+        causes: Its causes; empty if none of those of the other alternatives is there.
         discriminating_joint: The joint whose motion would decide; empty if none would.
     """
 
@@ -115,7 +113,7 @@ class Alternative:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
         return {
-            "causes": [one.to_dict() for one in self.causes],
+            "causes": [cause.to_dict() for cause in self.causes],
             "discriminating_joint": self.discriminating_joint or None,
         }
 
@@ -125,9 +123,9 @@ class UnidentifiableCauses:
     """Causes that leave less, but that this motion does not determine.
 
     Attributes:
-        causes: What was fitted.
-        reason: Why it is not believed.
-        discriminating_joint: The joint whose motion would determine it; empty if none would.
+        causes: The fitted causes.
+        reason: Why they are refused.
+        discriminating_joint: The joint whose motion would determine them; empty if none would.
     """
 
     causes: tuple[Cause, ...]
@@ -136,9 +134,8 @@ class UnidentifiableCauses:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
-        causes = [one.to_dict() for one in self.causes]
         return {
-            "causes": causes,
+            "causes": [cause.to_dict() for cause in self.causes],
             "reason": self.reason,
             "discriminating_joint": self.discriminating_joint or None,
         }
@@ -149,7 +146,7 @@ class RecordedTcpCheck:
     """Distance of the kinematics of a side from the tool centre point that it recorded.
 
     Attributes:
-        name: What the side is called.
+        name: Name of the side.
         rms: Root mean square distance in [m].
         max: Largest distance in [m].
         agrees: Whether that is within the tolerance, with the tool as it is given.
@@ -169,8 +166,8 @@ class UntestedCauses:
     """Causes that these sides cannot show.
 
     Attributes:
-        kinds: Which.
-        reason: Why not.
+        kinds: Their kinds.
+        reason: Why they are not shown.
     """
 
     kinds: tuple[str, ...]
@@ -182,8 +179,8 @@ class Unexplained:
     """Deviation that no named cause explains.
 
     Attributes:
-        rms: Root mean square of what stays, in the unit of the diagnosis.
-        interpretation: What it is taken for, where that is known; else empty.
+        rms: Its root mean square, in the unit of the diagnosis.
+        interpretation: Its probable reason, or empty.
         is_unrelated_motion: Whether it is so large that the two sides are probably different motions.
     """
 

@@ -1,4 +1,4 @@
-"""Presentation of a diagnosis: the answer, what to do, tables of causes, what was not tested."""
+"""Presentation of a diagnosis: the answer, what to do, tables of causes, and untested causes."""
 
 from __future__ import annotations
 
@@ -36,17 +36,11 @@ NOTE = (
 
 MAX_NAMED = 3  # equivalent causes, and kinds untested for one reason, in a line of a terminal
 EXPLAINED = {"explanation": "Explanation", "interval": "95 % interval", "equivalents": "equivalent causes"}
-DETAILS = (
-    "value",
-    "from_row",
-    "rms_alone",
-    "equivalents",
-    "exceeds_tolerance",
-)  # only a page has room for these
+DETAILS = ("value", "from_row", "rms_alone", "equivalents", "exceeds_tolerance")  # only in a page
 
 
 def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
-    """Return what a diagnosis alone shows; a report and a recording show its comparison.
+    """Return the presentation of a diagnosis alone; a report and a recording show its comparison.
 
     Args:
         diagnosis: The diagnosis.
@@ -74,14 +68,17 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
     has_residual = diagnosis.causes or diagnosis.undecided  # else the answer says it
     residual = format_residual(diagnosis.unexplained, diagnosis.unit) if has_residual else ""
     single = diagnosis.causes[0] if len(diagnosis.causes) == 1 else None
+
+    equivalents = ""
+    if single and single.equivalents and not undecided:
+        equivalents = " or ".join([short_name(single), *_shorten(single.equivalents, MAX_NAMED)])
     own_tcp = "; ".join(map(format_own_tcp, diagnosis.recorded_tcp))
     return (
         Fact("Diagnosis" if diagnosis.verdict == "pass" else "Cause", diagnosis.summary, leads=True),
         Fact("Meaning", _meaning(diagnosis, hints), brief=False, leads=True),
         Fact("95 % interval", format_interval(single) if single else "", brief=False, page=False),
         Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
-        # tables have all of them
-        Fact("Equivalent causes", _equivalents(single) if single and not undecided else "", page=False),
+        Fact("Equivalent causes", equivalents, page=False),  # tables have all of them
         Fact("Remaining deviation", residual, brief=False, page=False),
         Fact("Own TCP", "" if diagnosis.origin else own_tcp, brief=False),
         Fact("Not tested", "; ".join(_untested(diagnosis)), brief=False),
@@ -105,23 +102,16 @@ def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
     return Advice("; ".join(steps), tuple(hints))
 
 
-def _equivalents(cause: Cause) -> str:
-    """Return a cause and what the log does not distinguish from it."""
-    return (
-        " or ".join([short_name(cause), *_named(cause.equivalents, MAX_NAMED)]) if cause.equivalents else ""
-    )
-
-
 def _untested(diagnosis: Diagnosis, most: int | None = None) -> Iterator[str]:
     """Yield which kinds were not tested, and why; without the reason that the answer gives."""
     for untested in diagnosis.untested:
         if untested.reason != diagnosis.unexplained.interpretation:
             labels = [KIND_TEXTS[kind].label for kind in untested.kinds]
-            yield f"{text.enumerated(_named(labels, most))} ({untested.reason})"
+            yield f"{text.enumerated(_shorten(labels, most))} ({untested.reason})"
 
 
-def _named(names: Sequence[str], most: int | None) -> list[str]:
-    """Return at most so many names, and how many more there are."""
+def _shorten(names: Sequence[str], most: int | None) -> list[str]:
+    """Return at most `most` names, and the number of the others."""
     more = 0 if most is None else len(names) - most
     return [*names[:most], f"{more} more"] if more > 1 else list(names)
 
@@ -138,7 +128,7 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
         yield Table("Causes", tuple(columns), NOTE, several, page=shown)
     if diagnosis.undecided:
         heads = {**EXPLAINED, "discriminating_joint": "more motion of this decides"}
-        rows = [(*_explained(one), one.discriminating_joint or "none") for one in diagnosis.undecided]
+        rows = [(*_explained(each), each.discriminating_joint or "none") for each in diagnosis.undecided]
         table = table_of("Undecided between", heads, rows, brief=True)
         yield replace(table, columns=(*table.columns[:-1], replace(table.columns[-1], brief=False)))
     if diagnosis.unidentifiable:
@@ -148,19 +138,19 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
         }  # fmt: skip
         refused = [
             (
-                *_explained(one), format_amount(one.causes[-1].rms_after, diagnosis.unit),
-                one.reason, one.discriminating_joint or "none",
+                *_explained(each), format_amount(each.causes[-1].rms_after, diagnosis.unit),
+                each.reason, each.discriminating_joint or "none",
             )
-            for one in diagnosis.unidentifiable
+            for each in diagnosis.unidentifiable
         ]  # fmt: skip
         yield table_of("Not determined by this motion", heads, refused)
 
 
 def _explained(explanation: Alternative | UnidentifiableCauses) -> tuple[str, str, str]:
-    """Return the causes of an explanation, their intervals, and their twins."""
+    """Return the causes of an explanation, their intervals, and their equivalents."""
     intervals = "; ".join(filter(None, map(format_interval, explanation.causes)))
-    twins = ", ".join(twin for cause in explanation.causes for twin in cause.equivalents)
-    return format_explanation(explanation), intervals, twins
+    equivalents = ", ".join(name for cause in explanation.causes for name in cause.equivalents)
+    return format_explanation(explanation), intervals, equivalents
 
 
 def _heads(unit: str) -> Heads[Cause]:
@@ -178,7 +168,7 @@ def _heads(unit: str) -> Heads[Cause]:
         "rms_alone": ("without it alone", lambda cause: Value(cause.rms_alone, unit)),
         "few_equivalents": (
             "equivalent causes",
-            lambda cause: ", ".join(_named(cause.equivalents, MAX_NAMED)),
+            lambda cause: ", ".join(_shorten(cause.equivalents, MAX_NAMED)),
         ),
         "equivalents": ("equivalent causes", lambda cause: ", ".join(cause.equivalents)),
         "exceeds_tolerance": (

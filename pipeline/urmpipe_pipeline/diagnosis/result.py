@@ -1,6 +1,7 @@
-"""What a diagnosis finds, and its summary: the same in the terminal, the recording and the report.
+"""The result of a diagnosis, and its summary: the same in the terminal, the recording and the report.
 
-The summary: a passed log, causes in order with what each takes away, what is undecided or not determined.
+The summary: a passed log, the causes in order, each with the rms before and after it, then what is undecided
+or not determined.
 """
 
 from __future__ import annotations
@@ -47,24 +48,24 @@ class Diagnosis(Result):
     Attributes:
         name: The log's name.
         verdict: That of the comparison; None if nothing was judged.
-        samples: How many samples were looked at.
+        samples: Number of samples.
         unit: m of positions, rad of joints alone.
         rms: Root mean square of the deviation before, in `unit`.
-        causes: What was found: clocks first, then in the order of what each takes away after those before.
+        causes: The causes: clocks first, then what reduces the rms most after those before.
         undecided: Explanations between which the log does not decide.
         untested: Causes that these sides cannot show, and why.
         unexplained: Deviation left after the causes.
         sample: Rows of the log, from 0, of the residual, shape (m,).
         residual: reference - log after the causes are removed: x, y, z in [m], shape (m, 3), or the joints
             in [rad] or [m], shape (m, joints).
-        warnings: What a person should know.
-        recording: Where it was written.
-        comparison: The comparison that it stands in, where `urmpipe.diagnose` made it.
+        warnings: Warnings.
+        recording: The file it was written to.
+        comparison: The comparison that contains it, if `urmpipe.diagnose` made it.
         shares: In 0..1, on which the verdict and the causes rest: coverage of the reference, judged of
             the log's motion.
         unidentifiable: Explanations that this motion does not determine.
         recorded_tcp: How far each side with joints is from its recorded tool centre point.
-        origin: Name of the side that the causes are in, as its own tool centre point shows; empty if unknown.
+        origin: Name of the side with the causes, by the recorded tool centre points; empty if unknown.
     """
 
     name: str
@@ -96,14 +97,15 @@ class Diagnosis(Result):
         return f"{self.name}: {self.summary}"
 
     def _notes(self) -> list[str]:
-        """Return what is to be known of it."""
-        return [str(one) for one in self.warnings]
+        """Return its warnings."""
+        return list(map(str, self.warnings))
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a cause: kind, name, value, interval and rms before and after it, in SI."""
+        """Return one row per cause: kind, name, value, interval and rms before and after it, in SI."""
         import pandas as pd
 
-        return pd.DataFrame([one.to_dict() for one in self.causes], columns=list(_NO_CAUSE.to_dict()))
+        rows, columns = [cause.to_dict() for cause in self.causes], list(_NO_CAUSE.to_dict())
+        return pd.DataFrame(rows, columns=columns)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe diagnose --json` prints."""
@@ -115,14 +117,14 @@ class Diagnosis(Result):
             **{"coverage": None, "judged": None, **self.shares},
             "unit": self.unit,
             "rms": self.rms,
-            "causes": [one.to_dict() for one in self.causes],
-            "undecided": [one.to_dict() for one in self.undecided],
-            "unidentifiable": [one.to_dict() for one in self.unidentifiable],
-            "recorded_tcp": [asdict(one) for one in self.recorded_tcp],
+            "causes": [cause.to_dict() for cause in self.causes],
+            "undecided": [alternative.to_dict() for alternative in self.undecided],
+            "unidentifiable": [causes.to_dict() for causes in self.unidentifiable],
+            "recorded_tcp": list(map(asdict, self.recorded_tcp)),
             "origin": self.origin or None,
-            "untested": [asdict(one) for one in self.untested],
+            "untested": list(map(asdict, self.untested)),
             "unexplained": asdict(self.unexplained),
-            "warnings": [one.to_dict() for one in self.warnings],
+            "warnings": [warning.to_dict() for warning in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
 
@@ -131,7 +133,7 @@ _NO_CAUSE = Cause("joint_sign", "")
 
 
 def format_summary(diagnosis: Diagnosis) -> str:
-    """Return the answer in one summary."""
+    """Return the answer in one sentence."""
     causes, alternatives, residual = diagnosis.causes, diagnosis.undecided, diagnosis.unexplained
     before, after = (format_amount(rms, diagnosis.unit) for rms in (diagnosis.rms, residual.rms))
     if residual.is_unrelated_motion:
@@ -159,7 +161,7 @@ def format_summary(diagnosis: Diagnosis) -> str:
 
 
 def _moves_nothing(cause: Cause, unit: str) -> bool:
-    """Tell whether a cause leaves all positions: a turn about the tool centre point, whole turns."""
+    """Return whether a cause changes no position: a turn about the tool centre point, whole turns."""
     still = cause.effect < UNMOVED and abs(cause.rms_after - cause.rms_before) < UNMOVED
     return unit == "m" and still and cause.kind not in ("outliers", "own_geometry")
 
@@ -167,15 +169,16 @@ def _moves_nothing(cause: Cause, unit: str) -> bool:
 def select_causes(causes: Sequence[Cause]) -> list[Cause]:
     """Return the causes of a summary in their order: all that break the tolerance, others up to three.
 
-    With them those that they partly cancel.
+    Causes that they partly cancel are added.
     """
     listed = [cause for cause in causes if cause.exceeds_tolerance]
     listed += [cause for cause in causes if not cause.exceeds_tolerance][: max(MAX_CAUSES - len(listed), 0)]
-    return [cause for step in _split_steps(causes) if any(one in listed for one in step) for cause in step]
+    steps = (step for step in _split_steps(causes) if any(cause in listed for cause in step))
+    return [cause for step in steps for cause in step]
 
 
 def _split_steps(causes: Sequence[Cause]) -> list[list[Cause]]:
-    """Return causes in steps that each lower the rms: those that partly cancel each other stand in one."""
+    """Return causes in steps that each lower the rms: those that partly cancel each other are one step."""
     steps: list[list[Cause]] = []
     for cause in causes:
         if steps and _is_joinable(steps[-1], cause) and not _lowers(steps[-1]):
@@ -196,12 +199,12 @@ def _lowers(step: Sequence[Cause]) -> bool:
 
 
 def _format_avoidable(diagnosis: Diagnosis) -> str:
-    """Return how much of the deviation of a passed log would go, and under which condition."""
+    """Return how much of the deviation of a passed log could be removed, and how."""
     unit, listed = diagnosis.unit, select_causes(diagnosis.causes)
-    some, all_of_it = diagnosis.rms - diagnosis.unexplained.rms, diagnosis.rms
-    little = "only " if some < MIN_EXPLAINED * all_of_it else ""
-    amount = "next to nothing" if some < NOTHING * all_of_it else f"{little}{format_amount(some, unit)}"
-    amounts = f"{amount} of {format_amount(all_of_it, unit)} rms"
+    before, removed = diagnosis.rms, diagnosis.rms - diagnosis.unexplained.rms
+    little = "only " if removed < MIN_EXPLAINED * before else ""
+    amount = "next to nothing" if removed < NOTHING * before else f"{little}{format_amount(removed, unit)}"
+    amounts = f"{amount} of {format_amount(before, unit)} rms"
     undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
     if not listed:
         return f"{amounts} is explained: {undecided}"
@@ -248,7 +251,7 @@ def _in_chain(change: str, *, is_first: bool) -> str:
 
 
 def _format_others(cause: Cause, diagnosis: Diagnosis, *, is_last: bool) -> str:
-    """Return what the rows show that are no outliers."""
+    """Return the rms of the rows that are no outliers."""
     rms = format_amount(cause.rms_after, diagnosis.unit)
     if not is_last:
         return f"without {'them' if len(cause.rows) > 1 else 'it'} {rms} rms"
@@ -263,13 +266,14 @@ def _format_more(diagnosis: Diagnosis, listed: Sequence[Cause]) -> str:
 
 
 def _format_origin(diagnosis: Diagnosis) -> str:
-    """Return which side has the causes, as the other side's own tool centre point shows."""
-    names = [side for side in diagnosis.recorded_tcp if side.agrees and side.name != diagnosis.origin]
+    """Return which side has the causes, as the recorded tool centre points show."""
     if not diagnosis.origin:
         return ""
+    agreeing = [side for side in diagnosis.recorded_tcp if side.agrees and side.name != diagnosis.origin]
+    reason = f"the TCP that {diagnosis.origin} recorded follows the other side"
+    reason = format_own_tcp(agreeing[0]) if agreeing else reason
     causes = "that is" if len(diagnosis.causes) < 2 else "these are"
-    follows = f"the TCP that {diagnosis.origin} recorded follows the other side"
-    return f"; {format_own_tcp(names[0]) if names else follows}, so {causes} in {diagnosis.origin}"
+    return f"; {reason}, so {causes} in {diagnosis.origin}"
 
 
 def format_own_tcp(side: RecordedTcpCheck) -> str:
@@ -283,18 +287,14 @@ def format_own_tcp(side: RecordedTcpCheck) -> str:
 def format_undecided(alternatives: Sequence[Alternative]) -> str:
     """Return what a log does not decide between: "either A or B (more motion of phi5 would decide)"."""
     listed = alternatives[:MAX_LISTED]
-    listed = listed[:1] if sum(len(one.causes) for one in listed) > MAX_UNDECIDED else listed
+    listed = listed[:1] if sum(len(alternative.causes) for alternative in listed) > MAX_UNDECIDED else listed
     clauses = [format_explanation(alternative) for alternative in listed]
     more = len(alternatives) - len(listed)
     clauses += [f"{more} more" if more > 1 else "another"] if more > 0 else []
-    needs = list(
-        dict.fromkeys(
-            alternative.discriminating_joint
-            for alternative in alternatives
-            if alternative.discriminating_joint
-        )
+    joints = dict.fromkeys(filter(None, (each.discriminating_joint for each in alternatives)))
+    decides = (
+        f"more motion of {text.enumerated([*joints])} would decide" if joints else "this log cannot decide"
     )
-    decides = f"more motion of {text.enumerated(needs)} would decide" if needs else "this log cannot decide"
     return f"either {' or '.join(clauses)} ({decides})"
 
 
@@ -304,17 +304,14 @@ def format_explanation(explanation: Alternative | UnidentifiableCauses) -> str:
 
 
 def format_refusal(refused: UnidentifiableCauses) -> str:
-    """Return why causes are not believed, and which motion would determine them."""
+    """Return why causes are refused, and which motion would determine them."""
     if len(refused.causes) > 1 and refused.reason == NOT_CONSTANT:
         return f"not determined by this motion: {refused.reason}"
-    if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines so many
+    if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines them
         return f"not determined by this motion: {len(refused.causes)} causes ({refused.reason})"
-    needs = (
-        f"; more motion of {refused.discriminating_joint} would determine it"
-        if refused.discriminating_joint
-        else ""
-    )
-    return f"not determined by this motion: {format_explanation(refused)} ({refused.reason}){needs}"
+    joint = refused.discriminating_joint
+    remedy = f"; more motion of {joint} would determine it" if joint else ""
+    return f"not determined by this motion: {format_explanation(refused)} ({refused.reason}){remedy}"
 
 
 def format_residual(residual: Unexplained, unit: str) -> str:
