@@ -60,19 +60,26 @@ def written(
     path: Path, values: FloatArray, t: NDArray[np.floating] | None = None, names: Sequence[str] = PLACE
 ) -> Path:
     """Write a log (CSV) with all digits; a row a tick, or at times in [s]; nothing where a value is NaN."""
-    times = TICK * np.arange(len(values)) if t is None else t
-    lines = [",".join(("t [s]", *names))]
-    for at, row in zip(times.tolist(), values.tolist(), strict=True):
-        lines.append(",".join((f"{at:.9f}", *map(_cell, row))))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text(log_text(values, t, names), encoding="utf-8")
     return path
+
+
+def log_text(values: FloatArray, t: NDArray[np.floating] | None = None, names: Sequence[str] = PLACE) -> str:
+    """Return the log that `written` writes."""
+    times = TICK * np.arange(len(values)) if t is None else t
+    cells = ((f"{at:.9f}", *map(_cell, row)) for at, row in zip(times.tolist(), values.tolist(), strict=True))
+    return "".join(",".join(row) + "\n" for row in (("t [s]", *names), *cells))
 
 
 def still(path: Path, values: FloatArray, names: Sequence[str] = PLACE) -> Path:
-    """Write still poses (CSV): rows without a time."""
-    lines = [",".join(names), *(",".join(map(_cell, row)) for row in values.tolist())]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    """Write static poses (CSV): rows without a time."""
+    path.write_text(still_text(values, names), encoding="utf-8")
     return path
+
+
+def still_text(values: FloatArray, names: Sequence[str] = PLACE) -> str:
+    """Return the static poses that `still` writes."""
+    return "".join(",".join(row) + "\n" for row in (names, *(map(_cell, row) for row in values.tolist())))
 
 
 def logs(folder: Path, cycles: Iterable[FloatArray], names: Sequence[str] = PLACE) -> list[Path]:
@@ -86,10 +93,14 @@ def judged(result: Comparison) -> IsoTest:
     return result.iso
 
 
+def evaluated(reference: Path, done: Path | Sequence[Path], **options: object) -> Comparison:
+    """Return the comparison of a test."""
+    return urmpipe.iso(reference, done, **options)  # type: ignore[arg-type]
+
+
 def told(reference: Path, done: Path | Sequence[Path], **options: object) -> IsoTest:
     """Return what the cycles of a test tell."""
-    many = done if isinstance(done, Path) else list(done)
-    return judged(urmpipe.iso(reference, many, **options))  # type: ignore[arg-type]
+    return judged(evaluated(reference, done if isinstance(done, Path) else list(done), **options))
 
 
 def values_of(test: IsoTest) -> dict[tuple[str, str | None], float | None]:
@@ -132,6 +143,18 @@ def along(
     row = np.rint(np.array(t) / tick)
     every = np.arange(row[-1] + 1)
     return np.column_stack([np.interp(every, row, column) for column in np.array(nodes).T])
+
+
+def late(path: FloatArray, rows: int) -> FloatArray:
+    """Return a motion that follows another with a lag, which rounds corners, and swings beyond them."""
+    position, speed, positions = path[0].copy(), np.zeros(3), []
+    rate = 1.0 / (TICK * rows)
+    for commanded in path:
+        for _ in range(10):
+            speed = speed + 0.1 * TICK * ((commanded - position) * rate**2 - speed * rate)
+            position = position + 0.1 * TICK * speed
+        positions.append(position.copy())
+    return np.array(positions)
 
 
 def curve(points: FloatArray, speed: float, *, rest: float = 0.5, tick: float = TICK) -> FloatArray:

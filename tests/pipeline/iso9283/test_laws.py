@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from repeated import PLACE, along, logs, overall, still, told, value, values_of, written
+from asserting import there
+from made_runs import path_run
+from repeated import TICK, along, overall, still, told, value, values_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import to_matrices, to_quaternions
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.iso9283.criteria import UNITS, repeatability
+from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.iso9283.result import IsoTest
+from urmpipe_pipeline.runs.run import Run
 
-QUAT = (*PLACE, "qx", "qy", "qz", "qw")
 CORNERS = ((0.0, 0.0, 0.3), (0.15, 0.0, 0.3), (0.15, 0.1, 0.3), (0.0, 0.1, 0.325), (0.05, 0.05, 0.3))
 WAY_IN = (0.8, -0.6, -0.1)
 """About the direction of the last leg."""
@@ -76,26 +79,33 @@ def cycles() -> Iterator[tuple[FloatArray, FloatArray]]:
         yield place, turns
 
 
-def moved(folder: Path, rotation: FloatArray, shift: Sequence[float]) -> IsoTest:
+def evaluated(reference: FloatArray, *cycles: FloatArray, planes: int = 20) -> IsoTest:
+    """The test of positions in [m], shape (n, 3), or with quaternions, shape (n, 7), a row each 5 ms."""
+
+    def run(rows: FloatArray, name: str) -> Run:
+        return path_run(rows[:, :3], rows[:, 3:] if rows.shape[1] > 3 else None, name=name, tsp=TICK)
+
+    runs = [run(cycle, f"cycle{k}") for k, cycle in enumerate(cycles)]
+    options = CompareOptions({}, iso=IsoOptions(planes=planes))
+    return there(compare_runs(run(reference, "command"), runs, options).iso)
+
+
+def moved(rotation: FloatArray, shift: Sequence[float]) -> IsoTest:
     """The test of command and cycles, all of them moved."""
-    folder.mkdir(exist_ok=True)
 
     def rows(place: FloatArray, turns: FloatArray) -> FloatArray:
         quat = to_quaternions((rotation @ turns).reshape(-1, 9), "matrix")
         return np.column_stack((place @ rotation.T + np.asarray(shift), quat))
 
     wanted = command()
-    still_turns = turned(len(wanted))
     moving = np.linalg.norm(np.gradient(wanted, axis=0), axis=1) > 1e-9
     last = np.maximum.accumulate(np.where(moving, np.arange(len(wanted)), 0))
-    reference = written(folder / "command.csv", rows(wanted, still_turns[last]), None, QUAT)
-    done = logs(folder, (rows(*one) for one in cycles()), QUAT)
-    return told(reference, done, planes=20)
+    return evaluated(rows(wanted, turned(len(wanted))[last]), *(rows(*one) for one in cycles()))
 
 
 @pytest.fixture(scope="module")
-def unmoved(tmp_path_factory: pytest.TempPathFactory) -> IsoTest:
-    return moved(tmp_path_factory.mktemp("unmoved"), np.eye(3), (0.0, 0.0, 0.0))
+def unmoved() -> IsoTest:
+    return moved(np.eye(3), (0.0, 0.0, 0.0))
 
 
 def same(one: IsoTest, other: IsoTest, names: set[str]) -> None:
@@ -122,9 +132,7 @@ def test_the_set_tells_every_criterion_but_vap(unmoved: IsoTest) -> None:
 def test_rigid_motion_of_both_sides_changes_no_position(
     unmoved: IsoTest, shift: tuple[float, ...], axis: tuple[float, ...], angle: float
 ) -> None:
-    with TemporaryDirectory() as folder:
-        other = moved(Path(folder), about(axis, angle), shift)
-    same(unmoved, other, set(UNITS) - ANGLES)
+    same(unmoved, moved(about(axis, angle), shift), set(UNITS) - ANGLES)
 
 
 @pytest.mark.slow
@@ -133,16 +141,14 @@ def test_rigid_motion_of_both_sides_changes_no_position(
 def test_shifts_and_turns_about_the_base_change_no_angle(
     unmoved: IsoTest, shift: tuple[float, ...], angle: float
 ) -> None:
-    with TemporaryDirectory() as folder:
-        same(unmoved, moved(Path(folder), about((0.0, 0.0, 1.0), angle), shift), set(UNITS))
+    same(unmoved, moved(about((0.0, 0.0, 1.0), angle), shift), set(UNITS))
 
 
 @pytest.mark.slow
-def test_identical_cycles_have_no_spread(tmp_path: Path) -> None:
+def test_identical_cycles_have_no_spread() -> None:
     place, turns = next(cycles())
     rows = np.column_stack((place, to_quaternions(turns.reshape(-1, 9), "matrix")))
-    reference = written(tmp_path / "command.csv", rows, None, QUAT)
-    values = overall(told(reference, logs(tmp_path, [rows] * 5, QUAT), planes=20))
+    values = overall(evaluated(rows, *[rows] * 5))
     for name in ("RP", "RT", "RD", "RV", *(name for name in ANGLES if name.startswith("R"))):
         # The mean of five equal doubles is rounded once: 1e-16 of lengths and angles below 1.
         assert values[name] == pytest.approx(0.0, abs=1e-15), name
@@ -156,10 +162,7 @@ def test_identical_cycles_have_no_spread(tmp_path: Path) -> None:
 @given(SHIFTS)
 def test_a_constant_shift_is_the_accuracy(shift: tuple[float, ...]) -> None:
     s, wanted = np.array(shift), command()
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        reference = written(folder / "command.csv", wanted)
-        iso = told(reference, logs(folder, [wanted + s] * 3), planes=20)
+    iso = evaluated(wanted, *[wanted + s] * 3)
     corners = np.array(CORNERS)
     ways = np.diff(corners, axis=0) / np.linalg.norm(np.diff(corners, axis=0), axis=1)[:, np.newaxis]
     across = [float(np.linalg.norm(s - (s @ way) * way)) for way in ways]
@@ -171,18 +174,14 @@ def test_a_constant_shift_is_the_accuracy(shift: tuple[float, ...]) -> None:
 
 
 @pytest.mark.slow
-def test_a_shift_across_both_legs_of_a_corner_is_no_overshoot(tmp_path: Path) -> None:
+def test_a_shift_across_both_legs_of_a_corner_is_no_overshoot() -> None:
     # The mean path runs above the line of the second leg, on neither side of it: rounding must not decide.
     found = []
     corners = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.2, 0.0]])
     for k in range(6):
         turn = about((1.0, 2.0, 3.0), 0.5 * k)
         wanted = along(corners @ turn.T, 0.1, rest=0.2)
-        folder = tmp_path / str(k)
-        folder.mkdir()
-        reference = written(folder / "command.csv", wanted)
-        done = logs(folder, [wanted + turn @ [0.0, 0.0, 1e-3]] * 2)
-        found.append(value(told(reference, done, planes=5), "CO"))
+        found.append(value(evaluated(wanted, *[wanted + turn @ [0.0, 0.0, 1e-3]] * 2, planes=5), "CO"))
     np.testing.assert_allclose(found, found[0], atol=ROUNDING)
 
 
@@ -210,27 +209,16 @@ def test_a_gaussian_cloud_of_visits_has_it_too(tmp_path: Path) -> None:
     assert value(iso, "AP") < 6.0 * SIGMA / np.sqrt(1000.0)  # chance: chi with 3 degrees, 1e-7 beyond 6
 
 
-@pytest.fixture(scope="module")
-def ordered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path], IsoTest]:
-    """Command and cycles without a rotation, and their test."""
-    folder = tmp_path_factory.mktemp("ordered")
-    reference = written(folder / "command.csv", command())
-    done = logs(folder, [place for place, _ in cycles()])
-    return reference, done, told(reference, done, planes=20)
-
-
 @pytest.mark.slow
 @SOME
 @given(st.permutations(range(4)))
-def test_the_order_of_cycles_does_not_matter(
-    ordered: tuple[Path, list[Path], IsoTest], order: list[int]
-) -> None:
-    reference, done, first = ordered
-    second = told(reference, [done[k] for k in order], planes=20)
+def test_the_order_of_cycles_does_not_matter(order: list[int]) -> None:
+    places = [place for place, _ in cycles()]
+    first, second = evaluated(command(), *places), evaluated(command(), *(places[k] for k in order))
     same(first, second, set(UNITS) - {"dAP", "dRP"})
 
 
-def test_the_attained_point_is_the_mean_of_the_second_half_of_a_rest(tmp_path: Path) -> None:
+def test_the_attained_point_is_the_mean_of_the_second_half_of_a_rest() -> None:
     # It rests for 0.4 s, rows 0 to 80: creeps at 0.5 mm/s for 0.15 s, then stays, then goes on by 1 um a row,
     # 0.2 mm/s, in rows 60 to 69, and stays 10 um further on.
     wanted = along(((0.0, 0.0, 0.3), (0.2, 0.0, 0.3)), 0.1, rest=0.4)
@@ -239,7 +227,6 @@ def test_the_attained_point_is_the_mean_of_the_second_half_of_a_rest(tmp_path: P
     ending[:30] -= 0.5e-3 * 0.005 * np.arange(30, 0, -1)
     ending[60:70] += 1e-6 * np.arange(1, 11)
     ending[70:] += 1e-5
-    reference = written(tmp_path / "command.csv", wanted)
-    iso = told(reference, logs(tmp_path, [done] * 2))
+    iso = evaluated(wanted, done, done, planes=50)
     # rows 40 to 80: (1 + 2 + ... + 10 + 11 . 10)/41 = 165/41 um
     assert value(iso, "AP", "pose 2") == pytest.approx(165e-6 / 41.0, abs=ROUNDING)

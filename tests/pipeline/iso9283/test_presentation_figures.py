@@ -15,7 +15,7 @@ from asserting import there
 from made_runs import URM6, path_run, run_of
 from presented import scene_of
 from recorded import entities, static, times_of
-from repeated import along
+from repeated import along, late
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -25,7 +25,6 @@ from urmpipe_pipeline.iso9283.figures import (
     MAX_DISPLAYED,
     MAX_DRAWN,
     RING_PIECES,
-    circles,
     corner_drawing,
     deviation_figure,
     display_factor,
@@ -44,17 +43,6 @@ SQUARE = ((0.0, 0.0, 0.3), (0.2, 0.0, 0.3), (0.2, 0.2, 0.3), (0.0, 0.2, 0.35), (
 CYCLES = 6
 PIXEL = 0.11
 """Places in a drawing are written to a tenth of a pixel: twice half of one, and a little."""
-
-
-def late(path: FloatArray, rows: int) -> FloatArray:
-    """Return a motion that follows another with a lag, which rounds corners, and swings beyond them."""
-    place, speed, found = path[0].copy(), np.zeros(3), []
-    for wanted in path:
-        for _ in range(10):
-            speed = speed + 0.0005 * ((wanted - place) * (1.0 / (0.005 * rows)) ** 2 - speed / (0.005 * rows))
-            place = place + 0.0005 * speed
-        found.append(place.copy())
-    return np.array(found)
 
 
 @pytest.fixture(scope="module")
@@ -244,13 +232,6 @@ def test_the_tube_is_as_wide_as_rt_about_the_mean_path(path: CutPath) -> None:
     known = np.isfinite(mean.position).all(axis=1)
     np.testing.assert_array_equal(mean.position[known], centre)
     np.testing.assert_array_equal(np.asarray(mean.values)[known], path.accuracy)
-
-
-def test_circles_stand_across_any_direction() -> None:
-    normal = np.vstack((np.eye(3), -np.eye(3), [[0.6, 0.0, 0.8]]))
-    rings = circles(np.zeros((7, 3)), normal, np.ones(7)).reshape(7, -1, 3)[:, :-1]
-    np.testing.assert_allclose(np.einsum("rpi,ri->rp", rings, normal), 0.0, atol=1e-15)
-    np.testing.assert_allclose(np.linalg.norm(rings, axis=2), 1.0, rtol=1e-12)
 
 
 def test_a_deviation_is_enlarged_as_far_as_the_scene_allows(iso: IsoTest, path: CutPath) -> None:
