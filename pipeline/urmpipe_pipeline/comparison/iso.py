@@ -221,7 +221,7 @@ def _part(log: Side, first: int, last: int, number: int) -> _Candidate:
 def _take_rows(trajectory: Trajectory, first: int, last: int, name: str) -> Trajectory:
     """Return the rows of a trajectory from `first` to `last`, both included, with times from 0."""
     rows = slice(first, last + 1)
-    t_ns, quat, q, broken = (
+    t_ns, quat, q, breaks = (
         trajectory.t_ns[rows],
         trajectory.quat_xyzw,
         trajectory.q,
@@ -234,7 +234,7 @@ def _take_rows(trajectory: Trajectory, first: int, last: int, name: str) -> Traj
         position=trajectory.position[rows],
         quat_xyzw=None if quat is None else quat[rows],
         q=None if q is None else q[rows],
-        discontinuities=None if broken is None else broken[(broken >= first) & (broken < last)] - first,
+        discontinuities=None if breaks is None else breaks[(breaks >= first) & (breaks < last)] - first,
     )
 
 

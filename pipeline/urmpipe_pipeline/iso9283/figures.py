@@ -457,12 +457,9 @@ def _corner_half_width(corner: CornerPath) -> float:
     """
     legs = max(float(np.linalg.norm(corner.command[end] - corner.point)) for end in (0, -1))
     half = min(CORNER_MARGIN * max(corner.rounding, corner.overshoot or 0.0), legs)
-    distance = (
-        0.0
-        if corner.overshoot_point is None
-        else float(np.linalg.norm(corner.overshoot_point - corner.point))
-    )
-    distance *= VIEW_MARGIN
+    distance = 0.0
+    if corner.overshoot_point is not None:
+        distance = VIEW_MARGIN * float(np.linalg.norm(corner.overshoot_point - corner.point))
     return max(half, distance if distance <= MAX_WIDENING * half else 0.0, MIN_HALF_WIDTH)
 
 
