@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,8 @@ from urmpipe_models.arm.denavit_hartenberg import urm_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.math3d import RotationForm
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.derivatives import derivatives
@@ -60,3 +64,19 @@ def run_of(
 def off(x: float, samples: int = 100) -> FloatArray:
     """A deviation that grows from 0 to x along x."""
     return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
+
+
+def paths(deltas: Mapping[str, FloatArray], **options: Any) -> Comparison:
+    """Paths compared with a path, each off by reference - log in [m], shape (n, 3)."""
+    length = max(map(len, deltas.values()))
+    reference = np.column_stack([np.linspace(0.0, 1.0, length), np.zeros(length), np.ones(length)])
+    runs = [path_run(reference[: len(delta)] - delta, name=name) for name, delta in deltas.items()]
+    return compare_runs(path_run(reference), runs, CompareOptions(**options))
+
+
+def arms(deltas: Mapping[str, FloatArray], **options: Any) -> Comparison:
+    """Arms compared with an arm, each off by reference - log in [rad], shape (n, 6)."""
+    t = TSP * np.arange(max(map(len, deltas.values())))
+    q = np.column_stack([0.5 * np.sin(t * (1 + i)) + i for i in range(6)])
+    runs = [run_of(q[: len(delta)] - delta, name=name) for name, delta in deltas.items()]
+    return compare_runs(run_of(q, name="wanted"), runs, CompareOptions(**options))

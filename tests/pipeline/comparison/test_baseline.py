@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from asserting import refusal, there
-from made_runs import off
+from made_runs import arms, off, paths
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.math3d import translation
@@ -25,17 +24,15 @@ from urmpipe_pipeline.comparison.baseline import (
     parse_noise,
 )
 from urmpipe_pipeline.comparison.baseline_section import worse_words
-from urmpipe_pipeline.comparison.comparison import Comparison, SettingDifference, UnmatchedQuantity
+from urmpipe_pipeline.comparison.comparison import SettingDifference, UnmatchedQuantity
 from urmpipe_pipeline.text import to_json_value
 from urmpipe_pipeline.trajectories import Sync
-
-Compared = Callable[..., Comparison]
 
 ROUNDING = 1e-15
 """Positions of 1 m round at 2e-16 m, and are taken apart twice."""
 
 
-def test_the_same_comparison_did_not_change(arms: Compared) -> None:
+def test_the_same_comparison_did_not_change() -> None:
     result = arms({"a": np.full((50, 6), 0.001)}, tolerance={"axis": 0.001, "angle": 0.001, "joint": 0.002})
     found = compare_with_baseline(result, result, 0.0)
     assert (found.verdict, found.worse, found.new, found.missing, found.differences) == (
@@ -54,12 +51,12 @@ def test_the_same_comparison_did_not_change(arms: Compared) -> None:
     } == {(0.0, 0.0, 50)}
 
 
-def test_what_changed_is_said_by_digits_that_differ(paths: Compared) -> None:
+def test_what_changed_is_said_by_digits_that_differ() -> None:
     grown = compare_with_baseline(paths({"a": off(0.00100002)}), paths({"a": off(0.001)}), 1e-9).changes[0]
     assert worse_words(grown) == "max 1.00000 → 1.00002 mm, rms 0.57881 → 0.57882 mm"
 
 
-def test_a_sample_that_moved_alone_leaves_largest_and_rms(paths: Compared) -> None:
+def test_a_sample_that_moved_alone_leaves_largest_and_rms() -> None:
     sizes = off(0.001, 1000)
     moved = sizes.copy()
     moved[10, 0] += 1e-5
@@ -68,7 +65,7 @@ def test_a_sample_that_moved_alone_leaves_largest_and_rms(paths: Compared) -> No
 
 
 @pytest.mark.slow
-def test_shares_differ_by_a_digit_where_they_count_as_changed(paths: Compared) -> None:
+def test_shares_differ_by_a_digit_where_they_count_as_changed() -> None:
     out = off(0.0, 25_000)
     out[:24_750, 0] = 0.005
     more = out.copy()
@@ -81,7 +78,7 @@ def test_shares_differ_by_a_digit_where_they_count_as_changed(paths: Compared) -
     assert compare_with_baseline(paths({"a": one}), paths({"a": out})).changes[0].worse == ()
 
 
-def test_what_grew_by_more_than_the_noise_is_worse(paths: Compared) -> None:
+def test_what_grew_by_more_than_the_noise_is_worse() -> None:
     before, now = (paths({"a": off(size)}) for size in (0.001, 0.0012))
     x = compare_with_baseline(now, before).changes[0]
     assert (x.worse, x.better, x.changed) == (("max", "rms"), (), True)
@@ -93,7 +90,7 @@ def test_what_grew_by_more_than_the_noise_is_worse(paths: Compared) -> None:
     assert (back.changes[0].worse, back.changes[0].better, back.verdict) == ((), ("max", "rms"), "pass")
 
 
-def test_what_grew_within_the_noise_is_not(paths: Compared) -> None:
+def test_what_grew_within_the_noise_is_not() -> None:
     before, now = (paths({"a": off(size)}) for size in (0.001, 0.0012))
     quiet = compare_with_baseline(now, before, 0.0002 + ROUNDING)
     assert quiet.verdict == "pass"
@@ -101,7 +98,7 @@ def test_what_grew_within_the_noise_is_not(paths: Compared) -> None:
     assert compare_with_baseline(now, before, 0.0002 - 1e-9).verdict == "fail"
 
 
-def test_a_change_that_statistics_do_not_show_is_seen_at_its_sample(paths: Compared) -> None:
+def test_a_change_that_statistics_do_not_show_is_seen_at_its_sample() -> None:
     aside = [np.roll(off(size), 1, axis=1) for size in (0.001, -0.001)]
     before, now = (paths({"a": one}) for one in aside)
     y = compare_with_baseline(now, before).changes[1]
@@ -110,7 +107,7 @@ def test_a_change_that_statistics_do_not_show_is_seen_at_its_sample(paths: Compa
     assert compare_with_baseline(now, before).verdict == "pass"
 
 
-def test_more_samples_out_are_worse_unless_the_noise_put_them_there(paths: Compared) -> None:
+def test_more_samples_out_are_worse_unless_the_noise_put_them_there() -> None:
     steps = np.zeros((100, 3))
     steps[:10, 0] = 0.0040  # out of 3.5 mm in both
     steps[10:50, 0] = 0.003_499_8
@@ -124,7 +121,7 @@ def test_more_samples_out_are_worse_unless_the_noise_put_them_there(paths: Compa
     assert (x.now.out_fraction, x.worse) == (0.13, ("out_fraction",))
 
 
-def test_shares_of_different_tolerances_do_not_compare(paths: Compared) -> None:
+def test_shares_of_different_tolerances_do_not_compare() -> None:
     before = paths({"a": off(0.003)})
     now = paths({"a": off(0.003)}, tolerance={"axis": 0.001})
     found = compare_with_baseline(now, before)
@@ -133,7 +130,7 @@ def test_shares_of_different_tolerances_do_not_compare(paths: Compared) -> None:
     assert found.differences == (SettingDifference("tolerance", {"axis": 0.0035}, {"axis": 0.001}),)
 
 
-def test_a_diagnosis_is_no_difference_since_it_changes_no_figure(paths: Compared) -> None:
+def test_a_diagnosis_is_no_difference_since_it_changes_no_figure() -> None:
     plain, diagnosed = (paths({"a": off(0.003, 30)}, diagnose=diagnose) for diagnose in (False, True))
     assert compare_with_baseline(diagnosed, plain).differences == ()
 
@@ -146,7 +143,7 @@ def test_a_diagnosis_is_no_difference_since_it_changes_no_figure(paths: Compared
     st.floats(1e-7, 1e-3),
 )
 def test_no_change_within_the_noise_is_ever_worse(
-    paths: Compared, values: FloatArray, change: FloatArray, noise: float
+    values: FloatArray, change: FloatArray, noise: float
 ) -> None:
     """Of no share, largest or rms. The norm may change by sqrt(3) as much as an axis."""
     before, now = paths({"a": values}), paths({"a": values + change * noise})
@@ -154,7 +151,7 @@ def test_no_change_within_the_noise_is_ever_worse(
     assert compare_with_baseline(now, before, level).worse == ()
 
 
-def test_times_that_both_have_are_compared(paths: Compared) -> None:
+def test_times_that_both_have_are_compared() -> None:
     before, now = (
         paths({"a": off(0.001, 100), "b": off(0.0, 100)}),
         paths({"a": off(0.001, 60), "b": off(0.0, 100)}),
@@ -166,7 +163,7 @@ def test_times_that_both_have_are_compared(paths: Compared) -> None:
     assert SettingDifference("samples of a", 100, 60) in found.differences
 
 
-def test_logs_and_quantities_that_only_one_has_are_told(paths: Compared, arms: Compared) -> None:
+def test_logs_and_quantities_that_only_one_has_are_told() -> None:
     before, now = paths({"a": off(0.0), "old": off(0.0)}), paths({"new": off(0.0), "a": off(0.0)})
     found = compare_with_baseline(now, before)
     assert (found.new, found.missing) == ((UnmatchedQuantity("new"),), (UnmatchedQuantity("old"),))
@@ -178,7 +175,7 @@ def test_logs_and_quantities_that_only_one_has_are_told(paths: Compared, arms: C
     assert compare_with_baseline(with_joints, paths({"a": off(0.0)})).missing == ()
 
 
-def test_the_only_logs_of_both_are_a_pair_whatever_they_are_called(paths: Compared) -> None:
+def test_the_only_logs_of_both_are_a_pair_whatever_they_are_called() -> None:
     found = compare_with_baseline(paths({"today": off(0.001)}), paths({"released": off(0.001)}))
     assert (found.verdict, found.new, found.missing) == ("pass", (), ())
     assert found.differences == (SettingDifference("log of today", "released", "today"),)
@@ -187,7 +184,7 @@ def test_the_only_logs_of_both_are_a_pair_whatever_they_are_called(paths: Compar
 
 
 @pytest.mark.parametrize(("samples", "verdict"), [(90, "pass"), (89, "fail")])
-def test_a_log_that_lost_a_tenth_of_its_samples_is_worse(paths: Compared, samples: int, verdict: str) -> None:
+def test_a_log_that_lost_a_tenth_of_its_samples_is_worse(samples: int, verdict: str) -> None:
     found = compare_with_baseline(paths({"a": off(0.0, samples)}), paths({"a": off(0.0)}))
     assert found.verdict == verdict
     assert {change.worse for change in found.changes} == {() if verdict == "pass" else ("samples",)}
@@ -196,7 +193,7 @@ def test_a_log_that_lost_a_tenth_of_its_samples_is_worse(paths: Compared, sample
 
 
 @pytest.mark.parametrize(("samples", "verdict"), [(25, "pass"), (20, "fail")])
-def test_samples_count_by_the_time_that_they_stand_for(paths: Compared, samples: int, verdict: str) -> None:
+def test_samples_count_by_the_time_that_they_stand_for(samples: int, verdict: str) -> None:
     before, now = paths({"a": off(0.0)}), paths({"a": off(0.0, samples)})
     slower = replace(now, runs=(replace(now.runs[0], t_ns=now.runs[0].t_ns * 4),))  # 20 ms instead of 5 ms
     assert compare_with_baseline(slower, before).verdict == verdict
@@ -206,7 +203,7 @@ def test_samples_count_by_the_time_that_they_stand_for(paths: Compared, samples:
     assert {change.worse for change in compare_with_baseline(faster, before).changes} == {("samples",)}
 
 
-def test_samples_left_out_between_others_are_lost_time(paths: Compared) -> None:
+def test_samples_left_out_between_others_are_lost_time() -> None:
     before = paths({"a": off(0.0)})
     run = before.runs[0]
     kept = {name: getattr(run, name)[::2] for name in ("sample", "t_ns", "delta", "path", "out_of_tolerance")}
@@ -215,7 +212,7 @@ def test_samples_left_out_between_others_are_lost_time(paths: Compared) -> None:
     assert {change.worse for change in compare_with_baseline(now, before).changes} == {("samples",)}
 
 
-def test_another_base_and_another_tool_are_told(arms: Compared) -> None:
+def test_another_base_and_another_tool_are_told() -> None:
     before = arms({"a": np.zeros((20, 6))})
     run = before.runs[0]
     robot = there(run.run.robot).placed(base=translation(0.0, 0.0, 1.0), tool=translation(0.0, 0.0, 0.12))
@@ -226,7 +223,7 @@ def test_another_base_and_another_tool_are_told(arms: Compared) -> None:
     )
 
 
-def test_what_was_made_otherwise_is_told(paths: Compared) -> None:
+def test_what_was_made_otherwise_is_told() -> None:
     before = paths({"a": off(0.0)})
     run = replace(before.runs[0], sync=Sync("given", 0.25))
     made = replace(
@@ -243,7 +240,7 @@ def test_what_was_made_otherwise_is_told(paths: Compared) -> None:
     )
 
 
-def test_the_result_is_json_in_the_comparison(paths: Compared) -> None:
+def test_the_result_is_json_in_the_comparison() -> None:
     before = replace(paths({"a": off(0.001), "old": off(0.0)}), recording=Path("old.rrd"))
     now = paths({"a": off(0.002)})
     held = replace(now, baseline=compare_with_baseline(now, before))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
 
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 from asserting import there
-from made_runs import off
+from made_runs import arms, off, paths
 from presented import Untouched, cells, every_section, facts, figures, scene_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
@@ -24,8 +23,6 @@ from urmpipe_pipeline.presentation.palette import run_colour
 from urmpipe_pipeline.presentation.section import Check, Place, Ref, Section
 from urmpipe_pipeline.results import present
 
-Compared = Callable[..., Comparison]
-
 
 def noisy(seed: int, size: float = 0.001, samples: int = 60) -> FloatArray:
     """Random deviations of six joints."""
@@ -36,7 +33,7 @@ def log_section(result: Comparison, name: str) -> Section:
     return next(one for one in present(result).body.sections if one.title == name)
 
 
-def test_a_quantity_with_a_tolerance_is_a_check(paths: Compared) -> None:
+def test_a_quantity_with_a_tolerance_is_a_check() -> None:
     result = paths({"good": off(0.001), "bad": off(0.004)}, tolerance={"axis": 0.0035, "norm": 0.01})
     shown = present(result)
     assert [one.title for one in shown.body.sections] == ["good", "bad"]
@@ -51,7 +48,7 @@ def test_a_quantity_with_a_tolerance_is_a_check(paths: Compared) -> None:
     assert (shown.name, shown.verdict, shown.created) == (result.name, "fail", result.provenance.created)
 
 
-def test_the_properties_and_rows_are_the_statistics(arms: Compared) -> None:
+def test_the_properties_and_rows_are_the_statistics() -> None:
     result = arms({"a": noisy(1), "b": noisy(2)}, tolerance={"axis": 0.001, "joint": 0.002})
     for one in result.runs:
         properties = log_section(result, one.name).properties
@@ -67,7 +64,7 @@ def test_the_properties_and_rows_are_the_statistics(arms: Compared) -> None:
     assert list(table) == list(next(result.rows()))
 
 
-def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared) -> None:
+def test_a_joint_that_is_called_x_is_not_the_axis() -> None:
     result = arms({"a": np.full((20, 6), 0.01)}, tolerance={"axis": 1.0, "joint": 0.002})
     run = result.runs[0]
     renamed = {"x": replace(run.joint_statistics["q1"], quantity="x")}
@@ -77,7 +74,7 @@ def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared) -> None:
     assert [check.name for check in checks] == ["x", "y", "z", "joint x", "coverage", "judged"]
 
 
-def test_the_first_fact_is_what_decided(arms: Compared) -> None:
+def test_the_first_fact_is_what_decided() -> None:
     result = arms({"a": noisy(1), "b": noisy(2, 0.01)}, tolerance={"joint": 0.002})
     for one in result.runs:
         section = log_section(result, one.name)
@@ -94,7 +91,7 @@ def test_the_first_fact_is_what_decided(arms: Compared) -> None:
     assert shown.opens_at_ns == worst.t_ns[worst.worst_statistics_index]
 
 
-def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
+def test_the_tables_hold_the_statistics_of_each_unit() -> None:
     result = arms({"a": noisy(1)}, tolerance={"axis": 0.001, "joint": 0.002})
     one = result.runs[0]
     lengths, angles, shares = (cells(table) for table in log_section(result, "a").tables)
@@ -109,14 +106,14 @@ def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
         assert shares[key] == [getattr(held, key) for held in one.shares.values()], key
 
 
-def test_assumptions_stand_in_the_verdict_s_line_alone_and_among_others(paths: Compared) -> None:
+def test_assumptions_stand_in_the_verdict_s_line_alone_and_among_others() -> None:
     result = replace(paths({"a": off(0.001)}), assumptions=("the joints are in deg", "so (a)"))
     shown = present(result)
     assert shown.headline.endswith(", assuming the joints are in deg and so (a)")
     assert [line["Assuming"] for line in shown.lines] == ["the joints are in deg; so (a)"]
 
 
-def test_many_logs_are_ranked_and_keep_their_colours(paths: Compared) -> None:
+def test_many_logs_are_ranked_and_keep_their_colours() -> None:
     deltas = {f"log{k}": off(0.001 * (1 + (7 * k) % 12)) for k in range(12)}
     result = paths(deltas, tolerance={"axis": 0.006})
     shown = present(result)
@@ -137,13 +134,13 @@ def test_many_logs_are_ranked_and_keep_their_colours(paths: Compared) -> None:
         assert line.colours == (run_colour(result.runs.index(one)),)
 
 
-def test_a_single_log_is_not_ranked(paths: Compared) -> None:
+def test_a_single_log_is_not_ranked() -> None:
     body = present(paths({"a": off(0.001)})).body
     assert body.tables == ()
     assert not any(isinstance(one, Figure) for one in body.blocks())
 
 
-def test_what_changed_since_the_baseline_is_a_section(paths: Compared) -> None:
+def test_what_changed_since_the_baseline_is_a_section() -> None:
     before, now = paths({"a": off(0.001), "old": off(0.0)}), paths({"a": off(0.0015), "new": off(0.0)})
     found = compare_with_baseline(now, before)
     shown = present(replace(now, baseline=found))
@@ -169,7 +166,7 @@ def test_what_changed_since_the_baseline_is_a_section(paths: Compared) -> None:
     assert all(check.kind == "worse-than-baseline" for check in against)
 
 
-def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> None:
+def test_the_plots_are_the_deviation_with_what_is_allowed() -> None:
     result = arms({"a": noisy(1)}, tolerance={"axis": 0.001, "angle": 0.002, "joint": 0.002})
     one = result.runs[0]
     deviation, joints, *_ = figures(log_section(result, "a"))
@@ -186,13 +183,13 @@ def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> Non
 
 
 @pytest.mark.parametrize(("kind", "view"), [("axis", 0), ("path", 1), ("angle", 2)])
-def test_the_viewer_opens_what_decided(arms: Compared, kind: str, view: int) -> None:
+def test_the_viewer_opens_what_decided(kind: str, view: int) -> None:
     result = arms({"a": noisy(1)}, tolerance={kind: 1e-6})
     deviation, *_ = figures(log_section(result, "a"))
     assert deviation.opened == view
 
 
-def test_paths_have_no_joints_and_no_arm(paths: Compared) -> None:
+def test_paths_have_no_joints_and_no_arm() -> None:
     result = paths({"a": off(0.001)})
     shown = present(result)
     units = {p.unit for f in figures(shown.body.sections[0]) for view in f.views for p in view.panels}
@@ -202,7 +199,7 @@ def test_paths_have_no_joints_and_no_arm(paths: Compared) -> None:
     np.testing.assert_array_equal(scene.paths[0].position, result.reference.position)
 
 
-def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -> None:
+def test_the_scene_is_the_worst_arm_all_paths_and_what_decided() -> None:
     result = arms({"a": noisy(1, 0.01), "b": noisy(2, 0.001)})
     scene, worst = scene_of(present(result)), result.worst
     assert scene.arms[0].q is worst.run.q
@@ -219,7 +216,7 @@ def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -
 
 
 @pytest.mark.parametrize("align", ["none", "start", "rigid", "tool"])
-def test_the_arm_stands_where_its_aligned_path_is(arms: Compared, align: str) -> None:
+def test_the_arm_stands_where_its_aligned_path_is(align: str) -> None:
     result = arms({"a": noisy(1, 0.01)}, align=align)
     one = result.runs[0]
     (arm,) = scene_of(present(result)).arms
@@ -242,14 +239,14 @@ def test_the_arm_stands_where_its_aligned_path_is(arms: Compared, align: str) ->
     ],
 )
 def test_a_deviation_is_enlarged_as_far_as_it_stays_inside_the_scene(
-    paths: Compared, largest: float, factor: int | None
+    largest: float, factor: int | None
 ) -> None:
     """`largest` is a share of the radius of the scene, which is half of the path's metre."""
     scene = scene_of(present(paths({"a": off(0.5 * largest)})))
     assert [one.name for one in scene.paths[3:]] == ([f"deviation x{factor}"] if factor else [])
 
 
-def test_a_page_shows_the_paths_coloured_by_the_deviation(paths: Compared) -> None:
+def test_a_page_shows_the_paths_coloured_by_the_deviation() -> None:
     result = paths({"a": off(0.004)})
     one = result.runs[0]
     space = next(b for b in log_section(result, "a").blocks() if isinstance(b, SpaceFigure))
@@ -259,7 +256,7 @@ def test_a_page_shows_the_paths_coloured_by_the_deviation(paths: Compared) -> No
     np.testing.assert_array_equal(np.asarray(actual.values), one.delta[:, 3])
 
 
-def test_each_warning_stands_once(arms: Compared) -> None:
+def test_each_warning_stands_once() -> None:
     result = arms({"a": noisy(1), "b": noisy(2, samples=40)})
     a, b = result.runs
     a = replace(a, run=replace(a.run, warnings=(LogWarning("gap", "two rows lie far apart", 7),)))
@@ -270,7 +267,7 @@ def test_each_warning_stands_once(arms: Compared) -> None:
     assert [one.kind for one in present(result).body.warnings] == ["general"]
 
 
-def test_events_tell_when_what_happened(paths: Compared) -> None:
+def test_events_tell_when_what_happened() -> None:
     result = paths({"a": off(0.004)}, tolerance={"axis": 0.0035})
     one = result.runs[0]
     longest = there(one.longest_out_interval)
@@ -279,7 +276,7 @@ def test_events_tell_when_what_happened(paths: Compared) -> None:
     assert found[int(one.t_ns[one.worst_statistics_index])] == "error"
 
 
-def test_no_array_of_a_motion_is_looked_into_before_it_is_shown(arms: Compared) -> None:
+def test_no_array_of_a_motion_is_looked_into_before_it_is_shown() -> None:
     result = arms({"a": noisy(1), "b": noisy(2)})
 
     def hidden(run: Any) -> Any:
@@ -292,7 +289,7 @@ def test_no_array_of_a_motion_is_looked_into_before_it_is_shown(arms: Compared) 
     assert shown.verdict == result.verdict
 
 
-def test_a_log_of_one_row_is_shown(paths: Compared) -> None:
+def test_a_log_of_one_row_is_shown() -> None:
     shown = present(paths({"a": np.zeros((1, 3))}))
     scene_of(shown)
     for section in every_section(shown.body):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from asserting import there
+from made_runs import arms, paths
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import complete_noise
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -21,8 +21,6 @@ from urmpipe_pipeline.comparison.warnings import (
     recorded_tcp_mismatch,
     weak_evidence,
 )
-
-Compared = Callable[..., Comparison]
 
 
 def off(samples: int) -> FloatArray:
@@ -82,13 +80,13 @@ def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArra
     assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
 
 
-def test_one_sample_is_one_pose(paths: Compared) -> None:
+def test_one_sample_is_one_pose() -> None:
     assert told(paths({"one": off(1)})) == [
         ("one-pose", "1 sample compared, all in one pose: the verdict is on that pose alone")
     ]
 
 
-def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Compared) -> None:
+def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not() -> None:
     moving = arms({"log": np.zeros((50, 6))}).runs[0]
     still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)))
     assert list(weak_evidence(moving)) == list(weak_evidence(still)) == []
@@ -96,7 +94,7 @@ def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Co
     assert [one.kind for one in weak_evidence(replace(still, run=at_rest))] == ["one-pose"]
 
 
-def test_encoders_that_flicker_are_no_motion(arms: Compared) -> None:
+def test_encoders_that_flicker_are_no_motion() -> None:
     moving = arms({"log": np.zeros((50, 6))}).runs[0]
     flicker = np.where(np.arange(50) % 2, 1.05e-4, 0.0)[:, None]  # as a UR5e at rest was logged
     for scale, expected in ((1.0, ["one-pose"]), (3.0, [])):
@@ -105,7 +103,7 @@ def test_encoders_that_flicker_are_no_motion(arms: Compared) -> None:
         assert [one.kind for one in weak_evidence(still)] == expected
 
 
-def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) -> None:
+def test_a_log_that_moves_only_where_it_is_not_compared_is_told() -> None:
     moving = arms({"log": np.zeros((50, 6))}).runs[0]
     q = moving.run.q.copy()
     q[:20] = q[0]
@@ -115,7 +113,7 @@ def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) 
         assert [one.kind for one in weak_evidence(resting)] == expected
 
 
-def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compared) -> None:
+def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones() -> None:
     logs = {"early": off(44), "whole": np.full((1000, 3), 0.001), "nearly": off(990)}
     result = paths(logs, tolerance={"coverage": 0.04})
     assert [run.name for run in result.ranking] == ["nearly", "whole", "early"]
@@ -127,7 +125,7 @@ def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compa
     assert (failed.verdict, told(failed)) == ("fail", [])  # the verdict says it
 
 
-def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:
+def test_a_large_tolerance_without_a_unit_is_told() -> None:
     assert told(paths({"log": off(50) + 1e-9}, tolerance={"axis": 3.5, "norm": 0.1})) == [
         ("large-tolerance", "a tolerance of 3500 mm (axis) accepts any deviation: 3.5 is in m")
     ]
@@ -136,7 +134,7 @@ def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:
     ] == ["a tolerance of 28.6479 deg (angle) accepts any deviation: 0.5 is in rad"]
 
 
-def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(arms: Compared) -> None:
+def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told() -> None:
     run = arms({"bad": np.zeros((50, 6))}).runs[0].run
     assert run.tcp is not None
     for away, expected in ((0.0005, []), (0.005, ["recorded-tcp-apart"])):
@@ -160,7 +158,7 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     )
 
 
-def test_first_rows_that_recorded_another_tool_are_not_told_of_as_another_robot(arms: Compared) -> None:
+def test_first_rows_that_recorded_another_tool_are_not_told_of_as_another_robot() -> None:
     run = arms({"bad": np.zeros((50, 6))}).runs[0].run
     assert run.tcp is not None
     position = run.tcp.position + np.array((0, 0, 0.0005))

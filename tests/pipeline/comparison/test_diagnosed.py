@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from asserting import refusal, there
 from diagnoses import LENGTH, SIGN, diagnosis_of
-from made_runs import off, path_run, run_of
+from made_runs import arms, off, path_run, paths, run_of
 from presented import cells, facts, figures, scene_of
 from urmpipe_models.errors import Hint, OptionError
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
@@ -22,15 +21,13 @@ from urmpipe_pipeline.presentation.scene import ArmMark
 from urmpipe_pipeline.presentation.section import Advice, Fact
 from urmpipe_pipeline.results import present
 
-Compared = Callable[..., Comparison]
-
 
 def diagnosed(result: Comparison) -> Comparison:
     """Return a comparison of which each log has a diagnosis."""
     return replace(result, runs=tuple(replace(one, diagnosis=diagnosis_of(one)) for one in result.runs))
 
 
-def test_its_cause_stands_under_the_verdict(paths: Compared) -> None:
+def test_its_cause_stands_under_the_verdict() -> None:
     result = diagnosed(paths({"log": off(0.5)}))
     shown = present(result)
     (section,) = shown.body.sections
@@ -39,7 +36,7 @@ def test_its_cause_stands_under_the_verdict(paths: Compared) -> None:
     assert shown.facts[0].value == facts(section)["Cause"] == section.properties["cause"] == said
 
 
-def test_a_log_out_of_tolerance_says_what_tells_its_cause(paths: Compared) -> None:
+def test_a_log_out_of_tolerance_says_what_tells_its_cause() -> None:
     result = paths({"log": off(0.5), "near": off(0.001)})
     shown = present(result)
     far, near = shown.body.sections
@@ -55,9 +52,7 @@ def test_a_log_out_of_tolerance_says_what_tells_its_cause(paths: Compared) -> No
     assert "Cause" not in facts(section)  # a diagnosis is refused with an alignment
 
 
-def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_a_line(
-    paths: Compared,
-) -> None:
+def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_a_line() -> None:
     (section,) = present(diagnosed(paths({"log": off(0.01)}))).body.sections
     tables = {one.title: one for one in section.tables}
     assert list(tables)[:2] == ["Causes", "Undecided between"]
@@ -79,13 +74,13 @@ def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_
     assert undecided["interval"][1] == "0.1089 to 0.1203 deg too low"
 
 
-def test_one_cause_is_no_table_in_the_terminal(paths: Compared) -> None:
+def test_one_cause_is_no_table_in_the_terminal() -> None:
     one = paths({"log": off(0.01)}).runs[0]
     several, alone = (replace(diagnosis_of(one), causes=causes) for causes in ((SIGN, LENGTH), (SIGN,)))
     assert [next(diagnosis_tables(found)).brief for found in (several, alone)] == [True, False]
 
 
-def test_what_stays_is_said_only_beside_a_cause(paths: Compared) -> None:
+def test_what_stays_is_said_only_beside_a_cause() -> None:
     found = diagnosis_of(paths({"log": off(0.01)}).runs[0])
     said = {fact.name: fact.value for fact in diagnosis_facts(found)}
     assert said["Remaining deviation"] == "rms 0.0574 mm: the digits of the log"
@@ -95,7 +90,7 @@ def test_what_stays_is_said_only_beside_a_cause(paths: Compared) -> None:
     assert str(nothing["Cause"]).startswith("no cause found: rms ")
 
 
-def test_each_axis_is_drawn_mended_with_its_tolerance(paths: Compared) -> None:
+def test_each_axis_is_drawn_mended_with_its_tolerance() -> None:
     result = diagnosed(paths({"log": off(0.01)}))
     one = result.runs[0]
     figure = figures(present(result).body.sections[0])[1]
@@ -110,7 +105,7 @@ def test_each_axis_is_drawn_mended_with_its_tolerance(paths: Compared) -> None:
         np.testing.assert_array_equal(mended.t_ns, one.t_ns[::2])
 
 
-def test_joints_alone_are_drawn_one_by_one_beside_their_deviation(arms: Compared) -> None:
+def test_joints_alone_are_drawn_one_by_one_beside_their_deviation() -> None:
     off_by = np.outer(np.linspace(0.0, 0.01, 60), np.arange(1.0, 7.0))
     result = arms({"log": off_by}, tolerance={"joint": 0.002})
     one = replace(result.runs[0], statistics={})
@@ -126,7 +121,7 @@ def test_joints_alone_are_drawn_one_by_one_beside_their_deviation(arms: Compared
         np.testing.assert_array_equal(panel.lines[0].values[:], joints[:, k] / 10.0)
 
 
-def test_the_mended_path_lies_beside_the_reference_by_what_stays(paths: Compared) -> None:
+def test_the_mended_path_lies_beside_the_reference_by_what_stays() -> None:
     result = diagnosed(paths({"log": off(0.01)}))
     one = result.runs[0]
     (mended,) = (path for path in scene_of(present(result)).paths if path.name == "without the causes")
@@ -135,7 +130,7 @@ def test_the_mended_path_lies_beside_the_reference_by_what_stays(paths: Compared
     np.testing.assert_array_equal(mended.t_ns, one.t_ns[::2])
 
 
-def test_what_is_named_is_marked_on_the_arm(arms: Compared) -> None:
+def test_what_is_named_is_marked_on_the_arm() -> None:
     (one,) = diagnosed(arms({"log": np.full((60, 6), 0.01)})).runs
     chain = there(one.run.robot)
     assert cause_marks(one, chain) == (
@@ -151,7 +146,7 @@ def test_what_is_named_is_marked_on_the_arm(arms: Compared) -> None:
     ]
 
 
-def test_without_a_cause_nothing_is_mended(paths: Compared) -> None:
+def test_without_a_cause_nothing_is_mended() -> None:
     result = paths({"log": off(0.01)})
     one = result.runs[0]
     nothing = replace(diagnosis_of(one), causes=(), undecided=())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,15 +13,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from asserting import refusal, there
-from made_runs import off
+from made_runs import arms, off, paths
 from urmpipe_models.errors import Finding, LogError, OutputError
 from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
-
-Compared = Callable[..., Comparison]
 
 
 def written(result: Comparison, path: Path) -> ET.Element:
@@ -65,7 +62,7 @@ def assert_consumers_take_it(root: ET.Element) -> None:
     assert len(set(names)) == len(names)
 
 
-def test_a_log_is_a_suite_and_a_judged_quantity_a_case(paths: Compared, tmp_path: Path) -> None:
+def test_a_log_is_a_suite_and_a_judged_quantity_a_case(tmp_path: Path) -> None:
     result = paths({"good": off(0.001), "bad": off(0.004)}, tolerance={"axis": 0.0035, "norm": 0.01})
     root = written(result, tmp_path / "verdict.xml")
     assert {name: root.get(name) for name in ("name", "tests", "failures", "errors", "time")} == {
@@ -85,7 +82,7 @@ def test_a_log_is_a_suite_and_a_judged_quantity_a_case(paths: Compared, tmp_path
     assert root[0].get("timestamp") == result.provenance.created[:19]
 
 
-def test_the_properties_are_the_statistics_bit_for_bit(arms: Compared, tmp_path: Path) -> None:
+def test_the_properties_are_the_statistics_bit_for_bit(tmp_path: Path) -> None:
     deltas = 0.001 * np.random.default_rng(1).normal(size=(60, 6))
     result = arms({"a": deltas}, tolerance={"axis": 0.001, "joint": 0.002})
     suite = written(result, tmp_path / "verdict.xml")[0]
@@ -101,7 +98,7 @@ def test_the_properties_are_the_statistics_bit_for_bit(arms: Compared, tmp_path:
     assert float(told["longest_out_interval"]) == there(run.longest_out_interval).duration
 
 
-def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path) -> None:
+def test_a_joint_that_is_called_x_is_not_the_axis(tmp_path: Path) -> None:
     result = arms({"a": np.full((20, 6), 0.01)}, tolerance={"axis": 1.0, "joint": 0.002})
     run = result.runs[0]
     assert run.joint_delta is not None
@@ -114,7 +111,7 @@ def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path
     assert [case.get("name") for case in cases] == ["x", "y", "z", "joint x", "coverage", "judged"]
 
 
-def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, tmp_path: Path) -> None:
+def test_what_is_worse_than_the_baseline_fails(tmp_path: Path) -> None:
     before = paths({"a": off(0.001), "old": off(0.0)})
     now = paths({"a": off(0.0015)})
     result = replace(now, baseline=compare_with_baseline(now, before))
@@ -139,9 +136,7 @@ def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, 
     assert [one.text for one in lost] == ["angle: in the baseline, not compared any more"]
 
 
-def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(
-    paths: Compared, arms: Compared, tmp_path: Path
-) -> None:
+def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(tmp_path: Path) -> None:
     before, now = arms({"monday": np.zeros((100, 6))}), paths({"tuesday": off(0.0)})
     result = replace(now, baseline=compare_with_baseline(now, before))
     gone = ["angle", *(f"q{number}" for number in range(1, 7))]
@@ -152,7 +147,7 @@ def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(
     assert failed == [("tuesday against baseline", f"{name} is there") for name in gone]
 
 
-def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path: Path) -> None:
+def test_the_warnings_of_a_log_stand_behind_its_cases(tmp_path: Path) -> None:
     logs, half = {"short": off(0.001, 50), "long": off(0.001)}, {"coverage": 0.5}
     result = paths(logs, tolerance={"norm": 0.15, **half})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
@@ -166,9 +161,7 @@ def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path:
     assert told == [f"not-covered: short: {seen}", None]
 
 
-def test_what_could_not_be_compared_takes_the_place_of_a_verdict_from_before(
-    paths: Compared, tmp_path: Path
-) -> None:
+def test_what_could_not_be_compared_takes_the_place_of_a_verdict_from_before(tmp_path: Path) -> None:
     path = tmp_path / "verdict.xml"
     written(paths({"a": off(0.0, 5)}), path)
     wrong = LogError(Finding("found 'x', allowed: a number", "a.csv", line=7, column="q1"), Finding("no arm"))
@@ -185,7 +178,7 @@ def test_what_could_not_be_compared_takes_the_place_of_a_verdict_from_before(
     assert {case[0].get("type") for case in cases} == {"bad-input"}
 
 
-def test_an_error_replaces_no_file_of_another_and_no_input(paths: Compared, tmp_path: Path) -> None:
+def test_an_error_replaces_no_file_of_another_and_no_input(tmp_path: Path) -> None:
     mine, other = tmp_path / "mine.xml", tmp_path / "other.xml"
     written(paths({"a": off(0.0, 5)}), mine)
     other.write_text("<testsuites/>")
@@ -201,7 +194,7 @@ def test_an_error_replaces_no_file_of_another_and_no_input(paths: Compared, tmp_
 @pytest.mark.slow
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(st.characters(categories=["L", "N", "P", "S", "Z", "C"]), min_size=1, max_size=20))
-def test_any_name_of_a_file_is_held(paths: Compared, tmp_path: Path, name: str) -> None:
+def test_any_name_of_a_file_is_held(tmp_path: Path, name: str) -> None:
     result = replace(paths({"a": off(0.0, 5)}), name=name)
     result = replace(result, runs=(replace(result.runs[0], name=name),))
     root = written(result, tmp_path / "verdict.xml")
@@ -209,7 +202,7 @@ def test_any_name_of_a_file_is_held(paths: Compared, tmp_path: Path, name: str) 
         assert root[0].get("name") == root.get("name") == name
 
 
-def test_control_characters_stand_as_python_escapes_them(paths: Compared, tmp_path: Path) -> None:
+def test_control_characters_stand_as_python_escapes_them(tmp_path: Path) -> None:
     result = replace(
         paths({"a": off(0.0, 5)}), name="a\x00b\tc\nd\r\x85\udc80\uffff]]><&\"'\N{GRINNING FACE}"
     )
@@ -218,7 +211,7 @@ def test_control_characters_stand_as_python_escapes_them(paths: Compared, tmp_pa
     )
 
 
-def test_a_junit_file_of_ours_is_replaced_and_no_other(paths: Compared, tmp_path: Path) -> None:
+def test_a_junit_file_of_ours_is_replaced_and_no_other(tmp_path: Path) -> None:
     path = tmp_path / "verdict.xml"
     for _ in range(2):
         written(paths({"a": off(0.0, 5)}), path)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from asserting import there
-from made_runs import path_run
+from made_runs import arms, path_run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-
-Compared = Callable[..., Comparison]
 
 T: FloatArray = 0.005 * np.arange(1000.0)
 
@@ -35,7 +31,7 @@ def of_path(log: FloatArray) -> dict[tuple[str, str], tuple[float, ...]]:
     return causes(compare_runs(path_run(back_and_forth(T)), [path_run(log)], CompareOptions(diagnose=True)))
 
 
-def test_zeros_of_joints_are_named_the_largest_share_first(arms: Compared) -> None:
+def test_zeros_of_joints_are_named_the_largest_share_first() -> None:
     noise = np.random.default_rng(3).normal(0.0, 1e-4, (1000, 6))
     zeros = np.array([0.001, 0.01, 0.0, -0.001, 0.0, 0.0])
     found = causes(arms({"log": noise + zeros}, diagnose=True))
