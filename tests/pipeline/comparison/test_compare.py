@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asserting import refusal, there
+from asserting import there
 from made_runs import TSP, URM6, path_run, run_of
 from urmpipe_models.arm.chain import Mesh, Visual
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
-from urmpipe_models.math3d import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.joint_log import LogColumn, LogWarning
 from urmpipe_pipeline.presentation.meshes import mesh_warnings
@@ -122,16 +120,6 @@ def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
     assert f"is known to +-{1e3 * precision:.2g} ms (standard error); the period is 5 ms" in said[0]
 
 
-def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
-    log = run_of(q, recorded=positions_over_log(URM6, q))
-    for sync in ("auto", 0.25):
-        assert refusal(OptionError, compare_with_recorded_tcp, log, CompareOptions(sync=sync)) == (
-            f"sync (--sync): found {sync} for one log, allowed: start, since its joints and its recorded"
-            " tool centre"
-            " point share the same rows"
-        )
-
-
 def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
     wanted = path_run(points_over_log(URM6, q)[:, -1])
     assert [r.name for r in compare_runs(wanted, [run_of(q), run_of(q), run_of(q, name="b")]).runs] == [
@@ -145,69 +133,6 @@ def test_one_log_is_held_against_what_it_recorded_itself(q: FloatArray) -> None:
     result = compare_with_recorded_tcp(run_of(q, recorded=recorded))
     assert result.runs[0].statistics["x"].mean == pytest.approx(0.001, abs=1e-15)
     assert result.runs[0].left_out == 1
-
-
-def test_a_verdict_that_fails_for_want_of_a_tool_says_so(q: FloatArray) -> None:
-    recorded = positions_over_log(URM6.placed(tool=translation(0.0, 0.0, 0.15)), q)
-    result = compare_with_recorded_tcp(run_of(q, recorded=recorded))
-    assert result.runs[0].verdict == "fail"
-    assert [warning.kind for warning in result.warnings] == ["recorded-tcp-tool"]
-    told = run_of(q, robot=URM6.placed(tool=translation(0.0, 0.0, 0.15)), recorded=recorded)
-    assert compare_with_recorded_tcp(told).warnings == ()
-
-
-def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> None:
-    tooled = URM6.placed(tool=translation(0.0, 0.0, 0.15))
-    recorded = positions_over_log(tooled, q)
-    wanted = path_run(recorded)
-    bare, given = run_of(q, recorded=recorded), run_of(q, name="given", robot=tooled, recorded=recorded)
-    result = compare_runs(wanted, [bare, given])
-    assert [run.verdict for run in result.runs] == ["fail", "pass"]
-    (warning,) = result.warnings
-    assert (warning.kind, warning.message) == (
-        "recorded-tcp-tool",
-        "the kinematics of urm6 stay 150.0 mm (rms) from the recorded TCP",
-    )
-    (same,) = compare_runs(wanted, [bare], CompareOptions(tcp="recorded")).warnings
-    assert same.kind == "same-data"
-    assert compare_runs(wanted, [run_of(q)]).warnings == ()  # nothing was recorded that could tell
-
-
-def test_a_path_held_against_a_log_is_told(q: FloatArray) -> None:
-    path = path_run(points_over_log(URM6, q)[:, -1])
-    (warning,) = compare_runs(run_of(q), [path]).warnings
-    assert (warning.kind, warning.message) == (
-        "path-as-log",
-        "a path without joints, compared with log, which has joints: the reference comes first, then"
-        " the logs",
-    )
-    assert compare_runs(path, [run_of(q)]).warnings == ()
-    assert [one.kind for one in compare_runs(path, [path]).warnings] == ["same-data"]
-
-
-def test_what_is_lacking_is_named(q: FloatArray) -> None:
-    wanted = path_run(points_over_log(URM6, q)[:, -1])
-    with pytest.raises(LogError) as error:
-        compare_runs(wanted, [run_of(q, robot=None)])
-    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; --robot NAME|FILE sets one")
-    with pytest.raises(LogError) as error:
-        compare_with_recorded_tcp(run_of(q))
-    assert str(error.value) == (
-        "log.csv: one log, which recorded no tool centre point; allowed: a reference before the log"
-    )
-    doubt = LogWarning("tcp-not-read", "tcp_xx, tcp_yy look like a recorded TCP")
-    with pytest.raises(
-        LogError, match=r"a reference before the log\nlog\.csv: tcp_xx, tcp_yy look like a recorded TCP$"
-    ):
-        compare_with_recorded_tcp(replace(run := run_of(q), log=replace(run.log, warnings=(doubt,))))
-    with pytest.raises(LogError) as error:
-        compare_runs(wanted, [run_of(q)], CompareOptions(sync=99.0))
-    assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
-    assert refusal(OptionError, CompareOptions, {"axis": -1.0}) == (
-        "tolerance (--tolerance): found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of"
-        " angle, joint in"
-        " rad (m of a joint that slides); positive; coverage, judged 0 to 1"
-    )
 
 
 def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
@@ -231,25 +156,6 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
     assert one["out_fraction"] == 1.0
 
 
-def test_an_unknown_tool_centre_point_is_refused() -> None:
-    with pytest.raises(OptionError) as error:
-        CompareOptions(tcp="x")  # type: ignore[arg-type]
-    assert str(error.value) == "tcp (--tcp): found x, allowed: fk, recorded"
-
-
-def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:
-    doubt = LogWarning("assumed-unit", "taken as m", 3)
-    reference = replace(path_run(points_over_log(URM6, q)[:, -1]), warnings=(doubt,))
-    result = compare_runs(reference, [run_of(q)])
-    assert result.warnings == (LogWarning("assumed-unit", "taken as m", 3, "path"),)
-
-
-def test_an_offset_that_no_clock_holds_is_refused() -> None:
-    for offset in (1e300, -1e9, float("inf")):
-        with pytest.raises(OptionError, match=r"allowed: stamps, start, auto, or a time in s below 1e\+09"):
-            CompareOptions(sync=offset)
-
-
 def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
     t = TSP * np.arange(200)
     true = np.column_stack([np.pi + 0.5 * (t - 0.5024), *(0.1 * np.sin(t + k) for k in range(5))])
@@ -266,17 +172,6 @@ def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
         compare_with_recorded_tcp(run_of(there, recorded=positions_over_log(URM6, true))).runs[0].delta.max()
         > 0.1
     )
-
-
-def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
-    other = replace(URM6, name="urm6b")
-    result = compare_runs(run_of(q, name="a"), [run_of(q + 1e-9, name="b", robot=other)])
-    assert result.warnings == (
-        LogWarning("robots-differ", "the kinematics are those of different robots: a as urm6, b as urm6b"),
-    )
-    assert compare_runs(run_of(q), [run_of(q, robot=other)]).warnings  # logs of one name are two logs
-    path = path_run(points_over_log(URM6, q)[:, -1])
-    assert not compare_runs(path, [run_of(q)]).warnings
 
 
 def test_meshes_that_went_away_since_the_log_was_read_are_told_once(q: FloatArray, tmp_path: Path) -> None:

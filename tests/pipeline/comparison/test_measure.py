@@ -12,11 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from asserting import refusal, there
+from asserting import there
 from made_runs import path_run, run_of
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import LogError
 from urmpipe_models.math3d import RotationForm, translation
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, tcp_trajectory
@@ -114,49 +113,6 @@ def test_joints_that_slide_have_no_turns() -> None:
     found = held(arm_run(joints() + [0.0, 0.0, 7.0], NAMES), arm_run(joints(), NAMES))  # noqa: RUF005
     assert found.joint_turns == (0, 0, 0)
     assert found.joint_statistics["s"].mean == pytest.approx(7.0, abs=1e-14)
-
-
-def test_joints_of_another_number_are_not_compared_and_it_is_said() -> None:
-    reference = arm_run(joints()[:, :2], ("a", "b"), "rr", "two")
-    assert_not_compared(reference, "the log has 3 joints, the reference has 2")
-
-
-def test_joints_that_turn_here_and_slide_there_are_not_compared_and_it_is_said() -> None:
-    assert_not_compared(arm_run(joints(), NAMES, "rpr"), "b, s turn on one side and slide on the other")
-
-
-def test_a_joint_without_any_value_is_not_compared_and_it_is_said() -> None:
-    reference = arm_run(joints(), NAMES)
-    lost = reference.q.copy()
-    lost[:, 1] = np.nan
-    assert_not_compared(replace(reference, q=lost), "a joint has no value at any compared sample")
-
-
-def assert_not_compared(reference: Run, reason: str) -> None:
-    log = arm_run(joints(), NAMES)
-    result = compare_runs(reference, [log])
-    assert result.runs[0].joint_delta is None
-    assert result.runs[0].joint_statistics == {}
-    assert result.runs[0].to_dict()["joints"] == {}
-    said = [w.message for w in result.warnings if w.kind == "joints-not-compared"]
-    assert said == [f"no joint is compared: {reason}"]
-    assert refusal(LogError, held, reference, log, joint=0.1) == (
-        f"log.csv: tolerance (--tolerance): joint: found that {reason}, allowed: the same joints on both"
-        " sides"
-    )
-
-
-def test_all_that_cannot_be_judged_is_refused_at_once() -> None:
-    with pytest.raises(LogError) as error:
-        held(path_run(np.column_stack([T, T, T])), arm_run(joints(), NAMES), joint=0.1, angle=0.1)
-    assert str(error.value) == (
-        "log.csv: tolerance (--tolerance): angle: found a side without an orientation, allowed: joints"
-        " with a robot,"
-        " or a recorded orientation\nlog.csv: tolerance (--tolerance): joint: found that a side has no"
-        " joints,"
-        " allowed: the same joints on both sides"
-    )
-    assert compare_runs(path_run(np.column_stack([T, T, T])), [arm_run(joints(), NAMES)]).warnings == ()
 
 
 # Orientations
