@@ -1,1 +1,1 @@
-"""A log becomes a run: repolarized, on a uniform grid, with kinematics and what is doubtful about it."""
+"""From a joint log to a run: ingest, its chapters and its presentation."""

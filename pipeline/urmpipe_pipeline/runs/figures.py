@@ -1,4 +1,9 @@
-"""The plots of a log over time: joints before and after repolarization, speed, motion."""
+"""The plots of a log over time.
+
+- `joints_figure`: joints before and after repolarization, with each entry of the audit marked.
+- `speed_figure`, `motion_figure`: the tool centre point, velocities and accelerations.
+- `torque_figures`: torques with their limits, their terms, and the energies, of an arm with masses.
+"""
 
 from __future__ import annotations
 
@@ -24,17 +29,19 @@ from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED
 
 EULER = {"rz": AXIS_COLOURS["z"], "ry": AXIS_COLOURS["y"], "rx": AXIS_COLOURS["x"]}
-"""The Euler angles in the colours of their axes."""
-
-NORM = (AXIS_COLOURS["norm"],)
-"""The colour of what is never negative."""
-
-JOINTS_SHARE = 3.4
-"""Height of a plot of joints relative to others: its legend names all of an arm's."""
+NORM = (AXIS_COLOURS["norm"],)  # of what is never negative
+JOINTS_SHARE = 3.4  # height of a plot of joints relative to other plots: its legend names all joints
+TERMS = {  # of a torque; the largest of a slow motion is next to 0
+    "gravity": AXIS_COLOURS["y"],
+    "inertia": AXIS_COLOURS["z"],
+    "centrifugal": AXIS_COLOURS["norm"],
+    "Coriolis": AXIS_COLOURS["x"],
+}
+SUM_COLOUR = JOINT_COLOURS[0]  # of terms or energies: violet
 
 
 def run_figures(run: Run) -> Iterator[Figure]:
-    """Yield the plots of a log that stands alone: joints, speed, motion, torques where they are known."""
+    """Yield the plots of a log: joints, speed, motion, and torques if they are known."""
     yield from joints_figure(run)
     if run.timed and run.tcp is not None:
         yield speed_figure(run.name, run.t_ns, _lengths(run.tcp.velocity))
@@ -43,16 +50,16 @@ def run_figures(run: Run) -> Iterator[Figure]:
 
 
 def times_of(run: Run) -> IntArray | None:
-    """Return the times of a run's samples in [ns], shape (g,); None if the number of a row is its axis."""
+    """Return the times of the samples in [ns], shape (g,); None for static poses, plotted by row."""
     return run.t_ns if run.timed else None
 
 
 def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
-    """Yield the joints as the file has them and repolarized, with every finding marked; nothing of a path.
+    """Yield the joints as in the file and repolarized, with each entry of the audit marked; no figure for a path.
 
     Args:
         run: The log.
-        opened: Number of the view that the viewer opens: 0 before, 1 after; None for both.
+        opened: View that the viewer opens: 0 before, 1 after; None for both.
     """
     if not run.log.joints:
         return
@@ -61,22 +68,23 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     panels = partial(joint_panels, run.log.joints, run.joint_units)
     after = panels("after" if run.audit else "joints", run.q, times_of(run), _marks(run))
     if not run.timed:
-        said = "A pose a row: no motion joins them."
-        yield Figure("Joints", said, joints, (View("Joints", after),), share=JOINTS_SHARE)
+        caption = "A pose a row: no motion joins them."
+        yield Figure("Joints", caption, joints, (View("Joints", after),), share=JOINTS_SHARE)
         return
     if not run.audit:
-        said = "No joint had to be repolarized: the values are those of the file."
+        caption = "No joint had to be repolarized: the values are those of the file."
         views = (View("Joints, no repolarization needed", after),)
-        yield Figure("Joints", said, f"{joints} {said}", views, share=JOINTS_SHARE)
+        yield Figure("Joints", caption, f"{joints} {caption}", views, share=JOINTS_SHARE)
         return
-    wraps, doubts = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
-    marked = f"{wraps} marked{f', {doubts} doubtful' if doubts else ''}"
+    wraps = len(run.repolarizations)
+    rest = len(run.audit) - wraps
+    marked = f"{wraps} marked{f', {rest} doubtful' if rest else ''}"
     before = panels("before", run.log.q, run.log.t_ns, _raw_marks(run))
     both = View("Joints in the file", before), View(f"Joints repolarized ({marked})", after)
     count = text.counted(wraps, "repolarization")
     caption = f"First as in the file, then repolarized. {count}: a triangle marks each, up where a turn was"
     caption += " added, down where one was taken away."
-    caption += f" A cross marks each of {text.counted(doubts, 'other finding')}." if doubts else ""
+    caption += f" A cross marks each of {text.counted(rest, 'other finding')}." if rest else ""
     title = "Joints before and after repolarization"
     alt = f"{joints} First as in the file, then after {count}."
     yield Figure(title, caption, alt, both, opened=opened, share=JOINTS_SHARE)
@@ -91,24 +99,24 @@ def joint_panels(
     marks: Sequence[Mark] = (),
     per: str = "",
 ) -> tuple[Panel, ...]:
-    """Return joints over time, a panel for those that turn and one for those that slide.
+    """Return joints over time, one panel for the revolute and one for the prismatic joints.
 
     Args:
-        names: Of the joints.
-        units: Of each, rad or m.
-        title: What is plotted of them.
-        values: In rad and m, divided by `per`, shape (n, joints).
-        t_ns: Times in [ns], shape (n,); None: the rows are points.
-        marks: Marks on them, by the names of the joints.
+        names: Names of the joints.
+        units: Unit of each joint, rad or m.
+        title: The quantity.
+        values: Values in [rad] and [m], per `per`, shape (n, joints).
+        t_ns: Times in [ns], shape (n,); None: the rows are plotted as points.
+        marks: Marks on the lines, with the names of the joints.
         per: "", "/s" or "/s2".
     """
     panels = []
     for unit in dict.fromkeys(units):
-        own = [j for j, other in enumerate(units) if other == unit]
+        indices = [j for j in range(len(units)) if units[j] == unit]
         line = Line(
-            values if len(own) == len(names) else np.asarray(values)[:, own],
-            tuple(names[j] for j in own),
-            tuple(map(joint_colour, own)),
+            values if len(indices) == len(names) else np.asarray(values)[:, indices],
+            tuple(names[j] for j in indices),
+            tuple(map(joint_colour, indices)),
             points=t_ns is None,
         )
         marked = tuple(mark for mark in marks if mark.name in line.names)
@@ -125,9 +133,9 @@ def speed_figure(name: str, t_ns: IntArray, speed: FloatArray | Computed) -> Fig
 
 
 def motion_figure(run: Run) -> Iterator[Figure]:
-    """Yield rates and accelerations of the joints, and how the tool centre point moves.
+    """Yield velocities and accelerations of the joints, and the motion of the tool centre point.
 
-    By kinematics; of a log without them the position and the orientation that it recorded, if any.
+    The latter is by kinematics; without a robot it is the recorded position and orientation, if any.
     """
     views = (*_derivatives(run), *(_recorded(run) if run.tcp is None else _point(run, run.tcp)))
     if not views:
@@ -145,19 +153,19 @@ def motion_figure(run: Run) -> Iterator[Figure]:
         alt = f"Poses of {point} of {run.name} by forward kinematics."
     else:
         caption = f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a,"
-        caption += f" and its {angles} The angles go on past ±π, so that none jumps."
-        caption += _singular_words(run.tcp)
-        alt = partial(_extent_words, f"Motion of {point} of {run.name}", run.tcp)
+        caption += f" and its {angles} The angles continue beyond ±π, so that none jumps."
+        caption += _format_singular(run.tcp)
+        alt = partial(_format_extent, f"Motion of {point} of {run.name}", run.tcp)
     yield Figure(title, caption, alt, views, share=2.2)
 
 
 def point_name(run: Run) -> str:
-    """Return what the paper calls the tool centre point: p7 of an arm with seven segments."""
+    """Return the symbol of the tool centre point in the paper: p7 of an arm with seven segments."""
     return f"p{len(run.robot.joints)}" if run.robot is not None else "p"
 
 
 def coordinates(values: FloatArray) -> Line:
-    """Return x, y and z in any unit, shape (n, 3), in their colours, by these names in all panels."""
+    """Return x, y and z in any unit, shape (n, 3), with their names and colours in all panels."""
     return Line(values, tuple("xyz"), tuple(AXIS_COLOURS[axis] for axis in "xyz"))
 
 
@@ -178,7 +186,7 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
         size = Line(_lengths(tcp.acceleration), ("‖a‖",), NORM)
         yield View("TCP acceleration", (Panel("a", "m/s2", (coordinates(tcp.acceleration), size), t_ns),))
     tinted = np.asarray(tcp.singular) if np.any(tcp.singular) else None
-    angles = Computed(len(tcp.euler_zyx), partial(_angles, tcp, tinted, follows=run.timed))
+    angles = Computed(len(tcp.euler_zyx), partial(_angles, tcp, tinted, continuous=run.timed))
     euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
 
@@ -187,16 +195,16 @@ def _lengths(vectors: FloatArray) -> Computed:
     return Computed(len(vectors), lambda: row_norms(vectors))
 
 
-def _angles(tcp: PointLog, singular: BoolArray | None, *, follows: bool) -> FloatArray:
+def _angles(tcp: PointLog, singular: BoolArray | None, *, continuous: bool) -> FloatArray:
     """Return the Euler angles in [rad] without those of singular samples, continuous in time."""
-    known = np.asarray(tcp.euler_zyx)
+    angles = np.asarray(tcp.euler_zyx)
     if singular is not None:
-        known = np.where(singular[:, np.newaxis], np.nan, known)
-    return unwrap_euler(known) if follows else known
+        angles = np.where(singular[:, np.newaxis], np.nan, angles)
+    return unwrap_euler(angles) if continuous else angles
 
 
 def _recorded(run: Run) -> Iterator[View]:
-    """Yield position and orientation as a log without kinematics recorded them itself."""
+    """Yield the recorded position and orientation."""
     t_ns, points = times_of(run), not run.timed
     if run.tcp_recorded is not None:
         position = replace(coordinates(run.tcp_recorded), points=points)
@@ -208,77 +216,66 @@ def _recorded(run: Run) -> Iterator[View]:
         yield View("Recorded orientation", (Panel("orientation", unit, (line,), t_ns),))
 
 
-def _singular_words(tcp: PointLog) -> str:
+def _format_singular(tcp: PointLog) -> str:
     count = text.counted(int(np.count_nonzero(tcp.singular)), "sample")
-    said = f" Tinted: {count} with ry at ±π/2, where rz and rx are not separately defined."
-    return said if np.any(tcp.singular) else ""
+    sentence = f" Tinted: {count} with ry at ±π/2, where rz and rx are not separately defined."
+    return sentence if np.any(tcp.singular) else ""
 
 
-def _extent_words(motion: str, tcp: PointLog) -> str:
-    """Say between which places a point moves and how fast."""
+def _format_extent(motion: str, tcp: PointLog) -> str:
+    """Return the sentence on the extent, the speed and the acceleration of a motion."""
     if not np.isfinite(tcp.position).any():
         return f"{motion} over time by forward kinematics. It has no value."
-    said = f"{motion} over time by forward kinematics. It stays {within_words(tcp.position)}"
+    sentence = f"{motion} over time by forward kinematics. It stays {within_words(tcp.position)}"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
         norm = row_norms(values)
         if np.isfinite(norm).any():
-            said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
-    return f"{said}."
+            sentence += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
+    return f"{sentence}."
 
 
 def _raw_marks(run: Run) -> list[Mark]:
-    """Return a mark half way down each jump of the file, and on each other finding."""
+    """Return a mark half way down each jump of the file, and on each other entry of the audit."""
     q = np.asarray(run.log.q)
     return [
-        _mark(run, one, float(q[one.sample, j] - (one.step / 2 if one.kind == "wrap" else 0.0)))
-        for one in run.audit
-        for j in (run.log.joints.index(one.joint),)
+        _mark(run, entry, float(q[entry.sample, j] - (entry.step / 2 if entry.kind == "wrap" else 0.0)))
+        for entry in run.audit
+        for j in (run.log.joints.index(entry.joint),)
     ]
 
 
 def _marks(run: Run) -> list[Mark]:
-    """Return a mark on the repolarized line at the instant of each finding."""
-    found = []
-    for name in dict.fromkeys(one.joint for one in run.audit):
-        own = [one for one in run.audit if one.joint == name]
-        t_ns = np.array([round(one.t * 1e9) for one in own], dtype=np.int64)
+    """Return a mark on the repolarized line at the time of each entry of the audit."""
+    marks = []
+    for name in dict.fromkeys(entry.joint for entry in run.audit):
+        entries = [entry for entry in run.audit if entry.joint == name]
+        t_ns = np.array([round(entry.t * 1e9) for entry in entries], dtype=np.int64)
         column = np.asarray(run.q)[:, run.log.joints.index(name)]
-        rows = _beside(run.t_ns, column, t_ns)
+        rows = _neighbours(run.t_ns, column, t_ns)
         if len(rows):
             values = np.interp(t_ns, run.t_ns[rows], column[rows])
-            found += [_mark(run, *pair) for pair in zip(own, values.tolist(), strict=True)]
-    return found
+            marks += [_mark(run, *pair) for pair in zip(entries, values.tolist(), strict=True)]
+    return marks
 
 
-def _beside(times_ns: IntArray, column: FloatArray, t_ns: IntArray) -> IntArray:
-    """Return the samples before and after each time; where a value is missing, all that there are."""
+def _neighbours(times_ns: IntArray, column: FloatArray, t_ns: IntArray) -> IntArray:
+    """Return the samples before and after each time; if a value is missing, all samples with a value."""
     after = np.searchsorted(times_ns, t_ns)
     rows: IntArray = np.unique(np.clip(np.concatenate((after - 1, after)), 0, len(times_ns) - 1))
     return rows if np.isfinite(column[rows]).all() else np.flatnonzero(np.isfinite(column))
 
 
-def _mark(run: Run, one: AuditEntry, value: float) -> Mark:
-    shape: Shape = "cross" if one.kind != "wrap" else "up" if one.after > one.before else "down"
-    kind = "repolarization" if one.kind == "wrap" else one.kind
-    words = f"{kind} of {one.joint}, row {one.row}: step {one.step:+.4f} rad, k {one.before} → {one.after}"
-    colour = joint_colour(run.log.joints.index(one.joint))
-    return Mark(round(one.t * 1e9), value, shape, colour, words, one.joint)
-
-
-TERMS = {
-    "gravity": AXIS_COLOURS["y"],
-    "inertia": AXIS_COLOURS["z"],
-    "centrifugal": AXIS_COLOURS["norm"],
-    "Coriolis": AXIS_COLOURS["x"],
-}
-"""The terms that a log tells, the largest of a slow motion next to 0, and their colours."""
-
-SUM_COLOUR = JOINT_COLOURS[0]
-"""Of what terms or energies add up to: violet."""
+def _mark(run: Run, entry: AuditEntry, value: float) -> Mark:
+    is_wrap = entry.kind == "wrap"
+    shape: Shape = "cross" if not is_wrap else "up" if entry.after > entry.before else "down"
+    label = f"{'repolarization' if is_wrap else entry.kind} of {entry.joint}, row {entry.row}"
+    label += f": step {entry.step:+.4f} rad, k {entry.before} → {entry.after}"
+    colour = joint_colour(run.log.joints.index(entry.joint))
+    return Mark(round(entry.t * 1e9), value, shape, colour, label, entry.joint)
 
 
 def torque_figures(run: Run) -> Iterator[Figure]:
-    """Yield torques, their terms and the energies; nothing of an arm without masses, or without rates."""
+    """Yield torques, their terms and the energies; none without masses or accelerations."""
     if run.robot is None or run.tau is None or len(run.t_ns) < 2:
         return
     yield joint_torques_figure(run, run.robot, run.tau)
@@ -301,13 +298,13 @@ def joint_torques_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
         views.append(View(f"Torque of {name}", (panel,)))
     caption = "What the joints must exert for this motion, by the masses of the robot (inverse dynamics);"
     caption += " friction and a load at the tool are not in it."
-    made = format_acceleration_source(run.derivative, len(run.t_ns))
-    caption += f"{f' {made}' if made else ''} First all joints, then each, numbered from the base."
+    source = format_acceleration_source(run.derivative, len(run.t_ns))
+    caption += f"{f' {source}' if source else ''} First all joints, then each, numbered from the base."
     if not limited:
         caption += f" {PERIOD_ASSUMED}"
     elif any(math.isfinite(joint.effort) for joint in robot.moving):
         caption += " Dashed: its effort limit; blue: within it; red: beyond it."
-    return Figure("Joint torques", caption, partial(_largest_words, run), tuple(views), share=2.2)
+    return Figure("Joint torques", caption, partial(_format_largest, run), tuple(views), share=2.2)
 
 
 def terms_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
@@ -327,7 +324,7 @@ def terms_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
         "What the torque of each joint is made of: the weights of the links (gravity), the accelerations q″"
         " (inertia), the squares q′² (centrifugal) and the products q′ᵢ q′ⱼ (Coriolis) of the rates. Areas"
         " stack from 0, up where a term is positive and down where it is negative; the line is their sum, the"
-        " torque. A fifth term is that of a load at the tool: a log tells no load, so it is 0 and not drawn.",
+        " torque. A fifth term is that of a load at the tool: a log contains no load, so it is 0 and not drawn.",
         f"Gravity, inertia, centrifugal and Coriolis terms of the torque of each joint of {run.name} over"
         " time, and their sum.",
         tuple(views),
@@ -353,18 +350,18 @@ def energy_figure(run: Run, robot: Chain) -> Figure:
 
 
 def _together(run: Run, tau: FloatArray) -> Iterator[Panel]:
-    """Yield the torques of all joints that turn, and the forces of those that slide, a panel each."""
+    """Yield the torques of the revolute joints, and the forces of the prismatic joints, one panel each."""
     units = run.torque_units
     for unit in dict.fromkeys(units):
-        own = [j for j, other in enumerate(units) if other == unit]
-        values = tau if len(own) == len(units) else np.asarray(tau)[:, own]
-        names, colours = [run.log.joints[j] for j in own], [joint_colour(j) for j in own]
+        indices = [j for j in range(len(units)) if units[j] == unit]
+        values = tau if len(indices) == len(units) else np.asarray(tau)[:, indices]
+        names, colours = [run.log.joints[j] for j in indices], [joint_colour(j) for j in indices]
         line = Line(values, tuple(names), tuple(colours))
         yield Panel(_symbol(unit), unit, (line,), run.t_ns, share=2.0)
 
 
 def _symbol(unit: str, number: str = "") -> str:
-    """Return what a torque in [N.m] or a force in [N] of a joint is called: τ2, F3."""
+    """Return the symbol of a torque in [N.m] or a force in [N] of a joint: τ2, F3."""
     return f"{'τ' if unit == 'N.m' else 'F'}{number}"
 
 
@@ -384,10 +381,11 @@ def _energies(run: Run, robot: Chain) -> FloatArray:
     return np.column_stack((kinetic, potential, kinetic + potential))
 
 
-def _largest_words(run: Run) -> str:
-    """Say how large the torque of each joint becomes, and how much of its limit that is."""
+def _format_largest(run: Run) -> str:
+    """Return the sentences on the largest torque of each joint, and its share of the limit."""
     largest = []
-    for one in run.torque_summaries():
-        share = "" if one.effort_share is None else f" ({text.percent(one.effort_share)} of its limit)"
-        largest.append(f"{one.joint} {one.max:.4g} {one.unit}{share}")
+    for summary in run.torque_summaries():
+        share = summary.effort_share
+        limit = "" if share is None else f" ({text.percent(share)} of its limit)"
+        largest.append(f"{summary.joint} {summary.max:.4g} {summary.unit}{limit}")
     return f"Torques of the joints of {run.name} over time. The largest: {', '.join(largest)}."

@@ -1,4 +1,4 @@
-"""How an ingested log shows itself: how it was read, what was repolarized, how it moves."""
+"""The presentation of a run: how it was read, what was repolarized, how it moves."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from urmpipe_pipeline.presentation.section import Block, Judged, Presentation, R
 from urmpipe_pipeline.runs.figures import run_figures
 from urmpipe_pipeline.runs.parts import (
     audit_table,
-    audit_words,
     file_tables,
+    format_audit,
     inference_table,
     log_events,
     log_facts,
@@ -25,7 +25,7 @@ from urmpipe_pipeline.runs.scene import mass_drawing, path_figure, run_scene
 
 
 def present(run: Run) -> Presentation:
-    """Return what an ingested log shows: nothing of it is judged."""
+    """Return the presentation of a run, which has no verdict."""
     duration = Value(run.duration, "s") if run.timed else None
     body = Section(
         f"Log {run.name}",
@@ -70,19 +70,18 @@ def present(run: Run) -> Presentation:
 
 
 def _headline(run: Run) -> str:
-    """Return how many rows a log has, and what the repolarizer found; of still poses that they are such."""
     if not run.timed:
         return text.counted(run.log.rows, "still pose")
-    return f"{text.counted(run.log.rows, 'row')}, {audit_words(run)}"
+    return f"{text.counted(run.log.rows, 'row')}, {format_audit(run)}"
 
 
 def audit_rows(run: Run) -> Table:
-    """Return what --audit writes: a row a finding."""
-    return rows_table("Audit of the repolarizer", AUDIT_COLUMNS, (one.to_dict() for one in run.audit))
+    """Return the table that --audit writes: one row per entry."""
+    return rows_table("Audit of the repolarizer", AUDIT_COLUMNS, (entry.to_dict() for entry in run.audit))
 
 
 def _page(run: Run) -> Iterator[Block]:
-    """Yield what only a page shows of a log."""
+    """Yield the blocks that only a page shows."""
     yield from playback_figures(run)
     yield from path_figure(run)
     yield from mass_drawing(run)

@@ -1,4 +1,4 @@
-"""What stands in space of an ingested log: its arm, and the path of its tool centre point."""
+"""A run in space: its arm, and the path of its tool centre point."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from urmpipe_pipeline.runs.run import Run
 
 
 def run_scene(run: Run) -> Scene | None:
-    """Return the arm of a log, where it was and where it recorded itself; None without a position."""
+    """Return the scene of a run: its arm, its path and the recorded path; None without a position."""
     arms: tuple[Arm, ...] = ()
     if run.robot is not None and run.tcp is not None:
         masses = bool(run.robot.inertials)
@@ -35,7 +35,7 @@ def run_scene(run: Run) -> Scene | None:
 
 
 def path_figure(run: Run) -> Iterator[SpaceFigure]:
-    """Yield the path of a tool centre point in space, by kinematics and as the log recorded it, if known."""
+    """Yield the path of the tool centre point in space, by kinematics and as recorded."""
     paths, timed, t_ns = [], run.timed, times_of(run)
     if run.tcp_recorded is not None and not (run.tcp is not None and run.log.measured):
         recorded = Path(
@@ -44,37 +44,36 @@ def path_figure(run: Run) -> Iterator[SpaceFigure]:
         paths.append(recorded)
     if run.tcp is not None:
         paths.append(Path("forward kinematics", run.tcp.position, t_ns, AXIS_COLOURS["norm"], line=timed))
-    if not paths or not np.isfinite(known := np.asarray(paths[-1].position)).any():
+    if not paths or not np.isfinite(position := np.asarray(paths[-1].position)).any():
         return
     what = "Path" if timed else "Poses"
     yield SpaceFigure(
         f"{what} in space",
         "The tool centre point, equal scale on all axes.",
-        f"{what} of {run.name} in three dimensions, {within_words(known)}.",
+        f"{what} of {run.name} in three dimensions, {within_words(position)}.",
         tuple(paths),
-        ends(known) if timed else (),
+        ends(position) if timed else (),
     )
 
 
 def mass_drawing(run: Run) -> Iterator[Drawing]:
-    """Yield the arm at its first pose in two projections, with its mass centres; nothing without masses."""
+    """Yield the arm at its first pose in two projections with its mass centres, if it has masses."""
     if run.robot is None or not run.robot.inertials or run.tcp is None:
         return
-    there = np.flatnonzero(np.isfinite(run.q).all(axis=1))
-    if not len(there):
+    rows = np.flatnonzero(np.isfinite(run.q).all(axis=1))
+    if not len(rows):
         return
-    q, name = np.asarray(run.q)[there[0]], run.robot.name
+    q, name = np.asarray(run.q)[rows[0]], run.robot.name
     (skeleton,) = points_over_log(run.robot, q[np.newaxis])
     masses = chain_masses(run.robot, q)
     sketch = Sketch([skeleton], spots=label_skeleton(skeleton), masses=masses)
     alt = f"{name} from the side and from the front, with the centres of"
-    alt += f" its {len(masses)} masses, {sum(one.mass for one in masses):.4g} kg in all."
+    alt += f" its {len(masses)} masses, {sum(centre.mass for centre in masses):.4g} kg in all."
     svg = draw_projections(sketch, (SIDEWAYS, FRONT), f"{name} at the start of {run.name}")
     yield Drawing("Mass centres", alt, svg)
 
 
 def _paths(run: Run) -> Iterator[Path]:
-    """Yield where the log recorded itself, and where it was by its joints."""
     by_joints, timed, t_ns = run.tcp is not None, run.timed, times_of(run)
     if run.tcp_recorded is not None and not (by_joints and run.log.measured):  # no frame joins both
         colour = REFERENCE_COLOUR if by_joints else run_colour(0)

@@ -14,7 +14,7 @@ from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.repolarization.audit import AuditEntry
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.playback import MOST, PARTS, Playback, replay_raw
+from urmpipe_pipeline.runs.playback import MAX_JUMPS, PARTS, Playback, replay_raw
 from urmpipe_pipeline.runs.run import Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
@@ -57,7 +57,7 @@ def test_at_rows_outside_the_jumps_the_tool_is_where_the_run_has_it(run: Run, pl
     np.testing.assert_allclose(played.position[at_rows], run.tcp.position[rows], rtol=0, atol=1e-12)
     np.testing.assert_array_equal(played.velocity[at_rows], run.tcp.velocity[rows])
     np.testing.assert_array_equal(played.acceleration[at_rows], run.tcp.acceleration[rows])
-    assert not played.off[at_rows].any()
+    assert not played.deviation[at_rows].any()
 
 
 def test_of_a_resampled_run_the_rows_of_the_file_are_played_back(run: Run) -> None:
@@ -69,7 +69,7 @@ def test_of_a_resampled_run_the_rows_of_the_file_are_played_back(run: Run) -> No
     places = there(run.tcp).position[rows]
     np.testing.assert_allclose(result.position[~result.jumping], places, rtol=0, atol=1e-12)  # as above
     # Linear over 20 ms instead of 5: the true path lies up to q'' dt^2 / 8 = 1e-4 rad beside the chord.
-    assert result.off[there(result.worst)] == pytest.approx(1.16687706595, abs=2e-4)
+    assert result.deviation[there(result.worst)] == pytest.approx(1.16687706595, abs=2e-4)
 
 
 def test_half_way_down_each_jump_stands_the_mean_of_its_two_rows(run: Run, played: Playback) -> None:
@@ -98,10 +98,10 @@ def test_the_tool_is_as_far_off_as_an_own_computation_finds(run: Run, played: Pl
                 np.abs(played.t - (entry.t + entry.half_period * (2 * part / PARTS - 1))) < 1e-9
             )
             # Sums of seven segments of 0.2 m: 1e-15 m each.
-            assert played.off[at] == pytest.approx(off, abs=1e-12)
+            assert played.deviation[at] == pytest.approx(off, abs=1e-12)
             furthest = max(furthest, off)
     assert played.worst is not None
-    assert played.off[played.worst] == pytest.approx(furthest, abs=1e-12)
+    assert played.deviation[played.worst] == pytest.approx(furthest, abs=1e-12)
     # phi2 lifts the whole arm but its foot: at t_r of row 909 it points the other way.
     assert played.t[played.worst] == pytest.approx(4.5375, abs=1e-12)
     assert furthest == pytest.approx(1.16687706595, abs=1e-10)
@@ -136,8 +136,8 @@ def test_a_missing_sample_at_a_jump_leaves_the_rest(run: Run) -> None:
     before = q.copy()
     result = there(replay_raw(holed))
     np.testing.assert_array_equal(holed.log.q, before)
-    assert np.isfinite(result.off).all()
-    assert result.off[there(result.worst)] == pytest.approx(1.16687706595, abs=1e-10)
+    assert np.isfinite(result.deviation).all()
+    assert result.deviation[there(result.worst)] == pytest.approx(1.16687706595, abs=1e-10)
 
 
 def test_neighbouring_jumps_share_their_row_and_of_many_the_first_are_played(run: Run) -> None:
@@ -145,9 +145,9 @@ def test_neighbouring_jumps_share_their_row_and_of_many_the_first_are_played(run
     q[:, 0] = np.where(np.arange(len(q)) % 2, -3.14, 3.14)
     audit = tuple(
         AuditEntry(run.log.joints[0], row + 1, (row - 0.5) * run.tsp, run.tsp / 2, -6.28, 0, 1)
-        for row in range(1, MOST + 500)
+        for row in range(1, MAX_JUMPS + 500)
     )
     result = there(replay_raw(replace(run, log=replace(run.log, q=q), audit=audit)))
-    assert result.jumps == MOST
-    assert np.count_nonzero(result.jumping) == MOST * PARTS + 1
+    assert result.jumps == MAX_JUMPS
+    assert np.count_nonzero(result.jumping) == MAX_JUMPS * PARTS + 1
     assert (np.diff(result.t) > 0).all()
