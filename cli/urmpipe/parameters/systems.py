@@ -25,7 +25,7 @@ from urmpipe.parameters.shared import (
 if TYPE_CHECKING:
     from urmpipe.systems.logs import LogTable
     from urmpipe_models.networks.forces import Wrench
-    from urmpipe_pipeline.runs.results import Run
+    from urmpipe_pipeline.runs.run import Run
     from urmpipe_pipeline.sources import LogMap, TableLike
 
 _running = partial(Param, heading=Heading.RUNNING)

@@ -55,7 +55,7 @@ def times_of(run: Run) -> IntArray | None:
 
 
 def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
-    """Yield the joints as in the file and repolarized, with each entry of the audit marked; no figure for a path.
+    """Yield the joints as in the file and repolarized, with the audit marked; no figure for a path.
 
     Args:
         run: The log.
@@ -324,7 +324,7 @@ def terms_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
         "What the torque of each joint is made of: the weights of the links (gravity), the accelerations q″"
         " (inertia), the squares q′² (centrifugal) and the products q′ᵢ q′ⱼ (Coriolis) of the rates. Areas"
         " stack from 0, up where a term is positive and down where it is negative; the line is their sum, the"
-        " torque. A fifth term is that of a load at the tool: a log contains no load, so it is 0 and not drawn.",
+        " torque. A fifth term is that of a load at the tool: no load is in a log, so it is 0 and not drawn.",
         f"Gravity, inertia, centrifugal and Coriolis terms of the torque of each joint of {run.name} over"
         " time, and their sum.",
         tuple(views),
