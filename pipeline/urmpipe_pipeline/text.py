@@ -1,4 +1,9 @@
-"""How values are written: numbers with their units, exact numbers for programs, CSV cells, JSON."""
+"""How values are written: numbers with their units, counts, names, CSV cells and JSON.
+
+Numbers in tables and sentences are plain digits, `SIGNIFICANT` of them, or as many as distinguish a value
+from its limit; the unit is in the head of a table, or follows in a sentence. Programs get the shortest text
+that gives the same double.
+"""
 
 from __future__ import annotations
 
@@ -14,80 +19,73 @@ from urmpipe_models.elementwise import IntArray
 from urmpipe_models.errors import escape_control_characters
 from urmpipe_models.measure_units import compatible_units, conversion_factor
 
-NOTHING = "–"
-"""Stands where there is no value."""
+NOTHING = "–"  # in place of a missing value
 
-SIGNIFICANT = 4
-"""Digits of a length or an angle that people read; JSON, CSV and the tips of a report's cells have all."""
+SIGNIFICANT = 4  # digits of a length or an angle; JSON, CSV and the tips of a report's cells have all
+MAX_INTEGER_DIGITS = 9  # of a number without an exponent
+MAX_DECIMALS = 4  # of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians
+MAX_DISTINGUISHING_DECIMALS = 18  # that distinguish a value from its limit
+MIN_STANDARD_ERROR = 1e-3  # [ms], of a time: a fit may result in less, but no clock is more exact
+MAX_NAMED_ROWS = 6  # rows or intervals of rows in a sentence; the others are counted
 
-LONGEST = 9
-"""Digits before the point of a number without an exponent."""
-
-DIGITS = 4
-"""Digits after the point of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians."""
-
-FEWEST = 18
-"""Digits after the point at most that tell a value from what it is held against."""
-
-FINEST = 1e-3
-"""The least standard error of a time that is said, in [ms]: a fit may claim less, but no clock keeps it."""
-
-NAMED = 6
-"""Rows or stretches of rows that are named in a sentence; the others are counted."""
-
+# Units that are shown, and their factors from the SI unit.
 SHOWN = {si: (unit, conversion_factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
-"""The units that people read, and how many of them one of the SI unit is."""
 
 
-def display_unit(unit: str, wanted: str) -> tuple[str, float]:
-    """Return the unit to show a quantity in, and how many of it one of its own is.
+def display_unit(unit: str, preferred: str) -> tuple[str, float]:
+    """Return the unit to show a quantity in, and the factor to it.
 
     Args:
-        unit: Its own unit, one of SI.
-        wanted: The unit that people prefer; empty for none. One that is not known, or measures something else
-            (an FMU may say anything), is not shown: the own one is.
+        unit: Unit of the quantity, in SI.
+        preferred: Preferred unit; empty for none. One that is unknown or of another quantity (an FMU may
+            state any) is not used.
     """
-    return (wanted, conversion_factor(unit, wanted)) if wanted in compatible_units(unit) else (unit, 1.0)
+    if preferred in compatible_units(unit):
+        return preferred, conversion_factor(unit, preferred)
+    return unit, 1.0
 
 
 def number(value: float | None, unit: str, against: float | None = None) -> str:
     """Return a length in [m] as [mm], or an angle in [rad] as [deg].
 
-    Four significant digits, or as many as tell it from what it is held against. What is far below a
-    thousandth, or below what it is held against, ends at the same digit as that: 0.0000.
+    It has four significant digits, or as many as distinguish it from its limit. A value far below a
+    thousandth, or far below its limit, ends at the same digit as that: 0.0000.
 
     Args:
-        value: In [m] or [rad].
+        value: Value in [m] or [rad].
         unit: m or rad.
-        against: What it is held against, in the same unit.
+        against: Its limit in the same unit, if it has one.
     """
     if value is None or not math.isfinite(value):
         return NOTHING
     scale = SHOWN[unit][1]
     scaled = value * scale
-    finest = max(DIGITS, decimals(against * scale)) if against else DIGITS
+    finest = max(MAX_DECIMALS, decimals(against * scale)) if against else MAX_DECIMALS
     digits = min(decimals(scaled), finest) if abs(scaled) < 1e-3 else decimals(scaled)
     if against is not None and abs(value) != against:
-        while digits < FEWEST and f"{abs(scaled):.{digits}f}" == f"{against * scale:.{digits}f}":
+        while (
+            digits < MAX_DISTINGUISHING_DECIMALS
+            and f"{abs(scaled):.{digits}f}" == f"{against * scale:.{digits}f}"
+        ):
             digits += 1
     return f"{round(scaled, digits) + 0.0:.{digits}f}"  # + 0.0: no -0.0000
 
 
 def decimals(value: float) -> int:
-    """Return how many digits after the point show `SIGNIFICANT` digits of a value; one of 0."""
+    """Return the number of decimals that show `SIGNIFICANT` digits of a value; one for 0."""
     if not value or not math.isfinite(value):
         return 1
-    before = math.floor(math.log10(float(f"{abs(value):.{SIGNIFICANT - 1}e}")))  # 9.9996 is shown as 10.00
-    return max(SIGNIFICANT - 1 - before, 0)
+    exponent = math.floor(math.log10(float(f"{abs(value):.{SIGNIFICANT - 1}e}")))  # 9.9996 is shown as 10.00
+    return max(SIGNIFICANT - 1 - exponent, 0)
 
 
 def quantity(value: float | None, unit: str, against: float | None = None) -> str:
-    """Return a number with the unit that people read: "2.500 mm", "0.1234 deg"."""
+    """Return a number with the unit that is shown: "2.500 mm", "0.1234 deg"."""
     return f"{number(value, unit, against)} {SHOWN[unit][0]}"
 
 
 def limit(value: float | None, unit: str = "m") -> str:
-    """Return a tolerance in [m] as [mm] or in [rad] as [deg], with no more digits than it has."""
+    """Return a tolerance in [m] as [mm] or in [rad] as [deg], with all its digits."""
     return NOTHING if value is None else f"{value * SHOWN[unit][1]:.6g}"
 
 
@@ -101,22 +99,22 @@ def in_words(value: float, unit: str) -> str:
 def significant(value: float) -> str:
     """Return a number in any unit with `SIGNIFICANT` digits, with an exponent if very small or large."""
     rounded = float(f"{value:.{SIGNIFICANT}g}")
-    return f"{rounded:.{LONGEST}g}" if abs(rounded) >= 1.0 else f"{rounded:.{SIGNIFICANT}g}"
+    return f"{rounded:.{MAX_INTEGER_DIGITS}g}" if abs(rounded) >= 1.0 else f"{rounded:.{SIGNIFICANT}g}"
 
 
 def allowed(value: float, unit: str = "m") -> str:
-    """Return a given value with the unit that people read: "3.5 mm", "0.5 deg", "5 %", "0.25 m/s"."""
+    """Return a stated value with the unit that is shown: "3.5 mm", "0.5 deg", "5 %", "0.25 m/s"."""
     shown, scale = SHOWN.get(unit, (unit, 1.0)) if unit != "1" else ("%", 100.0)
     return f"{value * scale:.6g} {shown}"
 
 
 def point(values: Any) -> str:
-    """Return x, y, z in [m]: tenths of a millimetre."""
+    """Return x, y, z in [m], to tenths of a millimetre."""
     return ", ".join(f"{value:.4f}" if math.isfinite(value) else NOTHING for value in values)
 
 
 def seconds(value: float) -> str:
-    """Return a time in [s]: milliseconds, and microseconds where they are not 0."""
+    """Return a time in [s] to milliseconds, or to microseconds if these are not 0."""
     if not math.isfinite(value):
         return NOTHING
     text = f"{round(value, 6) + 0.0:.6f}"  # + 0.0: no -0.000
@@ -124,8 +122,8 @@ def seconds(value: float) -> str:
 
 
 def standard_error(value: float) -> str:
-    """Return the standard error of a time in [s] as [ms]: two digits, none finer than a microsecond."""
-    return f"{float(f'{max(1e3 * value, FINEST):.2g}'):.6g} ms"
+    """Return the standard error of a time in [s] as [ms]: two digits, at least a microsecond."""
+    return f"{float(f'{max(1e3 * value, MIN_STANDARD_ERROR):.2g}'):.6g} ms"
 
 
 def percent(share: float) -> str:
@@ -143,9 +141,9 @@ def percent(share: float) -> str:
 
 
 def portion(share: float) -> str:
-    """Return how much of something is used up, to stand before it: "71.0 % of", "1.2 times".
+    """Return a share to precede its whole: "71.0 % of", "1.2 times".
 
-    Above 1 it has three digits, or as many as tell it from 1, without an exponent.
+    Above 1 it has three digits, or as many as distinguish it from 1, without an exponent.
     """
     if share <= 1.0:
         return f"{percent(share)} of"
@@ -169,20 +167,20 @@ def rows_text(rows: Sequence[int] | IntArray) -> str:
     last = np.append(first[1:], len(rows)) - 1
     parts = [
         str(rows[a]) if a == b else f"{rows[a]}-{rows[b]}"
-        for a, b in zip(first[:NAMED], last[:NAMED], strict=True)
+        for a, b in zip(first[:MAX_NAMED_ROWS], last[:MAX_NAMED_ROWS], strict=True)
     ]
-    more = len(rows) - 1 - last[:NAMED][-1]
-    said = ", ".join(parts) + (f" and {more} more" if more else "")
-    return f"row{'' if len(rows) == 1 else 's'} {said}"
+    more = len(rows) - 1 - last[:MAX_NAMED_ROWS][-1]
+    listed = ", ".join(parts) + (f" and {more} more" if more else "")
+    return f"row{'' if len(rows) == 1 else 's'} {listed}"
 
 
 def enumerated(words: Sequence[str]) -> str:
-    """Return some words as a list in a sentence: "a", "a and b", "a, b and c"."""
+    """Return texts as a list in a sentence: "a", "a and b", "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def unique(names: Sequence[str]) -> list[str]:
-    """Return the names, those that repeat with a number: "log", "log-2"."""
+    """Return names, those that repeat with a number: "log", "log-2"."""
     result: list[str] = []
     for name in names:
         candidate, number = name, 2
@@ -193,28 +191,24 @@ def unique(names: Sequence[str]) -> list[str]:
 
 
 def exact(value: Any) -> str:
-    """Return a value for programs, nothing for None: a float in the fewest digits that read back as it."""
+    """Return a value for programs: empty for None, a float in the fewest digits that give the same double."""
     if value is None:
         return ""
     return value if isinstance(value, str) else repr(value)
 
 
 def encodable(value: str) -> str:
-    """Return a text without the lone surrogates that stand for undecodable bytes of a file name."""
+    """Return a text without lone surrogates, which Python has for undecodable bytes of a file name."""
     return value.encode("utf-8", "replace").decode("utf-8")
 
 
-_FORMULA = ("=", "+", "-", "@")
-"""How a cell begins that a spreadsheet takes for a formula, and runs (OWASP, CSV Injection)."""
+_FORMULA = ("=", "+", "-", "@")  # start of a cell that a spreadsheet runs as a formula (OWASP, CSV Injection)
 
 
 def csv_text(text: str) -> str:
-    """Return a text as a cell of CSV: on one line, behind an apostrophe where a spreadsheet would run it."""
-    return (
-        f"'{escape_control_characters(text)}"
-        if text.startswith(_FORMULA)
-        else escape_control_characters(text)
-    )
+    """Return a text as a cell of CSV: on one line, after an apostrophe if a spreadsheet would run it."""
+    escaped = escape_control_characters(text)
+    return f"'{escaped}" if text.startswith(_FORMULA) else escaped
 
 
 def without_apostrophe(cell: str) -> str:
@@ -223,7 +217,7 @@ def without_apostrophe(cell: str) -> str:
 
 
 def to_json_value(value: Any) -> Any:
-    """Return a value as JSON can hold it: arrays as lists, NaN and infinities as null."""
+    """Return a value as JSON: arrays as lists, NaN and infinities as null."""
     if isinstance(value, Mapping):
         return {str(key): to_json_value(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -238,10 +232,10 @@ def to_json_value(value: Any) -> Any:
 
 
 def parse_json(written: str | bytes) -> Any:
-    """Return the value that JSON holds.
+    """Return the value of a JSON text.
 
     Raises:
-        ValueError: If it is no JSON, or nested too deep to be read.
+        ValueError: If it is no JSON, or nested too deep.
     """
     try:
         return json.loads(written)
@@ -250,5 +244,5 @@ def parse_json(written: str | bytes) -> Any:
 
 
 def format_option_value(value: Any) -> str:
-    """Return an option's value as one line: text as it is, the rest as JSON."""
+    """Return the value of an option as one line: text as it is, other values as JSON."""
     return value if isinstance(value, str) else json.dumps(to_json_value(value), ensure_ascii=False)
