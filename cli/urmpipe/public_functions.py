@@ -17,11 +17,10 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from urmpipe.parameters.param import Kind, Param, params_of, read_parameters
-from urmpipe_models.display import Displayable
+from urmpipe_models.display import Displayable, format_count
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, format_value
 from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.recording import is_recording
-from urmpipe_pipeline.text import counted
 
 Parameters = ParamSpec("Parameters")
 ResultT = TypeVar("ResultT")
@@ -156,5 +155,5 @@ def raise_warnings(strict: bool, found: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are errors; ignored columns are not warnings."""
     errors = [warning for warning in found if warning.kind != PASSED_OVER]
     if strict and errors:
-        first = Finding(parameter="strict", found=counted(len(errors), "warning"), allowed="none")
+        first = Finding(parameter="strict", found=format_count(len(errors), "warning"), allowed="none")
         raise LogError(first, *(warning.as_finding() for warning in errors))

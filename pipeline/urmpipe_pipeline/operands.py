@@ -17,6 +17,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import (
     Finding,
     Hint,
@@ -42,7 +43,6 @@ from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
-from urmpipe_pipeline.text import counted
 
 NOT_A_RUN = "found the recording of {}, allowed: one that ingest wrote"
 BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
@@ -207,7 +207,7 @@ class _Blocks:
         if len(self._names) in {0, 1, self._simulations} and (self._simulations or not self._names):
             return
         names = ", ".join(map(format_value, self._names))
-        found = f"{names} with {counted(self._simulations, 'simulation')}"
+        found = f"{names} with {format_count(self._simulations, 'simulation')}"
         allowed = "a block of a simulation, or one for each of several"
         raise OptionError(Finding(parameter="block", found=found, allowed=allowed))
 

@@ -25,7 +25,7 @@ from typing import Literal, NamedTuple
 
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_models.files import keep_permissions
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 OutputKind = Literal[
     "recording", "report", "map", "export", "audit", "junit", "statistics", "figure", "drawing", "fmu",
@@ -129,7 +129,7 @@ def safe_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> Iterato
 def check_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
     """Raise an `OutputError` if an output may not be written there: before long work whose result it is."""
     name = os.fspath(path.absolute())
-    if kind == "recording" and encodable(name) != name:  # in Linux a name may contain any bytes
+    if kind == "recording" and drop_surrogates(name) != name:  # in Linux a name may contain any bytes
         message = "found a name that is not UTF-8 text, which Rerun cannot open, allowed: one that is"
         raise OutputError(Finding(message, str(path)))
     try:

@@ -32,7 +32,7 @@ MAX_NAMED_ROWS = 6  # rows or intervals of rows in a sentence; the others are co
 SHOWN = {si: (unit, conversion_factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
 
 
-def display_unit(unit: str, preferred: str) -> tuple[str, float]:
+def choose_unit(unit: str, preferred: str) -> tuple[str, float]:
     """Return the unit to show a quantity in, and the factor to it.
 
     Args:
@@ -45,7 +45,7 @@ def display_unit(unit: str, preferred: str) -> tuple[str, float]:
     return unit, 1.0
 
 
-def number(value: float | None, unit: str, against: float | None = None) -> str:
+def format_number(value: float | None, unit: str, against: float | None = None) -> str:
     """Return a length in [m] as [mm], or an angle in [rad] as [deg].
 
     It has four significant digits, or as many as distinguish it from its limit. A value far below a
@@ -79,41 +79,41 @@ def decimals(value: float) -> int:
     return max(SIGNIFICANT - 1 - exponent, 0)
 
 
-def quantity(value: float | None, unit: str, against: float | None = None) -> str:
+def format_quantity(value: float | None, unit: str, against: float | None = None) -> str:
     """Return a number with the unit that is shown: "2.500 mm", "0.1234 deg"."""
-    return f"{number(value, unit, against)} {SHOWN[unit][0]}"
+    return f"{format_number(value, unit, against)} {SHOWN[unit][0]}"
 
 
-def limit(value: float | None, unit: str = "m") -> str:
+def format_limit(value: float | None, unit: str = "m") -> str:
     """Return a tolerance in [m] as [mm] or in [rad] as [deg], with all its digits."""
     return NOTHING if value is None else f"{value * SHOWN[unit][1]:.6g}"
 
 
-def in_words(value: float, unit: str) -> str:
+def format_rounded(value: float, unit: str) -> str:
     """Return an angle, a length or a rate of one in [rad] or [m] for a sentence: "12.5 deg/s"."""
     base, slash, per = unit.partition("/")
     shown, scale = SHOWN[base]
-    return f"{significant(value * scale)} {shown}{slash}{per}"
+    return f"{format_significant(value * scale)} {shown}{slash}{per}"
 
 
-def significant(value: float) -> str:
+def format_significant(value: float) -> str:
     """Return a number in any unit with `SIGNIFICANT` digits, with an exponent if very small or large."""
     rounded = float(f"{value:.{SIGNIFICANT}g}")
     return f"{rounded:.{MAX_INTEGER_DIGITS}g}" if abs(rounded) >= 1.0 else f"{rounded:.{SIGNIFICANT}g}"
 
 
-def allowed(value: float, unit: str = "m") -> str:
+def format_stated(value: float, unit: str = "m") -> str:
     """Return a stated value with the unit that is shown: "3.5 mm", "0.5 deg", "5 %", "0.25 m/s"."""
     shown, scale = SHOWN.get(unit, (unit, 1.0)) if unit != "1" else ("%", 100.0)
     return f"{value * scale:.6g} {shown}"
 
 
-def point(values: Any) -> str:
+def format_point(values: Any) -> str:
     """Return x, y, z in [m], to tenths of a millimetre."""
     return ", ".join(f"{value:.4f}" if math.isfinite(value) else NOTHING for value in values)
 
 
-def seconds(value: float) -> str:
+def format_seconds(value: float) -> str:
     """Return a time in [s] to milliseconds, or to microseconds if these are not 0."""
     if not math.isfinite(value):
         return NOTHING
@@ -121,12 +121,12 @@ def seconds(value: float) -> str:
     return text[:-3] + text[-3:].rstrip("0")
 
 
-def standard_error(value: float) -> str:
+def format_standard_error(value: float) -> str:
     """Return the standard error of a time in [s] as [ms]: two digits, at least a microsecond."""
     return f"{float(f'{max(1e3 * value, MIN_STANDARD_ERROR):.2g}'):.6g} ms"
 
 
-def percent(share: float) -> str:
+def format_percent(share: float) -> str:
     """Return a share in [%], never rounded to 0 or to 100 when it is not, and without an exponent."""
     scaled = share * 100.0
     if scaled in (0.0, 100.0):
@@ -140,13 +140,13 @@ def percent(share: float) -> str:
     return f"{scaled:.2g} %" if scaled < 1.0 else f"{scaled:.1f} %"
 
 
-def portion(share: float) -> str:
+def format_portion(share: float) -> str:
     """Return a share to precede its whole: "71.0 % of", "1.2 times".
 
     Above 1 it has three digits, or as many as distinguish it from 1, without an exponent.
     """
     if share <= 1.0:
-        return f"{percent(share)} of"
+        return f"{format_percent(share)} of"
     if share >= 1000.0:
         return f"{share:.0f} times"
     digits = 3
@@ -155,12 +155,7 @@ def portion(share: float) -> str:
     return f"{share:.{digits}g} times"
 
 
-def counted(count: int, noun: str) -> str:
-    """Return a count with its noun in the right number: "1 log", "2 logs"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def rows_text(rows: Sequence[int] | IntArray) -> str:
+def format_rows(rows: Sequence[int] | IntArray) -> str:
     """Return rows, shape (n,), for a sentence: "row 3", "rows 3, 7-9 and 40 more"."""
     rows = np.asarray(rows)
     first = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) != 1)
@@ -174,12 +169,12 @@ def rows_text(rows: Sequence[int] | IntArray) -> str:
     return f"row{'' if len(rows) == 1 else 's'} {listed}"
 
 
-def enumerated(words: Sequence[str]) -> str:
+def join_words(words: Sequence[str]) -> str:
     """Return texts as a list in a sentence: "a", "a and b", "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def unique(names: Sequence[str]) -> list[str]:
+def make_unique(names: Sequence[str]) -> list[str]:
     """Return names, those that repeat with a number: "log", "log-2"."""
     result: list[str] = []
     for name in names:
@@ -190,14 +185,14 @@ def unique(names: Sequence[str]) -> list[str]:
     return result
 
 
-def exact(value: Any) -> str:
+def format_exact(value: Any) -> str:
     """Return a value for programs: empty for None, a float in the fewest digits that give the same double."""
     if value is None:
         return ""
     return value if isinstance(value, str) else repr(value)
 
 
-def encodable(value: str) -> str:
+def drop_surrogates(value: str) -> str:
     """Return a text without lone surrogates, which Python has for undecodable bytes of a file name."""
     return value.encode("utf-8", "replace").decode("utf-8")
 
@@ -205,14 +200,14 @@ def encodable(value: str) -> str:
 _FORMULA = ("=", "+", "-", "@")  # start of a cell that a spreadsheet runs as a formula (OWASP, CSV Injection)
 
 
-def csv_text(text: str) -> str:
+def to_csv_text(text: str) -> str:
     """Return a text as a cell of CSV: on one line, after an apostrophe if a spreadsheet would run it."""
     escaped = escape_control_characters(text)
     return f"'{escaped}" if text.startswith(_FORMULA) else escaped
 
 
-def without_apostrophe(cell: str) -> str:
-    """Return a cell without the apostrophe of `csv_text`."""
+def strip_apostrophe(cell: str) -> str:
+    """Return a cell without the apostrophe of `to_csv_text`."""
     return cell[1:] if cell.startswith(tuple(f"'{sign}" for sign in _FORMULA)) else cell
 
 

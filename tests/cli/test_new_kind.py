@@ -42,7 +42,7 @@ from urmpipe_pipeline.presentation.section import (
 from urmpipe_pipeline.results import Kind, present
 from urmpipe_pipeline.tables.csv_files import write_table
 from urmpipe_pipeline.tables.junit import write_junit
-from urmpipe_pipeline.text import number
+from urmpipe_pipeline.text import format_number
 
 LIMIT = 0.25
 
@@ -156,7 +156,7 @@ def test_a_report_has_its_section_beside_those_of_other_results() -> None:
         "Swing other",
         "Angle over time",
         "Turns",
-        number(largest, "rad", LIMIT),
+        format_number(largest, "rad", LIMIT),
     ):
         assert words in page
     assert [one["verdict"] for one in report.to_dict()["recordings"]] == ["fail", "fail"]

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import shell_quote
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Statistics
@@ -25,7 +26,7 @@ from urmpipe_pipeline.text import format_option_value
     ],
 )
 def test_a_standard_error_is_said_no_finer_than_a_microsecond(error: float, written: str) -> None:
-    assert text.standard_error(error) == written
+    assert text.format_standard_error(error) == written
 
 
 def test_a_tolerance_names_its_quantities() -> None:
@@ -37,10 +38,10 @@ def test_a_tolerance_names_its_quantities() -> None:
 
 
 def test_counts_lists_and_options() -> None:
-    assert text.counted(1, "log") == "1 log"
-    assert text.counted(0, "log") == "0 logs"
-    assert text.enumerated(("a",)) == "a"
-    assert text.enumerated(("a", "b", "c")) == "a, b and c"
+    assert format_count(1, "log") == "1 log"
+    assert format_count(0, "log") == "0 logs"
+    assert text.join_words(("a",)) == "a"
+    assert text.join_words(("a", "b", "c")) == "a, b and c"
     assert format_option_value("x") == "x"
     assert format_option_value((0.0, None, "é")) == '[0.0, null, "é"]'
 
@@ -74,7 +75,7 @@ def test_how_much_of_a_tolerance_is_used_is_never_rounded_to_all_of_it(largest: 
     ],
 )
 def test_a_share_is_never_rounded_to_none_or_all_of_it(share: float, written: str) -> None:
-    assert text.percent(share) == written
+    assert text.format_percent(share) == written
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from urmpipe.command_line import operand
 from urmpipe.parameters import kinds
 from urmpipe.parameters.comparing import Ingest
 from urmpipe.parameters.shared import ROBOT
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, OptionError
 
 if TYPE_CHECKING:
@@ -54,11 +55,10 @@ def ingest(call: Call, logs: tuple[Path, ...], output: Path | None, explain: boo
 def _iter_lines(run: Run, is_replaced: bool, options: Mapping[str, Any]) -> Iterator[str]:
     from urmpipe.printing.terminal import recording_line
     from urmpipe_models.errors import shell_quote
-    from urmpipe_pipeline.text import counted
 
     if run.recording:
         yield recording_line(run.recording, is_replaced)
     if audit := options["audit"]:
-        yield f"Audit: {audit}  ({counted(len(run.audit), 'line')})"
+        yield f"Audit: {audit}  ({format_count(len(run.audit), 'line')})"
     if log_map := options["write_map"]:
         yield f"Map: {log_map}  (use it: urmpipe ingest LOG --map {shell_quote(log_map)})"

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from urmpipe.printing.terminal import LISTED, format_verdict, join_lines, new_console
-from urmpipe_models.display import HEAD_ROWS
+from urmpipe_models.display import HEAD_ROWS, format_count
 from urmpipe_models.errors import escape_html, escape_line
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.brief import (
@@ -54,7 +54,7 @@ def print_presentation(presentation: Presentation, *, every: bool = False) -> No
     for section in selected:
         _print_section(console, section)
     if hidden := len(sections) - len(selected):
-        console.print(f"{text.counted(hidden, 'more section')}: --json, or the report")
+        console.print(f"{format_count(hidden, 'more section')}: --json, or the report")
 
 
 def print_verdict(presentation: Presentation, *, err: bool = False) -> None:

@@ -16,6 +16,7 @@ from urmpipe_fmus.blocks import block_names, block_option_help, block_summary, n
 from urmpipe_fmus.build.description import TITLES as VARIABLE_HEADS
 from urmpipe_fmus.build.description import variable_row
 from urmpipe_fmus.cosim.checks import ELEMENT
+from urmpipe_models.display import format_count
 from urmpipe_pipeline import text
 
 if TYPE_CHECKING:
@@ -144,7 +145,7 @@ def print_checked(report: CheckReport) -> None:
     heads = ("Variable", "Causality", "Type", "Unit", "Start", "Min", "Max", "Before", "After", "Description")
     if console.width < MIN_DESCRIPTION_WIDTH:
         heads = heads[:-1]
-    table = new_table(*heads, title=text.counted(len(report.variables), "variable"))
+    table = new_table(*heads, title=format_count(len(report.variables), "variable"))
     rows = _arrays(report.variables)
     for name, elements in rows[:LISTED]:
         table.add_row(*_variable_cells(name, elements)[: len(heads)])

@@ -19,13 +19,13 @@ from urmpipe.public_functions import PathLike
 from urmpipe.reading import resolve_reading
 from urmpipe_fmus.block import Table
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.grid import REGULAR
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
-from urmpipe_pipeline.text import counted
 
 IN_MAP = {  # options of reading that a map states
     *("decimal", "delimiter", "interval", "joints", "layout", "period"),
@@ -125,7 +125,7 @@ def _check_complete(file: str, quantities: Sequence[tuple[str, str, FloatArray]]
     for name, _, values in quantities:
         rows, columns = np.nonzero(~np.isfinite(values))
         if len(rows):
-            count = counted(len(np.unique(rows)), "row")
+            count = format_count(len(np.unique(rows)), "row")
             message = f"found {count} without a value, allowed: one in every row"
             findings.append(Finding(message, file, row=int(rows[0]) + 1, column=f"{name}[{columns[0] + 1}]"))
     if findings:

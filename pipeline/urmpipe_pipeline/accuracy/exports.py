@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.exports import (
     columns_of,
 )
 from urmpipe_pipeline.runs.exports import export_metadata, poses_by_kinematics
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 
 def exports(result: AccuracyResult) -> Exports:
@@ -52,9 +52,9 @@ def velocities_table(result: AccuracyResult) -> ExportTable:
 
 def samples_table(result: AccuracyResult) -> ExportTable:
     """Return the samples of all motions one below the other: points, deviation, joints, drives."""
-    motions, joints = result.motions, [encodable(name) for name in result.robot.coordinates]
+    motions, joints = result.motions, [drop_surrogates(name) for name in result.robot.coordinates]
     driven, units, rates = (
-        [encodable(name) for name in result.driven],
+        [drop_surrogates(name) for name in result.driven],
         result.joint_units,
         [f"{one}/s" for one in result.joint_units],
     )
@@ -84,8 +84,8 @@ def _fields(result: AccuracyResult, table: ExportTable) -> dict[str, Any]:
     times = [one.values.ns / 1e9 for one in table.columns if isinstance(one.values, Times)]
     speed, limit, nothing = result.running_speed, result.limit, np.empty((0, 0))
     return {
-        "name": encodable(result.name),
-        "robot": encodable(result.robot.name),
+        "name": drop_surrogates(result.name),
+        "robot": drop_surrogates(result.robot.name),
         "t": times[0][:, np.newaxis] if times else nothing,
         "values": np.column_stack([np.asarray(one.values) for one in columns]),
         "names": [one.name for one in columns],

@@ -63,7 +63,7 @@ def velocity_figure(result: AccuracyResult) -> Figure:
             found,
             "diamond",
             colour,
-            f"{format_velocity(one.velocity)}: {text.quantity(found, 'm')}",
+            f"{format_velocity(one.velocity)}: {text.format_quantity(found, 'm')}",
             name,
         )
         for one in result.errors
@@ -102,14 +102,14 @@ def _velocity_caption(result: AccuracyResult, *, published: bool) -> str:
     said += " Dotted: the running speed, the largest within it." if result.running_speed is not None else ""
     said += ' Dark crosses: [Iso9283] Fig. 7; at the triangle only "more than" is known.' if published else ""
     gone = [format_velocity(one.velocity) for one in result.errors if one.diverged is not None]
-    return said + (f" No point at {text.enumerated(gone)}: the arm diverged." if gone else "")
+    return said + (f" No point at {text.join_words(gone)}: the arm diverged." if gone else "")
 
 
 def _errors_told(result: AccuracyResult) -> str:
     """Return the error that decides at each velocity."""
     said = ((one, result.judged_error(one)) for one in result.errors)
     return "; ".join(
-        f"{format_velocity(one.velocity)} {'diverged' if found is None else text.quantity(found, 'm')}"
+        f"{format_velocity(one.velocity)} {'diverged' if found is None else text.format_quantity(found, 'm')}"
         for one, found in said
     )
 
@@ -135,8 +135,9 @@ def _deviation(result: AccuracyResult, motion: DrivenMotion) -> Figure:
         "Deviation over time",
         "Δ is planned minus real at the same time; path is the distance from the nearest point of the path."
         f" Diamonds: the largest. Dotted: middles of corners.{drawn}",
-        f"Deviation at {format_velocity(motion.velocity)}: at most {text.quantity(float(norm.max()), 'm')}"
-        f" from the set point, {text.quantity(float(far.max()), 'm')} from the path.",
+        f"Deviation at {format_velocity(motion.velocity)}: at most"
+        f" {text.format_quantity(float(norm.max()), 'm')} from the set point,"
+        f" {text.format_quantity(float(far.max()), 'm')} from the path.",
         (View("delta = planned - real", tuple(panels)), View("Distance from the path", (path,))),
         _instants(motion),
         opened=0 if result.limited_error == "time" else 1,
@@ -207,7 +208,7 @@ def _drives(result: AccuracyResult, motion: DrivenMotion) -> Figure:
         "Voltages and currents",
         "Voltages of the drives, dashed: the largest that they have; and their currents.",
         f"Voltages and currents of {', '.join(names)} at {format_velocity(motion.velocity)}. At the limit:"
-        f" {text.percent(motion.errors.saturated_share)} of the samples.",
+        f" {text.format_percent(motion.errors.saturated_share)} of the samples.",
         (View("Voltages", tuple(panels)), View("Currents", (current,))),
         share=1.6,
     )

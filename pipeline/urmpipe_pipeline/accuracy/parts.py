@@ -43,7 +43,7 @@ def format_divergence(diverged: Divergence) -> str:
 
 def format_limit(result: AccuracyResult) -> str:
     """Return the limit, and its error: "0.4 mm (time)"."""
-    return "" if result.limit is None else f"{text.allowed(result.limit)} ({result.limited_error})"
+    return "" if result.limit is None else f"{text.format_stated(result.limit)} ({result.limited_error})"
 
 
 def headline(result: AccuracyResult) -> str:
@@ -65,10 +65,10 @@ def _format_errors(result: AccuracyResult) -> str:
     parts = []
     if known:
         error, velocity = max(known, key=lambda pair: pair[0])
-        off = f"is up to {text.quantity(error, 'm')} off ({result.limited_error})"
+        off = f"is up to {text.format_quantity(error, 'm')} off ({result.limited_error})"
         parts.append(f"{off} at {format_velocity(velocity)}")
     if diverged:
-        parts.append(f"diverges at {text.enumerated(diverged)}")
+        parts.append(f"diverges at {text.join_words(diverged)}")
     return ", and ".join(parts)
 
 
@@ -87,7 +87,7 @@ def facts(result: AccuracyResult) -> Iterator[Fact]:
     if result.limit is not None:
         speed = result.running_speed
         yield Fact("Running speed", "none" if speed is None else format_velocity(speed))
-        yield Fact("Limit", text.allowed(result.limit))
+        yield Fact("Limit", text.format_stated(result.limit))
     yield Fact("Robot", f"{result.robot.name}: {result.robot.description}".removesuffix(": "), brief=False)
     yield Fact("Error that decides", f"{result.limited_error}: {ERROR_DEFINITIONS[result.limited_error]}")
     yield Fact("Acceleration", _format_acceleration(result))
@@ -157,7 +157,7 @@ def motion_facts(result: AccuracyResult, motion: DrivenMotion) -> Iterator[Fact]
         yield Fact("Reached", reached, brief=False)
     yield Fact("At voltage limit", Value(errors.saturated_share, "%"), brief=False)
     by_drive = zip(result.driven, motion.at_limit.tolist(), strict=True)
-    fractions = ", ".join(f"{name} {text.percent(fraction)}" for name, fraction in by_drive)
+    fractions = ", ".join(f"{name} {text.format_percent(fraction)}" for name, fraction in by_drive)
     yield Fact("Of each drive", fractions, brief=False)
     yield Fact("Duration", Value(float(motion.t[-1]), "s"), brief=False)
 
@@ -167,7 +167,7 @@ def events(motion: DrivenMotion) -> Iterator[Event]:
     for number, t_ns in enumerate(motion.corner_times_ns.tolist(), start=1):
         if t_ns <= motion.t_ns[-1]:
             yield Event(t_ns, f"corner {number}")
-    distance = text.quantity(float(motion.delta[motion.worst, 3]), "m")
+    distance = text.format_quantity(float(motion.delta[motion.worst, 3]), "m")
     yield Event(int(motion.t_ns[motion.worst]), f"furthest from the set point: {distance}")
     if motion.diverged is not None:
         yield Event(int(motion.t_ns[-1]), format_divergence(motion.diverged), "error")

@@ -97,6 +97,6 @@ def _larger(motion: DrivenMotion) -> Path | None:
 
 def _worst(motion: DrivenMotion) -> Spot:
     """Return where a motion is furthest from its set point."""
-    said = text.quantity(float(motion.delta[motion.worst, 3]), "m")
-    when = text.seconds(float(motion.t[motion.worst]))
+    said = text.format_quantity(float(motion.delta[motion.worst, 3]), "m")
+    when = text.format_seconds(float(motion.t[motion.worst]))
     return Spot(spot_at(motion.position[motion.worst]), f"‖Δ‖ {said} at {when} s", DEVIATION_COLOUR)

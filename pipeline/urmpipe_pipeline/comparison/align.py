@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.errors import LogError
 from urmpipe_models.hand_eye import solve_hand_eye
@@ -29,7 +30,6 @@ from urmpipe_models.math3d import (
     to_matrices,
     to_quaternions,
 )
-from urmpipe_pipeline import text
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import ORIENTED, Alignment, AlignMode, Matched, run_finding
 
@@ -159,7 +159,7 @@ def _align_base_and_tool(matched: Matched, run: Run) -> Matched:
     """Move the log by the base Z and the tool X, d of the least residuals: p' = Z (p + R d), R' = Z R X."""
     posed, quat = _with_orientation(matched, "base+tool", run)
     if len(quat) < MIN_POSES:
-        poses = text.counted(len(quat), "compared pose")
+        poses = format_count(len(quat), "compared pose")
         message = f"base+tool: found {poses}, which some base and tool fit, allowed: {MIN_POSES} or more"
         raise LogError(run_finding(run, message, parameter="align"))
     rotation, reference_quat = to_matrices(quat), posed.reference_quat

@@ -42,7 +42,7 @@ def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
     """Yield a check for each quantity of a log that was compared then."""
     for one in found.changes:
         if one.run == run:
-            noise = text.allowed(one.noise, one.now.unit)
+            noise = text.format_stated(one.noise, one.now.unit)
             said = f"{size_of(one.now)}: {worse_words(one)} (noise {noise})" if one.worse else ""
             yield _check(run, quantity_name(one.now), said)
     for lost in found.missing:
@@ -83,7 +83,7 @@ def _check(run: str, name: str, said: str) -> Check:
 def since_words(found: BaselineComparison) -> str:
     """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
     said = [f"{quantities(len(found.worse))} worse"] if found.worse else []
-    criteria = text.enumerated([one.now.name for one in found.worse_criteria])
+    criteria = text.join_words([one.now.name for one in found.worse_criteria])
     said += [f"{criteria} worse"] if criteria else []
     said += [f"{len(found.missing)} gone"] if found.missing else []
     return ", ".join(said) or "nothing worse"
@@ -122,7 +122,7 @@ def worse_facts(found: BaselineComparison) -> Iterator[Fact]:
 def _facts(found: BaselineComparison) -> Iterator[Fact]:
     yield from worse_facts(found)
     yield Fact("New", _listed(list(map(str, found.new))))
-    noise = (f"{kind} {text.allowed(value, UNITS[kind])}" for kind, value in found.noise.items())
+    noise = (f"{kind} {text.format_stated(value, UNITS[kind])}" for kind, value in found.noise.items())
     yield Fact("Noise", ", ".join(noise), "smaller changes are not listed")
     yield Fact("Recording of the baseline", str(found.recording or ""), brief=False)
 

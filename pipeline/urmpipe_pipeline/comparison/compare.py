@@ -186,7 +186,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     options = _join_frames([(run, _is_recorded(run, options.tcp)) for run in (reference, *runs)], options)
     alone = _compares_joints_alone((reference, *runs), options)
     runs = [reference, *runs]
-    names = text.unique([run.name for run in runs])  # warnings name their log
+    names = text.make_unique([run.name for run in runs])  # warnings name their log
     runs = [
         run if run.name == name else replace(run, name=name) for name, run in zip(names, runs, strict=True)
     ]

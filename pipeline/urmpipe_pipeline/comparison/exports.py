@@ -25,7 +25,7 @@ from urmpipe_pipeline.presentation.exports import (
     columns_of,
 )
 from urmpipe_pipeline.runs.exports import clock_stamps, export_metadata
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 from urmpipe_pipeline.trajectories import joint_order
 
 NO_ORIENTATION = LogWarning(
@@ -55,7 +55,7 @@ def delta_table(comparison: Comparison) -> ExportTable:
     Where joints alone are compared, their deviations, under the names that the reference has for them.
     """
     runs = comparison.runs
-    names = np.repeat([encodable(run.name) for run in runs], [len(run.sample) for run in runs])
+    names = np.repeat([drop_surrogates(run.name) for run in runs], [len(run.sample) for run in runs])
     columns = [
         ExportColumn("run", "", names),
         ExportColumn("sample", "", np.concatenate([run.sample for run in runs])),
@@ -99,8 +99,8 @@ def _criteria(comparison: Comparison, table: ExportTable) -> dict[str, Any]:
     """Return the fields of a table of criteria: its texts as cells, its numbers as arrays."""
     columns = {one.name: np.asarray(one.values) for one in table.columns}
     return {
-        "comparison": encodable(comparison.name),
-        "reference": encodable(comparison.reference.name),
+        "comparison": drop_surrogates(comparison.name),
+        "reference": drop_surrogates(comparison.reference.name),
         **{name: values.tolist() if values.dtype.kind == "U" else values for name, values in columns.items()},
     }
 
@@ -114,8 +114,8 @@ def _joint_delta(comparison: Comparison, run: Deviation) -> FloatArray:
 def _fields(comparison: Comparison) -> dict[str, Any]:
     """Return the fields of a comparison in SI, with a struct a log in the cell `runs`."""
     return {
-        "name": encodable(comparison.name),
-        "reference": encodable(comparison.reference.name),
+        "name": drop_surrogates(comparison.name),
+        "reference": drop_surrogates(comparison.reference.name),
         "verdict": comparison.verdict,
         "tolerance": dict(comparison.tolerance),
         "runs": [_deviation(comparison, run) for run in comparison.runs],
@@ -125,10 +125,10 @@ def _fields(comparison: Comparison) -> dict[str, Any]:
 def _deviation(comparison: Comparison, run: Deviation) -> dict[str, Any]:
     """Return the fields of a log; where joints alone are compared, their names and deviations."""
     timed, nothing = run.run.timed, np.empty((0, 0))
-    joints = [*map(encodable, comparison.reference.joints)]
+    joints = [*map(drop_surrogates, comparison.reference.joints)]
     placed = {"delta": run.delta, "reference": run.reference, "actual": run.actual}
     return {
-        "name": encodable(run.name),
+        "name": drop_surrogates(run.name),
         "verdict": run.verdict,
         "sample": run.sample,
         "t": run.t if timed else nothing,

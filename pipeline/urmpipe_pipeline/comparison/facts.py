@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.identification import Twist, apply_twists_to_frames
 from urmpipe_models.math3d import Transform
@@ -94,10 +95,10 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
         yield Fact("Position", place_of(one, held), brief=False)
     ranked = len(result.runs) > 1  # a table at the top of the page has the log's verdict
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
-    compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
-    yield Fact("Compared", compared if timed else f"{text.counted(len(one.sample), 'pose')}, row by row")
+    compared = f"{format_count(len(one.sample), 'sample')} over {text.format_seconds(one.duration)} s"
+    yield Fact("Compared", compared if timed else f"{format_count(len(one.sample), 'pose')}, row by row")
     for share in one.shares.values():
-        seen = f"{share.samples} of {text.counted(share.total, 'sample')}"
+        seen = f"{share.samples} of {format_count(share.total, 'sample')}"
         name, words = share.quantity.capitalize(), f"{MEANING[share.quantity]}: {seen}"
         yield Fact(name, share_value(share), words, share in one.incomplete_shares, page=False)
     yield _left_out(one, len(result.reference.t_ns))
@@ -141,7 +142,7 @@ def sync_words(sync: Sync) -> tuple[str, str]:
     if sync.mode == "start":
         return "aligned at the first sample", ""
     sign = "-" if sync.offset < 0.0 else "+"
-    within = "" if sync.precision is None else f" ± {text.standard_error(sync.precision)}"
+    within = "" if sync.precision is None else f" ± {text.format_standard_error(sync.precision)}"
     said = f"t_reference = t_log {sign} {abs(sync.offset):.6g} s{within}"
     if sync.mode in ("given", "stamps"):
         return said, "as given" if sync.mode == "given" else "by absolute stamps on both sides"
@@ -156,13 +157,13 @@ def alignment_words(one: Deviation) -> tuple[str, str]:
         case "none":
             return "none", "both sides as recorded"
         case "tool":
-            moved = text.quantity(float(np.linalg.norm(alignment.tool)), "m")
+            moved = text.format_quantity(float(np.linalg.norm(alignment.tool)), "m")
             by = f"{_vector(alignment.tool)} mm in the tool's frame"
             return f"tool centre point moved by {moved}", f"the best constant offset: {by}"
         case "base+tool":
             return _base_and_tool_words(alignment)
-    turned = text.quantity(alignment.angle, "rad")
-    moved = text.quantity(float(alignment.moved(one.actual).max()), "m")
+    turned = text.format_quantity(alignment.angle, "rad")
+    moved = text.format_quantity(float(alignment.moved(one.actual).max()), "m")
     first = alignment.mode == "start"
     rule = "the first compared poses agree" if first else "the best rigid motion"
     about = f"rotated about the origin, then translated by {_vector(alignment.translation)} mm"
@@ -176,7 +177,8 @@ def _base_and_tool_words(alignment: Alignment) -> tuple[str, str]:
         ("tool", alignment.tool, alignment.tool_angle),
     )
     moved = (
-        f"{name} by {text.quantity(float(np.linalg.norm(shift)), 'm')} and {text.quantity(turn, 'rad')}"
+        f"{name} by {text.format_quantity(float(np.linalg.norm(shift)), 'm')}"
+        f" and {text.format_quantity(turn, 'rad')}"
         for name, shift, turn in sides
     )
     base, tool = _vector(alignment.translation), _vector(alignment.tool)
@@ -186,19 +188,19 @@ def _base_and_tool_words(alignment: Alignment) -> tuple[str, str]:
 
 def _vector(metres: tuple[float, ...]) -> str:
     """Return a vector in [m] as (x, y, z) in [mm]."""
-    return f"({', '.join(text.number(value, 'm') for value in metres)})"
+    return f"({', '.join(text.format_number(value, 'm') for value in metres)})"
 
 
 def _furthest_joint(one: Deviation) -> Iterator[Fact]:
     """Yield the joint that deviates most, of a log that is decided by something else."""
     joint = one.worst_joint("rad") or one.worst_joint("m")
     if joint is not None and one.worst_statistics.kind != "joint" and joint.max:
-        said = f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}"
+        said = f"{joint.quantity}: {text.format_quantity(joint.max, joint.unit)}"
         yield Fact("Joint furthest off", said, page=False)
 
 
 def _left_out(one: Deviation, reference_samples: int) -> Fact:
-    own = f"{one.left_out} of {text.counted(one.left_out + len(one.sample), 'sample')}"
+    own = f"{one.left_out} of {format_count(one.left_out + len(one.sample), 'sample')}"
     theirs = f"{one.reference_left_out} of {reference_samples} of the reference"
     some = bool(one.left_out or one.reference_left_out)
     return Fact("Left out", f"{own}, {theirs}", "no counterpart, or no value", some, page=some)
@@ -280,4 +282,4 @@ def _sliding(one: Deviation) -> str:
     if not sliding:
         return ""
     names = ", ".join(held.quantity for held in sliding)
-    return f"in m for joints that slide: {names} {text.limit(sliding[0].tolerance)} mm"
+    return f"in m for joints that slide: {names} {text.format_limit(sliding[0].tolerance)} mm"

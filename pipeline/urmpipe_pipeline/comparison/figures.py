@@ -45,7 +45,7 @@ def overview_figure(comparison: Comparison) -> Iterator[Figure]:
     logarithmic = min(largest) > 0.0 and max(largest) > APART * min(largest)
     placed = [(f"{place}. {one.name}", one) for place, one in enumerate(ranking, start=1)]
     order = "; ".join(
-        f"{name}: at most {text.quantity(one.statistics['norm'].max, 'm')}, {one.verdict}"
+        f"{name}: at most {text.format_quantity(one.statistics['norm'].max, 'm')}, {one.verdict}"
         for name, one in placed
     )
     own = "its own time" if all(one.run.timed for one in ranking) else "the rows"
@@ -95,7 +95,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
             f"Equal scale on all axes. A dot is where a pose was asked for, the arrow from it"
             f" the {arrows.name}, in the colour of its size.",
             f"Poses of {one.name} in three dimensions, each with its deviation as an arrow."
-            f" {decided} at x, y, z = {text.point(place)} m: {amount_words(one.worst_statistics)}.",
+            f" {decided} at x, y, z = {text.format_point(place)} m: {amount_words(one.worst_statistics)}.",
             (),
             spots[2:],
             arrows,
@@ -109,7 +109,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
         "Path in space",
         said,
         f"Paths of the reference and of {one.name} in three dimensions. {decided} at"
-        f" x, y, z = {text.point(place)} m: {amount_words(one.worst_statistics)}.",
+        f" x, y, z = {text.format_point(place)} m: {amount_words(one.worst_statistics)}.",
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             *supposed,
@@ -173,7 +173,7 @@ def _deviation(one: Deviation) -> Figure:
         line = _line(one, one.angle, ("angle",), (AXIS_COLOURS["norm"],))
         views.append(View("Angle between the orientations", (_panel(one, one.statistics["angle"], line),)))
     largest = ", ".join(
-        f"{symbol(held)} {text.quantity(held.max, held.unit)} {when(held)}"
+        f"{symbol(held)} {text.format_quantity(held.max, held.unit)} {when(held)}"
         for held in one.statistics.values()
     )
     said = "Δ is reference minus actual at the same time; path is the distance from the reference's path,"
@@ -206,7 +206,7 @@ def _joints(one: Deviation) -> Iterator[Figure]:
     units = [unit for unit in text.SHOWN if any(joint.unit == unit for joint in held)]
     values = np.asarray(one.joint_delta)
     panels = tuple(_joint_panel(one, values, held, unit) for unit in units)
-    largest = ", ".join(f"{joint.quantity} {text.quantity(joint.max, joint.unit)}" for joint in held)
+    largest = ", ".join(f"{joint.quantity} {text.format_quantity(joint.max, joint.unit)}" for joint in held)
     yield Figure(
         "Deviation of joints",
         "Reference minus log of each joint, without whole turns counted differently at the start. Dashed: the"
@@ -250,7 +250,7 @@ def _instant(one: Deviation) -> dict[int, str]:
     return {
         int(
             one.t_ns[one.worst_statistics_index]
-        ): f"{peak_words(one)} at {text.seconds(one.worst_statistics.t_max)} s"
+        ): f"{peak_words(one)} at {text.format_seconds(one.worst_statistics.t_max)} s"
     }
 
 
@@ -258,4 +258,4 @@ def _out_words(one: Deviation) -> str:
     """Say how much of the log is out of tolerance."""
     if all(held.tolerance is None for held in one.all_statistics):
         return "There is no tolerance."
-    return f"Out of tolerance: {text.percent(one.out_fraction)} of the samples."
+    return f"Out of tolerance: {text.format_percent(one.out_fraction)} of the samples."

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline import text
@@ -352,7 +353,7 @@ def _check_values(test: IsoTest, tolerance: Mapping[str, float]) -> None:
     A criterion that only lacks cycles is not judged, and the others are.
     """
     values = {criterion.name: criterion.value for criterion in test.overall}
-    count = text.counted(len(test.cycles), "cycle")
+    count = format_count(len(test.cycles), "cycle")
     missing = [name for name in tolerance if values.get(name) is None]
     if any(name not in values or len(test.cycles) >= min_cycles(name) for name in missing):
         known = ", ".join(name for name, value in values.items() if value is not None)
@@ -370,7 +371,7 @@ def _few_cycles(test: IsoTest) -> Iterator[LogWarning]:
         if is_tested and count < STANDARD_CYCLES[part]
     ]
     if few:
-        yield LogWarning(FEW, f"{text.counted(count, 'cycle')}; ISO 9283 takes {' and '.join(few)}")
+        yield LogWarning(FEW, f"{format_count(count, 'cycle')}; ISO 9283 takes {' and '.join(few)}")
 
 
 def _angle_warnings(command: Motion, cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarning]:
@@ -391,12 +392,14 @@ def _noise_warnings(cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarn
     values = {criterion.name: criterion.value for criterion in test.overall}
     noise = float(np.median([cycle.noise for cycle in cycles]))
     if values.get("PSt") is not None and 3.0 * noise > test.band:
-        message = f"PSt and OV are determined by noise: {text.quantity(3.0 * noise, 'm')} (three standard"
-        message += f" deviations) leaves the band of {text.allowed(test.band)}"
+        message = (
+            f"PSt and OV are determined by noise: {text.format_quantity(3.0 * noise, 'm')} (three standard"
+        )
+        message += f" deviations) leaves the band of {text.format_stated(test.band)}"
         yield LogWarning(NOISE_BEYOND_BAND, message, parameter="band")
     steps = [np.median(np.diff(cycle.t)) for cycle in cycles if len(cycle) > 1]
     speed_noise = 6.0 * np.sqrt(2.0) * noise / float(np.median(steps)) if steps else 0.0
     fluctuation = values.get("FV")
     if fluctuation is not None and 2.0 * speed_noise > fluctuation:
-        makes = f"{text.quantity(noise, 'm')} from row to row make about {speed_noise:.2g} m/s"
+        makes = f"{text.format_quantity(noise, 'm')} from row to row make about {speed_noise:.2g} m/s"
         yield LogWarning(NOISY_SPEED, f"FV is determined by noise: {makes}")

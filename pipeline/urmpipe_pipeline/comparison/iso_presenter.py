@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import apply_alignment
 from urmpipe_pipeline.comparison.baseline_section import baseline_section, criterion_checks, worse_facts
@@ -113,7 +114,7 @@ def headline(result: Comparison, test: IsoTest) -> str:
     else:
         message = f"within tolerance {against}: {format_criterion(worst)}"
     if test.failed_cycles:
-        count = text.counted(len(test.failed_cycles), "cycle")
+        count = format_count(len(test.failed_cycles), "cycle")
         names = format_failed_cycles(test.failed_cycles)
         message = f"followed {result.reference.name}; {count} failed: {names}; the others {message}"
     message = f"{_cycle_count(result, test)} {message}"
@@ -138,7 +139,7 @@ def _decisive_facts(test: IsoTest) -> Iterator[Fact]:
         yield Fact("Failed cycles", Value(len(test.failed_cycles)))
     criterion = find_decisive(test)
     if criterion is not None and (criterion.verdict == "fail" or not test.failed_cycles):
-        portion = text.portion(criterion.utilisation or 0.0)
+        portion = text.format_portion(criterion.utilisation or 0.0)
         value = f"{format_criterion(criterion)} ({portion} the tolerance)"
         yield Fact("Decided by", value, meaning(criterion.name))
         yield Fact("Where", find_worst_place(test, criterion))
@@ -149,9 +150,9 @@ def _basic_facts(result: Comparison, test: IsoTest) -> Iterator[Fact]:
     baseline = result.baseline
     yield from worse_facts(baseline) if baseline is not None and baseline.verdict == "fail" else ()
     parts = [test.cycle_count]
-    parts += [text.counted(len(test.poses.command), "pose")] if test.poses is not None else []
-    parts += [text.counted(len(test.path.s), "plane")] if test.path is not None else []
-    yield Fact("After ISO 9283", text.enumerated(parts))
+    parts += [format_count(len(test.poses.command), "pose")] if test.poses is not None else []
+    parts += [format_count(len(test.path.s), "plane")] if test.path is not None else []
+    yield Fact("After ISO 9283", text.join_words(parts))
     yield Fact("Reference", result.reference.name, brief=False)
     yield Fact("Tolerance", format_tolerance(result.tolerance), brief=False)
 

@@ -216,7 +216,7 @@ def _events(one: Deviation) -> Iterator[Event]:
         and longest.t is not None
         and longest.duration is not None
     ):
-        lasts = f"{longest.samples} samples, {text.seconds(longest.duration)} s"
+        lasts = f"{longest.samples} samples, {text.format_seconds(longest.duration)} s"
         yield Event(round(longest.t * 1e9), f"longest stretch out of tolerance begins: {lasts}", level)
     held, timed = one.worst_statistics, one.run.timed
     if isinstance(one.decisive, Share):
@@ -226,7 +226,7 @@ def _events(one: Deviation) -> Iterator[Event]:
         yield Event(at, f"decides: {amount_words(held)}{'' if timed else f' {when(held)}'}", level)
     if not one.statistics:
         return
-    x, y, z, norm = (text.quantity(float(value), "m") for value in one.delta[one.worst])
+    x, y, z, norm = (text.format_quantity(float(value), "m") for value in one.delta[one.worst])
     said = f"largest deviation: {norm} (x {x}, y {y}, z {z})"
     row = "" if timed else f" in row {one.sample[one.worst] + 1}"
     yield Event(int(one.t_ns[one.worst]) if timed else None, f"{said}{row}", level)

@@ -166,7 +166,7 @@ def stamp_offset(reference: Run, log: Run) -> float | str:
         return offset_ns / 1e9
     zones = [(run.name, _time_zone(run.log)) for run in (reference, log)]
     if unknown := [name for name, zone in zones if zone is None]:
-        return f"neither Unix times nor dates in {text.enumerated(unknown)}"
+        return f"neither Unix times nor dates in {text.join_words(unknown)}"
     if zones[0][1] != zones[1][1]:
         return " and ".join(f"times {zone} in {name}" for name, zone in zones)
     for run in (reference, log):
@@ -509,7 +509,7 @@ def sync_warnings(name: str, sync: Sync, period: float) -> list[LogWarning]:
     offset = f"the offset of {sync.offset:.6g} s, estimated by the {sync.by},"
     warnings = []
     if sync.precision is not None and sync.precision > CERTAIN * period:
-        error = f"is known to +-{text.standard_error(sync.precision)} (standard error)"
+        error = f"is known to +-{text.format_standard_error(sync.precision)} (standard error)"
         message = f"{offset} {error}; the period is {1e3 * period:.6g} ms"
         warnings.append(LogWarning("sync-uncertain", message, about=name))
     if sync.similarity is not None and sync.similarity < CERTAIN_SIMILARITY:

@@ -172,8 +172,10 @@ def statistics_tables(one: Deviation, *, ranked: bool = False) -> Iterator[Table
     for unit in text.SHOWN:
         own = [held for held in one.all_statistics if held.unit == unit]
         if own:
-            about = text.enumerated(list(dict.fromkeys(ABOUT[held.kind] for held in own)))
-            start = f"t = {text.seconds(float(one.t_ns[0]) / 1e9)} s" if one.run.timed else "the first row"
+            about = text.join_words(list(dict.fromkeys(ABOUT[held.kind] for held in own)))
+            start = (
+                f"t = {text.format_seconds(float(one.t_ns[0]) / 1e9)} s" if one.run.timed else "the first row"
+            )
             note = (
                 "max, rms and p95 are of absolute values, mean and std signed. At start: the difference of"
                 f" the start poses (mutual calibration) at {start}."

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Hint, LogError
 from urmpipe_models.hand_eye import MIN_SENSITIVITY, UnobservableDirection
 from urmpipe_models.measure_units import USUAL_UNITS
@@ -93,7 +94,7 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
         unit = UNITS[kind]
         if value > LARGE.get(unit, np.inf):
             bare, other = f"{value:g}", USUAL_UNITS[unit]
-            message = f"a tolerance of {text.allowed(value, unit)} ({kind}) accepts any deviation"
+            message = f"a tolerance of {text.format_stated(value, unit)} ({kind}) accepts any deviation"
             hints = (
                 Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),
                 Hint("tolerance", f"{kind}={bare}{unit}", "if not"),
@@ -110,8 +111,8 @@ def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> 
         level = tolerance_for(kind, "axis" if kind in AXES else kind, noise)
         if level is not None and level >= allowed:
             unit = UNITS[kind]
-            message = f"a noise of {text.allowed(level, unit)} ({kind}) reaches the tolerance of"
-            why = f"{text.allowed(allowed, unit)}: nothing within it can be worse than the baseline"
+            message = f"a noise of {text.format_stated(level, unit)} ({kind}) reaches the tolerance of"
+            why = f"{text.format_stated(allowed, unit)}: nothing within it can be worse than the baseline"
             yield LogWarning(LARGE_NOISE, f"{message} {why}; a number without a unit is in {unit}")
 
 
@@ -132,8 +133,8 @@ def left_out_warnings(deviation: Deviation, reference: Trajectory) -> Iterator[L
         yield LogWarning("left-out", message, about=deviation.name)
     coverage = deviation.shares["coverage"]
     if coverage.verdict != "fail" and coverage in deviation.incomplete_shares:
-        samples_of = f"{coverage.samples} of {text.counted(coverage.total, 'sample')} of {reference.name}"
-        message = f"it shows {samples_of} ({text.percent(coverage.value)}){unseen_words(coverage)}"
+        samples_of = f"{coverage.samples} of {format_count(coverage.total, 'sample')} of {reference.name}"
+        message = f"it shows {samples_of} ({text.format_percent(coverage.value)}){unseen_words(coverage)}"
         yield LogWarning("not-covered", message, about=deviation.name)
 
 
@@ -145,12 +146,12 @@ def weak_evidence(deviation: Deviation) -> Iterator[LogWarning]:
             partly.setdefault(statistics.samples or 0, []).append(statistics.quantity)
     for samples, quantities in partly.items():
         compared = f"{samples} of {len(deviation.sample)} compared samples"
-        message = f"{text.enumerated(quantities)}: judged at {compared}"
+        message = f"{text.join_words(quantities)}: judged at {compared}"
         yield LogWarning(
             "partly-judged", f"{message}; a sample without a value is out of tolerance", about=deviation.name
         )
     if deviation.run.timed and is_stationary(deviation):
-        message = f"{text.counted(len(deviation.sample), 'sample')} compared, all in one pose"
+        message = f"{format_count(len(deviation.sample), 'sample')} compared, all in one pose"
         yield LogWarning("one-pose", f"{message}: the verdict is on that pose alone", about=deviation.name)
 
 
@@ -214,8 +215,8 @@ def clocks_differ(reference: Trajectory, log: Trajectory, deviation: Deviation) 
     A log whose motion is in time has another cause, and no warning.
     """
     norm, path = deviation.statistics["norm"].rms, deviation.statistics["path"].rms
-    message = f"the clocks differ: {text.quantity(norm, 'm')} rms at the same time"
-    message += f", but {text.quantity(path, 'm')} rms from the path"
+    message = f"the clocks differ: {text.format_quantity(norm, 'm')} rms at the same time"
+    message += f", but {text.format_quantity(path, 'm')} rms from the path"
     mode = deviation.alignment.mode
     try:
         sync = synchronise(reference, log, "auto", mode)
@@ -230,7 +231,7 @@ def clocks_differ(reference: Trajectory, log: Trajectory, deviation: Deviation) 
     aligned = align(matched, mode, deviation.run)
     left = float(np.sqrt(np.mean(np.sum((aligned.reference - aligned.actual) ** 2, axis=1))))
     if left < MAX_RMS_LEFT * norm:
-        message += f"; an offset of {sync.offset:.6g} s leaves {text.quantity(left, 'm')} rms"
+        message += f"; an offset of {sync.offset:.6g} s leaves {text.format_quantity(left, 'm')} rms"
         hints = (BY_MOTION, Hint("sync", float(f"{sync.offset:.6g}"), "sets it"))
         yield LogWarning(CLOCKS_DIFFER, message, about=deviation.name, hints=hints)
 
@@ -252,18 +253,20 @@ def recorded_tcp_mismatch(runs: Sequence[Run], allowed: float) -> Iterator[LogWa
         if not group:
             continue
         run, distance = group[0]
-        limit = text.allowed(MAX_CALIBRATION)
+        limit = text.format_stated(MAX_CALIBRATION)
         cause = f"more than a calibration explains ({limit}): another robot, tool or base?"
         if calibrated:
             known = "a controller uses the calibration of its arm, which this robot model lacks"
             cause = f"usual up to {limit} where {known}"
         if len(group) == 1:
-            far = f"up to {text.quantity(distance, 'm')} from its recorded tool centre point"
+            far = f"up to {text.format_quantity(distance, 'm')} from its recorded tool centre point"
             remedy = f"a comparison of {run.name} alone does"
             message = f"its kinematics are {far}, {cause}; this verdict does not include that; {remedy}"
             yield LogWarning(RECORDED_TCP_APART, message, about=run.name)
         else:
-            far = text.enumerated([f"{run.name} is up to {text.quantity(most, 'm')}" for run, most in group])
+            far = text.join_words(
+                [f"{run.name} is up to {text.format_quantity(most, 'm')}" for run, most in group]
+            )
             message = f"by forward kinematics {far} from the recorded tool centre points, {cause}"
             remedy = "this verdict does not include that; a comparison of each alone does"
             yield LogWarning(RECORDED_TCP_APART, f"{message}; {remedy}")

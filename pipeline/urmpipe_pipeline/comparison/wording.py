@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from urmpipe_models.display import format_count
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, SampleInterval, Share, Statistics
@@ -29,7 +30,7 @@ def verdict_words(one: Comparison) -> str:
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
     lost = (
-        f"; not judged: {text.enumerated([log.name for log in one.failed_logs])}" if one.failed_logs else ""
+        f"; not judged: {text.join_words([log.name for log in one.failed_logs])}" if one.failed_logs else ""
     )
     return said + format_assumptions(one.assumptions) + format_defaults(one.provenance) + lost
 
@@ -75,8 +76,8 @@ def _clocks(one: Comparison) -> str:
     if not stamped:
         return ""
     if len(one.runs) == 1:
-        return f"; clocks by their stamps (offset {text.seconds(stamped[0].offset)} s)"
-    some = "" if len(stamped) == len(one.runs) else f" of {text.counted(len(stamped), 'log')}"
+        return f"; clocks by their stamps (offset {text.format_seconds(stamped[0].offset)} s)"
+    some = "" if len(stamped) == len(one.runs) else f" of {format_count(len(stamped), 'log')}"
     return f"; clocks{some} by their stamps"
 
 
@@ -87,7 +88,7 @@ def share_words(one: Share, whose: str = "") -> str:
     """
     of = f" of {whose}" if whose else ""
     if one.verdict != "fail":
-        return f"{one.quantity}{of} {text.percent(one.value)}"
+        return f"{one.quantity}{of} {text.format_percent(one.value)}"
     said = f"{one.quantity}{of} {held(Value(one.value, '%', one.tolerance, least=True))}"
     return said if whose else f"{said}{unseen_words(one)}"
 
@@ -125,7 +126,7 @@ def used_words(one: Statistics | Share | DeltaMeterResult) -> str:
         return ""
     if isinstance(one, Statistics) and one.missing:
         return f"no value at {one.missing} of {(one.samples or 0) + one.missing} samples"
-    return "" if math.isinf(one.utilisation) else f"{text.portion(one.utilisation)} the tolerance"
+    return "" if math.isinf(one.utilisation) else f"{text.format_portion(one.utilisation)} the tolerance"
 
 
 def amount_words(one: Statistics | Share) -> str:
@@ -147,7 +148,7 @@ def decided_words(one: Statistics | Share) -> str:
     """
     if isinstance(one, Share):
         return (
-            f"{amount_words(one)} ({one.samples} of {text.counted(one.total, 'sample')}){unseen_words(one)}"
+            f"{amount_words(one)} ({one.samples} of {format_count(one.total, 'sample')}){unseen_words(one)}"
         )
     lacks = one.tolerance is not None and one.missing
     used = used_words(one)
@@ -162,30 +163,32 @@ def peak_words(one: Deviation) -> str:
 def when(one: Statistics) -> str:
     """Return when a quantity was largest: "at t = 1.250 s"; of still poses in which row: "in row 3"."""
     timed = not math.isnan(one.t_max)
-    return f"at t = {text.seconds(one.t_max)} s" if timed else f"in row {one.sample_max + 1}"
+    return f"at t = {text.format_seconds(one.t_max)} s" if timed else f"in row {one.sample_max + 1}"
 
 
 def meter_words(one: DeltaMeterResult) -> str:
     """Return what a delta meter found: how much of how much, when, how often it was too much; its doubts."""
     amount = "has no value" if one.utilisation is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
     used = used_words(one)
-    said = f"{size_of(one)} {amount}{f' ({used})' if used else ''} at t = {text.seconds(one.t)} s"
+    said = f"{size_of(one)} {amount}{f' ({used})' if used else ''} at t = {text.format_seconds(one.t)} s"
     out = f"out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
-    lacks = f"coverage {text.percent(one.coverage)}: {one.missing} without a value" if one.missing else ""
+    lacks = (
+        f"coverage {text.format_percent(one.coverage)}: {one.missing} without a value" if one.missing else ""
+    )
     return "; ".join(filter(None, (said, out, lacks, *one.caveats)))
 
 
 def out_words(out: int, of: int) -> str:
     """Return how many samples are out of tolerance: "13 of 100 samples (13.0 %)"."""
-    return f"{out} of {text.counted(of, 'sample')} ({text.percent(out / of)})"
+    return f"{out} of {format_count(of, 'sample')} ({text.format_percent(out / of)})"
 
 
 def stretch_words(found: SampleInterval) -> str:
     """Return how long and from when a log was out of tolerance or unseen: "0.500 s from t = 1.250 s"."""
     if found.t is None or found.duration is None:
-        return f"{text.counted(found.samples, 'row')} from row {found.sample + 1}"
-    lasts = "1 sample at" if found.samples == 1 else f"{text.seconds(found.duration)} s from"
-    return f"{lasts} t = {text.seconds(found.t)} s"
+        return f"{format_count(found.samples, 'row')} from row {found.sample + 1}"
+    lasts = "1 sample at" if found.samples == 1 else f"{text.format_seconds(found.duration)} s from"
+    return f"{lasts} t = {text.format_seconds(found.t)} s"
 
 
 def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:
@@ -209,7 +212,7 @@ def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = (
         words[kind].format(
             written(Value(value, "%", given=True), unit=True)
             if kind in MIN_SHARES
-            else " or ±".join(text.allowed(value, unit) for unit in units.get(kind, ["m"]))
+            else " or ±".join(text.format_stated(value, unit) for unit in units.get(kind, ["m"]))
         )
         for kind, value in allowed.items()
         if value != MIN_SHARES.get(kind)

@@ -41,8 +41,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from urmpipe_models import DEFAULT_TOLERANCE
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, spread_rows
-from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.candidates import find_whole_turns, iter_onsets
 from urmpipe_pipeline.diagnosis.causes import (
     STRUCTURE,
@@ -313,7 +313,7 @@ def _why_undiagnosed(problem: Problem) -> str:
     some = spread_rows(model.rows, COUNTED_ROWS)
     known = int(np.isfinite(model.residual(null_state(model.groups), some)).all(axis=0).sum())
     if known < MIN_SAMPLES:
-        samples = text.counted(known, "sample")
+        samples = format_count(known, "sample")
         return f"{samples}{' with all values' * (known < model.rows)}: fewer than {MIN_SAMPLES}"
     moved = np.fmax.reduce(model.motion.value, axis=1) - np.fmin.reduce(model.motion.value, axis=1)
     side = "log" if problem.sign > 0.0 else "reference"

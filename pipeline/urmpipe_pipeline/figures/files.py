@@ -18,7 +18,7 @@ from urmpipe_pipeline.figures.size import COARSEST, FINEST, Size, size_of
 from urmpipe_pipeline.outputs import DRAWING_HEADER, atomic_group, check_output, safe_output
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.section import Presentation
-from urmpipe_pipeline.text import unique
+from urmpipe_pipeline.text import make_unique
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.figures.sheet import Sheet
@@ -122,7 +122,7 @@ def write_figures(
         OutputError: If they may not be written there, or there is no matplotlib to draw them.
     """
     figures = chosen(list(listed(presentations)), options.names, "figure_names")
-    stems = unique([figure_stem(one.title, one.part) for one in figures])
+    stems = make_unique([figure_stem(one.title, one.part) for one in figures])
     wanted = [
         (one, [FigureFile(options.folder / f"{stem}.{suffix}", one.title, one.part) for suffix in suffixes])
         for stem, one in zip(stems, figures, strict=True)

@@ -11,7 +11,7 @@ from matplotlib.font_manager import findfont, fontManager, get_font
 from matplotlib.text import Text
 
 from urmpipe_models.errors import escape_control_characters
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 FONT = "DejaVu Sans"
 """The font that comes with matplotlib: a figure is the same everywhere."""
@@ -19,7 +19,7 @@ FONT = "DejaVu Sans"
 
 def drawable(words: str) -> str:
     """Return a text from a file as it is drawn: with escapes for what acts, without what is no letter."""
-    return encodable(escape_control_characters(words))
+    return drop_surrogates(escape_control_characters(words))
 
 
 def complete(made: Figure) -> None:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import escape_html
 from urmpipe_pipeline import text
@@ -135,7 +136,7 @@ def speed_figure(path: CutPath) -> Figure:
         "The speed of each cycle, their mean and the commanded speed over the length of the command."
         " Diamonds: the middle of each straight leg with a constant commanded speed, on whose middle half AV,"
         " RV and FV rest. Dotted: corners.",
-        f"Speed of {text.counted(len(path.speed), 'cycle')} over a path of {format_amount(path.total, 'm')}."
+        f"Speed of {format_count(len(path.speed), 'cycle')} over a path of {format_amount(path.total, 'm')}."
         f" {legs or 'No leg is judged'}.",
         (View("Speed along the path", (panel,)),),
         dict(_corner_rows(path)),
@@ -189,9 +190,9 @@ def path_figure(path: CutPath) -> SpaceFigure:
         "Mean path and its tube",
         "Equal scale on all axes. Grey: command. Coloured by AT: the mean path, its deviation drawn"
         f" x{factor}.{caption}",
-        f"Mean path of {text.counted(len(path.crossed), 'cycle')} in space, its deviation drawn x{factor}."
+        f"Mean path of {format_count(len(path.crossed), 'cycle')} in space, its deviation drawn x{factor}."
         f" AT at most {format_amount(float(path.accuracy[worst]), 'm')} at x, y, z ="
-        f" {text.point(path.command[worst])} m.",
+        f" {text.format_point(path.command[worst])} m.",
         tuple(line for line in (command_line(path), of_tube, mean_line(path, factor)) if line is not None),
         ends(path.path),
     )

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline import text
 from urmpipe_pipeline.iso9283.corners import CornerPath, LegSpeed
 from urmpipe_pipeline.iso9283.criteria import Criterion, Verdict, combine_verdicts
 
@@ -133,7 +133,7 @@ class IsoTest:
     @property
     def cycle_count(self) -> str:
         """Number of cycles that follow the command, and of all if some do not: "9 of 10 cycles"."""
-        count = text.counted(len(self.cycles) + len(self.failed_cycles), "cycle")
+        count = format_count(len(self.cycles) + len(self.failed_cycles), "cycle")
         return f"{len(self.cycles)} of {count}" if self.failed_cycles else count
 
     @property

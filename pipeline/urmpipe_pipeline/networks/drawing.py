@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import escape_html
 from urmpipe_pipeline.networks.gallery import gallery_svg
 from urmpipe_pipeline.networks.graph_drawing import graph_svg
@@ -14,7 +15,6 @@ from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.networks.scene import motion_plane
 from urmpipe_pipeline.networks.sketch import mechanism_svg, view_words
 from urmpipe_pipeline.presentation.figure import Drawing
-from urmpipe_pipeline.text import counted
 
 APART_PX = 12.0
 """Between two drawings below each other, in pixels."""
@@ -28,9 +28,9 @@ def network_svg(result: NetworkResult) -> str:
 def drawings(result: NetworkResult) -> Iterator[Drawing]:
     """Yield the graph, the projections of what was found, and if all were requested each assembly."""
     network = result.network
-    ties = counted(len(network.joints), "joint")
-    ties += f" and {counted(len(network.elements), 'element')}" if network.elements else ""
-    loops = counted(len(result.loops), "loop")
+    ties = format_count(len(network.joints), "joint")
+    ties += f" and {format_count(len(network.elements), 'element')}" if network.elements else ""
+    loops = format_count(len(result.loops), "loop")
     bodies = f"{len(network.body_names)} bodies"
     yield Drawing(
         "Graph",

@@ -442,7 +442,7 @@ def _events(
         control = stop.name if stop.name in {item.name for item in mechanism.network.controls} else ""
         unit = (mechanism.network.control_unit(control) or ("",))[0] if control else stop.unit
         limit = stop.limit * (drive_factor(mechanism.network, control) if control else 1.0)
-        words = text.in_words(limit, unit) if unit else f"{limit:.6g}"
+        words = text.format_rounded(limit, unit) if unit else f"{limit:.6g}"
         words = f"{stop.name} reaches its limit {words} at {{at}}"
         yield event("limit", stop, {}, words)
 

@@ -30,7 +30,7 @@ from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.networks.given_values import parse_start
 from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.provenance import build_provenance
-from urmpipe_pipeline.text import allowed, in_words
+from urmpipe_pipeline.text import format_rounded, format_stated
 
 ROUNDED = 1e-4
 """A gap of less, in lengths of the mechanism and [rad], may come of figures with few digits."""
@@ -171,8 +171,8 @@ def _limit_warnings(network: Network, assemblies: Sequence[Assembly]) -> Iterato
         values = assemblies[0].values.get(joint.name, ())
         is_coupled = joint.name in network.coupled_joints
         for unit, value, end, limit in exceeded_limits(joint, values, is_coupled=is_coupled):
-            words = f"joint {joint.name} is at {in_words(value, unit)}, beyond its {end} limit"
-            yield LogWarning("beyond-limit", f"{words}, {allowed(limit, unit)}")
+            words = f"joint {joint.name} is at {format_rounded(value, unit)}, beyond its {end} limit"
+            yield LogWarning("beyond-limit", f"{words}, {format_stated(limit, unit)}")
 
 
 def _assemble(

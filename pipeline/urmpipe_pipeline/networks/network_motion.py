@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.display import format_headline
+from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.networks.closure import iter_chunks
@@ -463,10 +463,10 @@ def headline(motion: NetworkMotion) -> str:
     """Return what drives the network, how far it moves, and what ends the motion."""
     ranges = ", ".join(_range_words(motion, drive) for drive in motion.drives[:NAMED])
     ranges += f" and {len(motion.drives) - NAMED} more" if len(motion.drives) > NAMED else ""
-    rows, duration = text.counted(len(motion), "row"), text.seconds(float(motion.t[-1]))
+    rows, duration = format_count(len(motion), "row"), text.format_seconds(float(motion.t[-1]))
     if motion.complete:
         passed = [event for event in motion.events if event.kind != "limit"]
-        through = f", through {text.counted(len(passed), 'singular pose')}" if passed else ""
+        through = f", through {format_count(len(passed), 'singular pose')}" if passed else ""
         return f"{motion.name}: {ranges}, {rows} in {duration} s{through}"
     why = motion.events[-1].message if motion.events else "no step of the continuation succeeds"
     return f"{motion.name}: {ranges}, {rows} of {motion.requested} in {duration} s: {why}"
@@ -493,7 +493,7 @@ def _facts(motion: NetworkMotion) -> Iterator[Fact]:
     yield Fact("Law", motion.law, brief=False)
     yield Fact("Period", Value(motion.tsp, "s"), brief=False)
     if motion.body:
-        yield Fact("Traced point", f"{motion.body}: {text.point(motion.point)} m", brief=False)
+        yield Fact("Traced point", f"{motion.body}: {text.format_point(motion.point)} m", brief=False)
 
 
 def _tables(motion: NetworkMotion) -> Iterator[Table]:
@@ -539,7 +539,7 @@ def _number_words(value: float) -> str:
 
 
 def _value_words(value: float, unit: str) -> str:
-    return text.in_words(value, unit) if unit else f"{value:.6g}"
+    return text.format_rounded(value, unit) if unit else f"{value:.6g}"
 
 
 def _values_words(values: tuple[float, ...], unit: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from urmpipe_models.display import format_count
 from urmpipe_models.networks.assembly import Assembly, ClosureError
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mobility import Mobility
@@ -11,7 +12,7 @@ from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.presentation.parts import recording_fact, table_of
 from urmpipe_pipeline.presentation.section import Cell, Column, Fact, Table, Value
-from urmpipe_pipeline.text import counted, enumerated, in_words
+from urmpipe_pipeline.text import format_rounded, join_words
 
 MANY = 6
 """Gaps and redundant constraints that are named in a sentence; the others are counted."""
@@ -29,10 +30,10 @@ ROUNDED = 9
 def gap_words(gap: ClosureError) -> str:
     """Return what does not close, and by how much: "loop A, B, C, D is 12.3 mm and 1.2 deg apart"."""
     if gap.loop == (gap.name,):
-        off = in_words(gap.radians, "rad") if gap.radians else in_words(gap.metres, "m")
+        off = format_rounded(gap.radians, "rad") if gap.radians else format_rounded(gap.metres, "m")
         return f"element {gap.name} is {off} off its {'angle' if gap.radians else 'length'}"
-    apart = [in_words(gap.metres, "m")] * bool(gap.metres)
-    apart += [in_words(gap.radians, "rad")] * _is_turned(gap)
+    apart = [format_rounded(gap.metres, "m")] * bool(gap.metres)
+    apart += [format_rounded(gap.radians, "rad")] * _is_turned(gap)
     return f"loop {', '.join(gap.loop)} is {' and '.join(apart)} apart"
 
 
@@ -93,8 +94,8 @@ def structure_words(result: NetworkResult) -> str:
     """Return how it hangs together: "closed chain of 4 bodies by 4 joints, 1 loop"."""
     network = result.network
     counts = ((len(network.joints), "joint"), (len(network.elements), "element"))
-    ties = enumerated([counted(count, noun) for count, noun in counts if count])
-    loops = counted(len(result.loops), "loop") if result.loops else "no loop"
+    ties = join_words([format_count(count, noun) for count, noun in counts if count])
+    loops = format_count(len(result.loops), "loop") if result.loops else "no loop"
     held = f" by {ties}" if ties else ""
     return f"{result.structure} of {len(network.body_names)} bodies{held}, {loops}"
 
@@ -113,7 +114,7 @@ def control_values(result: NetworkResult) -> str:
 def found_words(result: NetworkResult) -> str:
     """Return how many assemblies there are, of how many starts, and why the search ended."""
     return result.reason + (
-        f" ({counted(result.start_count, 'start')} in all)" if result.start_count > 1 else ""
+        f" ({format_count(result.start_count, 'start')} in all)" if result.start_count > 1 else ""
     )
 
 
@@ -169,7 +170,7 @@ def assemblies_table(result: NetworkResult) -> Table:
     columns.append(Column("mobility", "Mobility", [Value(one.mobility) for one in every]))
     title = f"Assemblies ({len(every)})"
     if (more := len(named) - NARROW) > 0:
-        title += f"; {counted(more, 'more variable')} in the report and in --json"
+        title += f"; {format_count(more, 'more variable')} in the report and in --json"
     return Table(title, tuple(columns))
 
 

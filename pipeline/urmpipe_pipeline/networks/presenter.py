@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
+from urmpipe_models.display import format_count
 from urmpipe_pipeline.networks.drawing import drawings
 from urmpipe_pipeline.networks.parts import (
     assemblies_table,
@@ -31,7 +32,6 @@ from urmpipe_pipeline.presentation.section import (
     Table,
     Value,
 )
-from urmpipe_pipeline.text import counted
 
 
 def present(result: NetworkResult) -> Presentation:
@@ -87,11 +87,11 @@ def headline(result: NetworkResult) -> str:
     if moves is None:
         return f"{result.name}: {found}"
     said = f"{result.name}: {found}, a {moves.kind} of mobility {moves.mobility}"
-    said += f", {counted(len(moves.passive), 'idle spin')} of it" if moves.passive else ""
+    said += f", {format_count(len(moves.passive), 'idle spin')} of it" if moves.passive else ""
     if moves.kutzbach == moves.mobility:
         return said
     count = len(moves.redundant)
-    why = f"{counted(count, 'constraint')} {'is' if count == 1 else 'are'} redundant" if count else ""
+    why = f"{format_count(count, 'constraint')} {'is' if count == 1 else 'are'} redundant" if count else ""
     return f"{said} (Kutzbach {moves.kutzbach}{': ' if why else ''}{why})"
 
 

@@ -57,7 +57,7 @@ def law_figure(plan: PlannedPath) -> Figure:
     caption = "Arc length, and speed, acceleration and jerk along the path."
     caption += " Where s″ steps, s‴ has no value." if plan.jerk is None else ""
     caption += " Tinted: arcs." if tinted is not None else ""
-    reduced = f" once its speeds are reduced to {text.percent(factor)}" if factor < 1.0 else ""
+    reduced = f" once its speeds are reduced to {text.format_percent(factor)}" if factor < 1.0 else ""
     caption += f" Dashed: the largest values that the law allows{reduced}." if any(held) else ""
     return Figure(
         "Motion along the path",
@@ -153,7 +153,7 @@ def _shares(
     names, known = plan.joints.chain.coordinates, 100.0 * shares[:, own]
     sample, column = np.unravel_index(int(np.nanargmax(known)), known.shape)
     joint, largest = int(own[column]), float(known[sample, column])
-    words = f"{names[joint]}: {text.percent(largest / 100.0)} of its limit"
+    words = f"{names[joint]}: {text.format_percent(largest / 100.0)} of its limit"
     mark = Mark(int(plan.t_ns[sample]), largest, "diamond", joint_colour(joint), words, names[joint])
     line = Line(known, tuple(names[j] for j in own), tuple(joint_colour(int(j)) for j in own))
     panel = Panel(

@@ -12,7 +12,7 @@ from urmpipe_models.elementwise import BoolArray
 from urmpipe_models.ik.path import JointPath, find_true_runs
 from urmpipe_models.planning.joints import LimitUtilisation, PathJoints
 from urmpipe_models.planning.laws import TimeLaw
-from urmpipe_pipeline.text import in_words
+from urmpipe_pipeline.text import format_rounded
 
 SINGULAR = 1e-7
 """Smallest singular value [-] of a singular pose: a path is followed to 1e-9 m, joints to 1e-2 rad there."""
@@ -61,7 +61,7 @@ def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Infeasibility]:
         along = f"; so it is along {s[last] - s[first]:.3g} m" if last > first else ""
         yield _obstacle(joints, law, float(s[first]), "unreachable", f"{grid.reasons[first]}{along}")
     for jump in grid.jumps:
-        moved = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in jump.joints)
+        moved = ", ".join(f"{one.joint} by {format_rounded(one.step, one.unit)}" for one in jump.joints)
         words = f"the joints jump: {moved}"
         yield _obstacle(joints, law, float(s[jump.sample]), "jump", words, jump.joints[0].joint)
     for first, _ in find_true_runs(_singular(grid)):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.planned_paths.obstacles import Infeasibility
@@ -50,7 +51,7 @@ def law_words(plan: PlannedPath) -> str:
     given = ((plan.velocity, "m/s"), (plan.acceleration, "m/s²"), (plan.jerk, "m/s³"))
     values = [f"{value:.6g} {unit}" for value, unit in given if value is not None]
     held = " in total" if plan.arcs == "total" else " along the path"
-    within = f"up to {text.enumerated(values)}{held}" if values else ""
+    within = f"up to {text.join_words(values)}{held}" if values else ""
     return ", ".join(filter(None, ("limits of the joints" if plan.law == "limits" else plan.law, within)))
 
 
@@ -60,8 +61,8 @@ def reduced_words(plan: PlannedPath, joints: PlannedJoints) -> str:
         return ""
     name, limit, _, _ = joints.most_used
     needed = plan.speed_factor ** (-1 if limit == "largest rate" else -2)
-    left = f"to {text.percent(plan.speed_factor)} of the speed, {plan.speed:.4g} m/s"
-    return f"{left}: {name} would need {text.portion(needed)} its {limit}"
+    left = f"to {text.format_percent(plan.speed_factor)} of the speed, {plan.speed:.4g} m/s"
+    return f"{left}: {name} would need {text.format_portion(needed)} its {limit}"
 
 
 def limit_words(plan: PlannedPath, joints: PlannedJoints) -> str:
@@ -69,8 +70,8 @@ def limit_words(plan: PlannedPath, joints: PlannedJoints) -> str:
     if not joints.limited:
         return "the robot has no velocity or acceleration limits"
     name, limit, share, sample = joints.most_used
-    used = text.portion(round(share, ROUNDED))
-    return f"{name} uses {used} its {limit}, at t = {text.seconds(float(plan.t[sample]))} s"
+    used = text.format_portion(round(share, ROUNDED))
+    return f"{name} uses {used} its {limit}, at t = {text.format_seconds(float(plan.t[sample]))} s"
 
 
 def decisive_fact(plan: PlannedPath) -> Iterator[Fact]:
@@ -153,7 +154,7 @@ def passes_ns(plan: PlannedPath) -> list[int]:
 
 def _rows_words(plan: PlannedPath) -> str:
     """Return how many rows there are, and what those with a radius are."""
-    count = text.counted(len(plan.rows), "row")
+    count = format_count(len(plan.rows), "row")
     if not (plan.rows.radius > 0.0).any():
         return f"{count}, a stop each"
     meant = "corners that arcs round" if plan.rows.corner else "first points of arcs"
@@ -165,7 +166,7 @@ def _singular_words(plan: PlannedPath, joints: PlannedJoints) -> str:
     nearest, near = joints.nearest_singularity, joints.singularity
     if nearest is None:
         return ""
-    at = f"at t = {text.seconds(float(plan.t[nearest]))} s (row {plan.row[nearest]})"
+    at = f"at t = {text.format_seconds(float(plan.t[nearest]))} s (row {plan.row[nearest]})"
     value, volume = near.smallest[nearest], near.manipulability[nearest]
     return f"{at}: smallest singular value {value:.4g}, manipulability {volume:.4g}"
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
 from urmpipe_models.ik.solutions import SearchOptions
@@ -32,8 +33,8 @@ from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.runs.run import summarise_torques
 from urmpipe_pipeline.runs.torques import MOVE_SLOWER, effort_warning
-from urmpipe_pipeline.text import NAMED, counted, rows_text
-from urmpipe_pipeline.text import seconds as in_seconds
+from urmpipe_pipeline.text import MAX_NAMED_ROWS, format_rows
+from urmpipe_pipeline.text import format_seconds as in_seconds
 
 SPARE = 1.0 - 1e-4
 """What reduced speeds are multiplied by further, since limits are looked at on a grid [-]."""
@@ -209,13 +210,15 @@ def _warnings(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> It
         else [int(k) for k in path.orientation.uneven_rows if k not in path.stop_row]
     )
     if uneven:
-        rows = rows_text(np.array(uneven) + 1)
+        rows = format_rows(np.array(uneven) + 1)
         words = f"the tool's angular rate steps in {rows} while it moves, and so do the joints' rates"
         yield LogWarning("uneven-turn", words)
     if joints is not None and not timed.obstacles and len(steps := joints.rate_steps):
         t = timed.law.time_at(joints.s[steps]).tolist()
-        places = ", ".join(f"{in_seconds(one)} s" for one in t[:NAMED])
-        more = f" and {counted(len(t) - NAMED, 'other time')}" if len(t) > NAMED else ""
+        places = ", ".join(f"{in_seconds(one)} s" for one in t[:MAX_NAMED_ROWS])
+        more = (
+            f" and {format_count(len(t) - MAX_NAMED_ROWS, 'other time')}" if len(t) > MAX_NAMED_ROWS else ""
+        )
         words = f"a joint comes to a limit, or leaves it, at t = {places}{more}: there the joints' rates step"
         yield LogWarning("limit-contact", words)
 
@@ -236,5 +239,5 @@ def _half_turns(path: LineArcPath) -> Iterator[LogWarning]:
     turned = np.linalg.norm(path.orientation.rate, axis=1) * np.diff(path.at)
     rows = np.flatnonzero(turned > math.pi - EVEN_TURN_TOLERANCE)
     if len(rows):
-        words = f"the tool turns by 180 deg from {rows_text(rows + 1)} to the next: either way is as short"
+        words = f"the tool turns by 180 deg from {format_rows(rows + 1)} to the next: either way is as short"
         yield LogWarning("half-turn", words)

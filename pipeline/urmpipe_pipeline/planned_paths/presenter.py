@@ -107,7 +107,8 @@ def headline(plan: PlannedPath) -> str:
     said = f"{plan.name}: {plan.robot.name} runs {way}"
     if plan.speed_factor == 1.0 or plan.joints is None:
         return said
-    return f"{said}, reduced to {text.percent(plan.speed_factor)} of the speed by {plan.joints.most_used[0]}"
+    speed = text.format_percent(plan.speed_factor)
+    return f"{said}, reduced to {speed} of the speed by {plan.joints.most_used[0]}"
 
 
 def _checks(plan: PlannedPath) -> Iterator[Check]:

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
 from urmpipe_models.ik.solutions import Targets, validate_targets
 from urmpipe_models.planning.from_rows import validate_ends, validate_rows
 from urmpipe_models.planning.path import VARIANTS, PathRows
 from urmpipe_pipeline.sources.tables.numbers import capped
-from urmpipe_pipeline.text import counted
 
 FARTHEST = 1e9
 """The largest coordinate of a row in [m]."""
@@ -41,7 +41,7 @@ def curve_faults(rows: PathRows) -> tuple[Finding, ...]:
     Rows of which some places are unknown (NaN) are checked as far as possible.
     """
     if len(rows) < FEWEST:
-        few = Finding(found=counted(len(rows), "row"), allowed=f"{FEWEST} or more")
+        few = Finding(found=format_count(len(rows), "row"), allowed=f"{FEWEST} or more")
         return (few, *validate_ends(rows))
     if far := [*_far_away(rows)]:
         return (*far, *validate_ends(rows))

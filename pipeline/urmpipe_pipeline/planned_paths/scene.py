@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.kinematics.forward import points_over_log, poses_over_log
 from urmpipe_models.math3d import to_quaternions
@@ -60,7 +61,7 @@ def path_figure(plan: PlannedPath) -> SpaceFigure:
         "Path in space",
         caption,
         f"Path of {plan.name} in three dimensions, {within_words(plan.position)}, with"
-        f" {text.counted(len(path.arcs), 'arc')} and {text.counted(len(plan.stops), 'stop')}.",
+        f" {format_count(len(path.arcs), 'arc')} and {format_count(len(plan.stops), 'stop')}.",
         (_speed(plan), *(_arc_places(plan) if few else ()), _places("stops", plan.stops, INK_COLOUR)),
         _obstacle_spots(plan),
         sheets=Sheets("planes", outlines(path), REFERENCE_COLOUR) if few else None,
@@ -121,7 +122,7 @@ def _row_spots(plan: PlannedPath) -> Iterator[Spot]:
         places.setdefault(spot_at(np.round(plan.rows.position[row], 6)), []).append(row)
     for place, rows in places.items():
         stop = ": stop" if (plan.rows.radius[rows] == 0.0).all() else ""
-        yield Spot(place, f"{text.rows_text(np.array(rows) + 1)}{stop}", REFERENCE_COLOUR)
+        yield Spot(place, f"{text.format_rows(np.array(rows) + 1)}{stop}", REFERENCE_COLOUR)
 
 
 def _obstacle_spots(plan: PlannedPath) -> tuple[Spot, ...]:

@@ -116,7 +116,7 @@ def shown_unit(panel: Panel) -> tuple[str, float]:
     """Return the unit that a panel is drawn in, and the factor to it from the unit of the panel."""
     if panel.small and panel.unit in text.SHOWN:
         return text.SHOWN[panel.unit]
-    unit, factor = text.display_unit(panel.unit, panel.display_unit)
+    unit, factor = text.choose_unit(panel.unit, panel.display_unit)
     return unit.replace("/s2", "/s²").replace("/s3", "/s³"), factor
 
 

@@ -24,7 +24,7 @@ def written(cell: Cell, *, unit: bool = False) -> str:
         case Value():
             return _number(cell, unit=unit)
         case Place():
-            return f"({text.point(cell.position)})" + (" m" if unit else "")
+            return f"({text.format_point(cell.position)})" + (" m" if unit else "")
         case Advice():
             said = "; ".join(filter(None, (cell.words, *format_hints(cell.hints))))
         case Judged():
@@ -82,16 +82,20 @@ def _number(value: Value, *, unit: bool) -> str:
 def _digits(value: Value, number: float) -> str:
     if value.unit in text.SHOWN:
         exact = value.given and math.isfinite(number)
-        return text.limit(number, value.unit) if exact else text.number(number, value.unit, value.limit)
+        return (
+            text.format_limit(number, value.unit)
+            if exact
+            else text.format_number(number, value.unit, value.limit)
+        )
     if value.unit == "%":
         return f"{100.0 * number:.6g} %" if value.given else _percent(number, value.limit)
     if value.unit == "1":
         return f"{round(number, 3) + 0.0:.3f}"  # + 0.0: no -0.000
     if value.unit == "s":
-        return text.seconds(number)
+        return text.format_seconds(number)
     if isinstance(value.number, int):
         return str(value.number)
-    return f"{number:.6g}" if value.given else text.significant(number)
+    return f"{number:.6g}" if value.given else text.format_significant(number)
 
 
 def _said(percent: str) -> float:
@@ -100,8 +104,8 @@ def _said(percent: str) -> float:
 
 def _percent(share: float, against: float | None) -> str:
     """Return a share in [%], with as many digits as tell it from what it is held against."""
-    shown = text.percent(share)
-    if against is None or against == share or _said(shown) != _said(text.percent(against)):
+    shown = text.format_percent(share)
+    if against is None or against == share or _said(shown) != _said(text.format_percent(against)):
         return shown
     digits = next((n for n in range(3, FINEST) if f"{share:.{n}g}" != f"{against:.{n}g}"), FINEST)
     return f"{100.0 * share:.{digits}g} %"

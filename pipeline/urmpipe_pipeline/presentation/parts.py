@@ -122,7 +122,7 @@ def _in_unit(value: Any, name: str, units: Mapping[str, str]) -> Any:
         return value
     if isinstance(value, (list, tuple)):
         return f"{', '.join(f'{one:.6g}' for one in value)} {units[name]}"
-    return text.allowed(value, units[name])
+    return text.format_stated(value, units[name])
 
 
 def recording_fact(recording: Path | None) -> Fact:
@@ -154,7 +154,7 @@ def ends(position: FloatArray) -> tuple[Spot, ...]:
 
 def within_words(position: FloatArray) -> str:
     """Return between which corners a path in [m], shape (n, 3), stays: "within (0, ...) m and (1, ...) m"."""
-    low, high = (text.point(end(position, axis=0)) for end in (np.nanmin, np.nanmax))
+    low, high = (text.format_point(end(position, axis=0)) for end in (np.nanmin, np.nanmax))
     return f"within ({low}) m and ({high}) m"
 
 

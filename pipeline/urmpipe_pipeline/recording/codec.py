@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.errors import RecordingError, UrmpipeError, format_value
-from urmpipe_pipeline.text import unique
+from urmpipe_pipeline.text import make_unique
 
 ARRAY, DTYPE, SHAPE, TEXT, CODES = "$array", "dtype", "shape", "$text", "codes"  # keys of a reference
 CLASS, COLUMNS, COUNT = (
@@ -255,7 +255,7 @@ def child_keys(items: Sequence[Any]) -> list[str]:
     names = (item if isinstance(item, str) else getattr(item, "name", None) for item in items)
     # Rerun would escape other characters in a path, or not find the path again.
     keys = (re.sub(r"[^\w.-]", "_", name) or "_" if isinstance(name, str) else None for name in names)
-    return unique([str(i) if key is None else key for i, key in enumerate(keys)])
+    return make_unique([str(i) if key is None else key for i, key in enumerate(keys)])
 
 
 # Types

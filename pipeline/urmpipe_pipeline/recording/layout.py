@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.recording.codec import StoredArray
-from urmpipe_pipeline.text import encodable, unique
+from urmpipe_pipeline.text import drop_surrogates, make_unique
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -80,7 +80,7 @@ def keys(names: Sequence[str]) -> list[str]:
     Rerun's filters, by which views choose what they show, drop blanks at the end of a path, and take a
     backslash before a slash for the escape of that slash: names end before these.
     """
-    return unique([re.sub(r"[\s\\]+\Z", "", encodable(name)) or "unnamed" for name in names])
+    return make_unique([re.sub(r"[\s\\]+\Z", "", drop_surrogates(name)) or "unnamed" for name in names])
 
 
 def array_columns(

@@ -30,7 +30,7 @@ from urmpipe_pipeline.recording.reader import Store
 from urmpipe_pipeline.recording.views.blueprint import send_views
 from urmpipe_pipeline.recording.views.plots import LONG
 from urmpipe_pipeline.subprocess_reader import mark_safe
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -96,7 +96,7 @@ def _send_views_and_metadata(
         return path if path in plottable else None
 
     stream = sink.stream
-    stream.send_recording_name(encodable(shown.name))
+    stream.send_recording_name(drop_surrogates(shown.name))
     blueprint, opening, plotted = send_views(stream, shown, entity_of)
     rows = sum(array.rows for array in encoded.arrays if array.plotted)
     packed = encoded.packed(LONG if rows <= MAX_PLOTTED_ROWS else 0, plotted)

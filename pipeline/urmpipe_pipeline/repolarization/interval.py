@@ -12,13 +12,13 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.measure_units import compatible_units, quantity_to_si
 from urmpipe_models.wraps import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.sources.options import GivenInterval
-from urmpipe_pipeline.text import counted
 
 Interval = tuple[float, float]
 
@@ -246,4 +246,4 @@ def _format_evidence(
     wraps = int(np.isin(unwrapped.joints, list(ranges)).sum())
     period = float(periods[first]) / abs(column.factor)
     low, high = min(low for low, _ in ranges.values()), max(high for _, high in ranges.values())
-    return f"{counted(wraps, 'wrap')} by {period:.6g} {column.unit}, values from {low:.6g} to {high:.6g}"
+    return f"{format_count(wraps, 'wrap')} by {period:.6g} {column.unit}, values from {low:.6g} to {high:.6g}"

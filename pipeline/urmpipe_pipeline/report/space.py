@@ -93,7 +93,7 @@ def _path(path: Path, width: int, dot: int) -> Spec:
     said = "t %{customdata[0]:.3f} s" if timed else "row %{customdata[0]}"
     said += "<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"
     if path.values is not None:
-        said += f"<br>%{{customdata[1]:.{text.DIGITS}f}} {label(unit)}"
+        said += f"<br>%{{customdata[1]:.{text.MAX_DECIMALS}f}} {label(unit)}"
     style = {"color": path.colour, "width": width, "dash": "dash" if path.supposed else "solid"}
     return _in_space(place) | {
         "mode": "lines" if path.line else "markers",
@@ -210,7 +210,7 @@ def _arrows(arrows: Arrows) -> Iterator[Spec]:
         "line": style | {"color": typed(np.repeat(heights, 3)), "width": FRONT_PX, "showscale": False},
     }
     said = "row %{customdata[0]}<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"
-    said += f"<br>%{{customdata[1]:.{text.DIGITS}f}} {label(unit)}"
+    said += f"<br>%{{customdata[1]:.{text.MAX_DECIMALS}f}} {label(unit)}"
     yield _in_space(arrows.start) | {
         "mode": "markers",
         "name": label(arrows.name),

@@ -228,7 +228,7 @@ def _card(section: Section, name: str, anchors: Anchors) -> Card:
         state=section.verdict or PLAIN,
         size="" if value is None else section.facts[0].name,
         share=None if used is None else min(used, 1.0),
-        used="" if used is None or math.isinf(used) else f"{text.portion(used)} the limit",
+        used="" if used is None or math.isinf(used) else f"{text.format_portion(used)} the limit",
     )
 
 

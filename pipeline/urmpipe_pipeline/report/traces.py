@@ -14,13 +14,13 @@ from urmpipe_models.errors import escape_control_characters
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.curves import MAX_POINTS, decimate, stretches
 from urmpipe_pipeline.report.spec import BAND, FAULT, INK, MUTED, Spec, typed
-from urmpipe_pipeline.text import DIGITS
+from urmpipe_pipeline.text import MAX_DECIMALS
 
 DASHES = ("solid", "dash", "dot", "dashdot")
 """Tells the ninth joint from the first: colours repeat, dashes do not."""
 
 FINE_DIGITS = 6
-"""Digits after the point of a value in SI: micrometres; angles in [rad] and rates have `DIGITS`."""
+"""Digits after the point of a value in SI: micrometres; angles in [rad] and rates have `MAX_DECIMALS`."""
 
 SIGNIFICANT = 7
 """Digits that a value in SI has at most: what single precision holds."""
@@ -86,12 +86,12 @@ def pointer_digits(unit: str, values: FloatArray) -> int:
     Those in [mm] and [deg] have as many as in the tables.
     """
     if unit in {shown for shown, _ in text.SHOWN.values()}:
-        return DIGITS
-    most = DIGITS if unit == "rad" or "/s" in unit else FINE_DIGITS
+        return MAX_DECIMALS
+    most = MAX_DECIMALS if unit == "rad" or "/s" in unit else FINE_DIGITS
     return max(min(most, SIGNIFICANT - len(f"{_largest(values):.0f}")), 0)
 
 
-def told(values: FloatArray, digits: int = DIGITS) -> str:
+def told(values: FloatArray, digits: int = MAX_DECIMALS) -> str:
     """Return how values, shape (n,), are written under the pointer: as the tables write the largest of them.
 
     They are in the unit of the figure.
@@ -100,7 +100,7 @@ def told(values: FloatArray, digits: int = DIGITS) -> str:
     return EXPONENT if 0.0 < largest < SMALL else f".{digits}f"
 
 
-def precision(values: FloatArray, digits: int = DIGITS) -> Literal["f4", "f8"]:
+def precision(values: FloatArray, digits: int = MAX_DECIMALS) -> Literal["f4", "f8"]:
     """Return "f4" if single precision tells the same digits of values in any unit, shape (n,), else "f8".
 
     A tenth of the last digit may be lost, but the least and the largest value are told exactly as they are:

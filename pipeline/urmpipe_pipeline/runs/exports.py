@@ -27,7 +27,7 @@ from urmpipe_pipeline.presentation.exports import (
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.file_columns import file_roles, file_table
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 
 def exports(run: Run) -> Exports:
@@ -75,7 +75,7 @@ def grid_table(run: Run) -> ExportTable:
     if not timed:
         columns = [ExportColumn("row", "", np.arange(1, len(run.t_ns) + 1))]
     units = run.joint_units
-    joints = [encodable(name) for name in run.log.joints]
+    joints = [drop_surrogates(name) for name in run.log.joints]
     orders = (("", "", run.q), ("d_", "/s", run.qd), ("dd_", "/s2", run.qdd))
     for prefix, order, values in orders[: 3 if timed else 1]:
         names = [prefix + name for name in joints]
@@ -109,7 +109,7 @@ def _grid_fields(run: Run) -> dict[str, Any]:
     empty = np.empty((0, 0))
     timed = run.timed
     return {
-        "name": encodable(run.name),
+        "name": drop_surrogates(run.name),
         "rows": "grid",
         "t": run.t if timed else empty,
         "clock_ns": run.log.clock_start_ns + run.t_ns if timed else empty,
@@ -122,7 +122,7 @@ def _grid_fields(run: Run) -> dict[str, Any]:
         "a": tcp.acceleration if tcp is not None and timed else empty,
         "euler_zyx": empty if tcp is None else tcp.euler_zyx,
         "p_recorded": empty if run.tcp_recorded is None else run.tcp_recorded,
-        "joints": [encodable(name) for name in run.log.joints],
+        "joints": [drop_surrogates(name) for name in run.log.joints],
         "units": {
             "t": "s", "clock_ns": "ns", "q": list(units), "qd": [f"{unit}/s" for unit in units],
             "qdd": [f"{unit}/s2" for unit in units], "tau": run.torque_units, "p": "m", "v": "m/s",
@@ -136,7 +136,7 @@ def _file_fields(run: Run, table: ExportTable) -> dict[str, Any]:
     columns = [column for column in table.columns if not isinstance(column.values, Times)]
     clock = [column for column in table.columns if isinstance(column.values, Times)]
     return {
-        "name": encodable(run.name),
+        "name": drop_surrogates(run.name),
         "rows": "file",
         "t": run.log.t if run.timed else np.empty((0, 0)),
         "clock_ns": np.empty((0, 0)) if table.clock_ns is None else table.clock_ns,

@@ -15,6 +15,7 @@ from functools import cache, partial
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.dynamics.equations import energies_over_log, torque_terms_over_log
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_norms
 from urmpipe_models.kinematics.forward import PointLog
@@ -81,10 +82,10 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     marked = f"{wraps} marked{f', {rest} doubtful' if rest else ''}"
     before = panels("before", run.log.q, run.log.t_ns, _raw_marks(run))
     both = View("Joints in the file", before), View(f"Joints repolarized ({marked})", after)
-    count = text.counted(wraps, "repolarization")
+    count = format_count(wraps, "repolarization")
     caption = f"First as in the file, then repolarized. {count}: a triangle marks each, up where a turn was"
     caption += " added, down where one was taken away."
-    caption += f" A cross marks each of {text.counted(rest, 'other finding')}." if rest else ""
+    caption += f" A cross marks each of {format_count(rest, 'other finding')}." if rest else ""
     title = "Joints before and after repolarization"
     alt = f"{joints} First as in the file, then after {count}."
     yield Figure(title, caption, alt, both, opened=opened, share=JOINTS_SHARE)
@@ -217,7 +218,7 @@ def _recorded(run: Run) -> Iterator[View]:
 
 
 def _format_singular(tcp: PointLog) -> str:
-    count = text.counted(int(np.count_nonzero(tcp.singular)), "sample")
+    count = format_count(int(np.count_nonzero(tcp.singular)), "sample")
     sentence = f" Tinted: {count} with ry at ±π/2, where rz and rx are not separately defined."
     return sentence if np.any(tcp.singular) else ""
 
@@ -386,6 +387,6 @@ def _format_largest(run: Run) -> str:
     largest = []
     for summary in run.torque_summaries():
         share = summary.effort_share
-        limit = "" if share is None else f" ({text.percent(share)} of its limit)"
+        limit = "" if share is None else f" ({text.format_percent(share)} of its limit)"
         largest.append(f"{summary.joint} {summary.max:.4g} {summary.unit}{limit}")
     return f"Torques of the joints of {run.name} over time. The largest: {', '.join(largest)}."

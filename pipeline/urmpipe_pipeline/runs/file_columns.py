@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, Export
 from urmpipe_pipeline.sources.checks import REBUILT
 from urmpipe_pipeline.sources.clocks.text_times import ZONED
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 MAX_DIGITS = 15  # decimal numbers with up to 15 digits have different doubles
 MAX_EXACT_POWER = 22  # larger powers of ten are rounded
@@ -96,7 +96,7 @@ def _column_names(columns: Sequence[LogColumn]) -> list[str]:
             names.append(column.header)
         else:
             is_clock = column.role == "time" and not column.header
-            names.append(f"{'t' if is_clock else encodable(column.name)} [{column.unit}]")
+            names.append(f"{'t' if is_clock else drop_surrogates(column.name)} [{column.unit}]")
     return names
 
 

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogColumn
@@ -53,8 +54,8 @@ def _time_facts(run: Run) -> Iterator[Fact]:
         ("Rows", run.log.rows, "row", run.log.period),
         ("Grid", len(run.t_ns), "sample", run.tsp),
     ):
-        every = f" every {text.seconds(period)} s" if count > 1 else ""
-        yield Fact(name, f"{text.counted(count, noun)}{every}")
+        every = f" every {text.format_seconds(period)} s" if count > 1 else ""
+        yield Fact(name, f"{format_count(count, noun)}{every}")
     yield Fact("Duration", Value(run.duration, "s"))
 
 
@@ -88,8 +89,8 @@ def format_audit(run: Run) -> str:
     """Return the counts of an audit: "2 repolarizations, 1 other finding"."""
     wraps = len(run.repolarizations)
     rest = len(run.audit) - wraps
-    more = f", {text.counted(rest, 'other finding')}" if rest else ""
-    return f"{text.counted(wraps, 'repolarization')}{more}"
+    more = f", {format_count(rest, 'other finding')}" if rest else ""
+    return f"{format_count(wraps, 'repolarization')}{more}"
 
 
 def inference_table(run: Run, *, brief: bool = False) -> Table:

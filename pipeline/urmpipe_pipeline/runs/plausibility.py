@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_blocks
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
@@ -331,10 +332,10 @@ def _join_excesses(kind: str, excesses: list[_Excess], noun: str, advice: str) -
         return []
     worst = max(excesses, key=lambda excess: excess.largest)
     joints = [
-        f"{excess.name} ({text.counted(len(excess.rows), noun)})"
+        f"{excess.name} ({format_count(len(excess.rows), noun)})"
         for excess in excesses
         if excess is not worst
     ]
-    message = f"{worst.message}; also {text.enumerated(joints)}" if joints else worst.message
+    message = f"{worst.message}; also {text.join_words(joints)}" if joints else worst.message
     row = min(int(excess.rows[0]) for excess in excesses) + 1
     return [LogWarning(kind, f"{message}: {advice}", row)]

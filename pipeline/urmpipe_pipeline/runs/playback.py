@@ -177,7 +177,11 @@ def _point_figure(run: Run, after: PointLog, playback: Playback) -> Figure:
         panels.append(_size(f"‖{symbol}‖ before", unit, raw, t_ns, DEVIATION_COLOUR))
         panels.append(_size(f"‖{symbol}‖ after", unit, right, run.t_ns, AXIS_COLOURS["norm"]))
     worst = playback.worst
-    at = {} if worst is None else {int(t_ns[worst]): f"furthest off {text.seconds(playback.t[worst])} s"}
+    at = (
+        {}
+        if worst is None
+        else {int(t_ns[worst]): f"furthest off {text.format_seconds(playback.t[worst])} s"}
+    )
     return Figure(
         "Tool centre point before and after repolarization",
         f"{_format_error(run, playback)} {_format_method(run)}",
@@ -225,8 +229,8 @@ def _format_error(run: Run, playback: Playback) -> str:
         return "How far the tool centre point goes wrong is not known."
     t = float(playback.t[worst])
     jump = min(run.repolarizations, key=lambda entry: abs(entry.t - t))
-    deviation = text.quantity(float(playback.deviation[worst]), "m")
-    where = f"at t = {text.seconds(t)} s, where {jump.joint} jumps (row {jump.row})"
+    deviation = text.format_quantity(float(playback.deviation[worst]), "m")
+    where = f"at t = {text.format_seconds(t)} s, where {jump.joint} jumps (row {jump.row})"
     return (
         f"Before repolarization {point_name(run)} is off by up to {deviation}, {where}; its speed reaches"
         f" {_largest(playback.velocity)} m/s, its acceleration {_largest(playback.acceleration)} m/s²."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from urmpipe_pipeline import text
+from urmpipe_models.display import format_count
 from urmpipe_pipeline.outputs import AUDIT_COLUMNS
 from urmpipe_pipeline.presentation.parts import rows_table
 from urmpipe_pipeline.presentation.section import Block, Judged, Presentation, Ref, Section, Table, Value
@@ -71,8 +71,8 @@ def present(run: Run) -> Presentation:
 
 def _headline(run: Run) -> str:
     if not run.timed:
-        return text.counted(run.log.rows, "still pose")
-    return f"{text.counted(run.log.rows, 'row')}, {format_audit(run)}"
+        return format_count(run.log.rows, "still pose")
+    return f"{format_count(run.log.rows, 'row')}, {format_audit(run)}"
 
 
 def audit_rows(run: Run) -> Table:

@@ -119,7 +119,7 @@ def _initial_outlier_warning(robot: Chain | None, log: JointLog) -> list[LogWarn
     first = "the first row" if rows == 1 else f"the first {rows} rows"
     place = "as 0, 0, 0"
     if not np.isinf(distance):
-        place = f"{text.quantity(distance, 'm')} from where the others have it"
+        place = f"{text.format_quantity(distance, 'm')} from where the others have it"
     message = f"{first} of {log.rows} recorded the TCP {place}: no tool or pose known yet?"
     return [LogWarning(RECORDED_START, f"{message} They are kept and judged with the others", row=1)]
 
@@ -150,7 +150,7 @@ class PoseDifference(NamedTuple):
 
     def format(self, digits: int = 2, *, turned: bool) -> str:
         """Return distance, and angle if orientations matter, as text."""
-        angle = f" and {text.quantity(self.angle, 'rad')}" if turned else ""
+        angle = f" and {text.format_quantity(self.angle, 'rad')}" if turned else ""
         return f"{self.distance * 1e3:.{digits}f} mm{angle}"
 
 

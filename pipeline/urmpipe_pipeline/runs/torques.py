@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from urmpipe_models.arm.chain import GRAVITY, Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.dynamics.equations import torques_over_log
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Hint
@@ -118,7 +119,7 @@ def effort_warning(
     if not exceeding:
         return []
     worst = max(exceeding, key=lambda summary: summary.effort_share or 0.0)
-    row, place = None, f"at t = {text.seconds(worst.t_max)} s"
+    row, place = None, f"at t = {text.format_seconds(worst.t_max)} s"
     if rows_ns is not None:
         first = min(int(summary.beyond[0]) for summary in exceeding)
         at_ns = t_ns[[first, worst.sample_max]]
@@ -126,14 +127,16 @@ def effort_warning(
         row, worst_row = (round(index) + 1 for index in nearest)
         place = f"in row {worst_row}"
     message = f"{worst.joint} needs more than its effort of {worst.effort:.6g} {worst.unit} in"
-    message += f" {len(worst.beyond)} of {worst.samples} samples ({text.percent(worst.out_fraction or 0.0)}),"
+    message += (
+        f" {len(worst.beyond)} of {worst.samples} samples ({text.format_percent(worst.out_fraction or 0.0)}),"
+    )
     message += f" at worst {worst.max:.4g} {worst.unit} {place}"
     joints = [
-        f"{summary.joint} ({text.counted(len(summary.beyond), 'sample')})"
+        f"{summary.joint} ({format_count(len(summary.beyond), 'sample')})"
         for summary in exceeding
         if summary is not worst
     ]
-    message += f"; also {text.enumerated(joints)}" if joints else ""
+    message += f"; also {text.join_words(joints)}" if joints else ""
     return [LogWarning(EFFORT_LIMIT, f"{message}: {advice}", row, hints=hints)]
 
 
@@ -165,7 +168,7 @@ def noise_warnings(run: Run) -> list[LogWarning]:
     message = "joint values are noisy or coarse for torques: accelerations by differences give"
     message += f" {names[worst]} {before[worst]:.4g} {unit} rms, smoothed over {WINDOW} samples"
     message += f" {after[worst]:.4g} {unit}"
-    message += f"; also {text.enumerated([names[j] for j in sorted(further)])}" if further else ""
+    message += f"; also {text.join_words([names[j] for j in sorted(further)])}" if further else ""
     return [LogWarning(TORQUE_NOISE, message, hints=(SMOOTHED,))]
 
 

@@ -36,7 +36,7 @@ def coupling_warnings(simulation: Simulation) -> Iterator[LogWarning]:
     yield LogWarning(
         "coarse-step",
         f"blocks see each other's values held over {step}: residual of the energy balance",
-        found=f"{abs(residual):.3g} J, {text.percent(share)} of the largest energy",
+        found=f"{abs(residual):.3g} J, {text.format_percent(share)} of the largest energy",
         allowed=f"{100.0 * ALLOWED:g} %",
         hints=(Hint("step", shorter, "makes it smaller"),),
     )

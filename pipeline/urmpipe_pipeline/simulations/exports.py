@@ -11,7 +11,7 @@ from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_pipeline.presentation.exports import ExportColumn, Exports, ExportTable, Poses, Rows, Times
 from urmpipe_pipeline.runs.exports import export_metadata, poses_by_kinematics
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 
 def exports(simulation: Simulation) -> Exports:
@@ -32,10 +32,10 @@ def simulation_table(simulation: Simulation) -> ExportTable:
     """Return every signal of a simulation, a column a scalar: t, then `block.variable` with its unit."""
     columns = [ExportColumn("t [s]", "s", Times(simulation.t_ns, "s"))]
     for one in simulation.signals:
-        unit = encodable(one.unit)
+        unit = drop_surrogates(one.unit)
         behind = f" [{unit}]" if unit else ""
         columns += [
-            ExportColumn(f"{encodable(name)}{behind}", unit, np.ascontiguousarray(values))
+            ExportColumn(f"{drop_surrogates(name)}{behind}", unit, np.ascontiguousarray(values))
             for name, values in zip(one.names, one.columns.T, strict=True)
         ]
     return ExportTable(tuple(columns), simulation.t_ns)
@@ -49,7 +49,7 @@ def _fields(simulation: Simulation, table: ExportTable) -> dict[str, Any]:
     signals = [column for column in table.columns if not isinstance(column.values, Times)]
     values = [np.asarray(column.values) for column in signals]
     return {
-        "name": encodable(simulation.name),
+        "name": drop_surrogates(simulation.name),
         "t": simulation.t[:, np.newaxis],  # a vector without a row would be written as 0 x 0
         "clock_ns": simulation.t_ns[:, np.newaxis],
         "values": np.column_stack(values) if values else np.empty((len(simulation.t_ns), 0)),

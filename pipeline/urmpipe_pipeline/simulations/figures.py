@@ -159,7 +159,7 @@ def _instants(simulation: Simulation, verdict: DeltaMeterResult | None) -> dict[
     """Return when a delta meter decided, and when the simulation failed."""
     found = {} if simulation.failed is None else {int(simulation.t_ns[-1]): "failed"}
     if verdict is not None:
-        found[int(simulation.t_ns[verdict.sample])] = f"decides at {text.seconds(verdict.t)} s"
+        found[int(simulation.t_ns[verdict.sample])] = f"decides at {text.format_seconds(verdict.t)} s"
     return found
 
 
@@ -180,11 +180,11 @@ def _limit_words(group: Group, limits: Mapping[str, float]) -> str:
         own = {f"{limits[name] * factor:.6g}": None for name in signal.names if name in limits}
         found.setdefault(signal.variable, {}).update(own)
     words = [
-        f"the limit of |{variable}|, {f'{text.enumerated(list(values))} {unit}'.rstrip()}"
+        f"the limit of |{variable}|, {f'{text.join_words(list(values))} {unit}'.rstrip()}"
         for variable, values in found.items()
         if values
     ]
-    return f"Dashed: {text.enumerated(words)}; tinted: beyond it." if words else ""
+    return f"Dashed: {text.join_words(words)}; tinted: beyond it." if words else ""
 
 
 def _described(one: Signal) -> str:

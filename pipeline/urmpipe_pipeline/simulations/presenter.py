@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
+from urmpipe_models.display import format_count
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
@@ -78,7 +79,7 @@ def outcome_words(simulation: Simulation) -> str:
         return f"{simulation.name} did not reach its end"
     worst = simulation.judged_worst
     if worst is None:
-        return f"{simulation.name}: {text.counted(len(simulation.t_ns), 'sample')}"
+        return f"{simulation.name}: {format_count(len(simulation.t_ns), 'sample')}"
     within = "out of" if worst.out_of_tolerance else "within"
     doubted = ", but in doubt" if worst.caveats and not worst.out_of_tolerance else ""
     assumptions = format_assumptions(simulation.assumptions)
@@ -89,7 +90,7 @@ def _decisive(simulation: Simulation) -> Iterator[Fact]:
     """Yield why it failed and when, or which delta meter decided."""
     if simulation.failed is not None:
         yield Fact("Why", simulation.failed)
-        end = f"t = {text.seconds(float(simulation.t[-1]))} s" if len(simulation.t_ns) else "its start"
+        end = f"t = {text.format_seconds(float(simulation.t[-1]))} s" if len(simulation.t_ns) else "its start"
         yield Fact("Recorded until", end)
     elif (worst := simulation.judged_worst) is not None:
         yield Fact("Furthest out" if worst.out_of_tolerance else "Closest to the limit", Ref(worst.block))
@@ -160,8 +161,8 @@ def _energy_fact(simulation: Simulation, balance: EnergyBalance) -> Fact:
     if worst is None:
         return Fact(ENERGY, None)
     residual = abs(float(balance.residual[worst]))
-    blocks = text.counted(len({one.block for one in simulation.signals if one.is_energy}), "block")
-    at, share = text.seconds(float(simulation.t[worst])), text.percent(balance.share(residual))
+    blocks = format_count(len({one.block for one in simulation.signals if one.is_energy}), "block")
+    at, share = text.format_seconds(float(simulation.t[worst])), text.format_percent(balance.share(residual))
     words = f"not accounted for: at most {residual:.4g} J at t = {at} s, {share} of the largest energy"
     return Fact(ENERGY, f"{blocks}; {words} supplied, dissipated or stored ({RESIDUAL_CAUSES})")
 

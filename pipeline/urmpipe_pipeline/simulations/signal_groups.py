@@ -65,7 +65,7 @@ class Group:
     @property
     def shown(self) -> tuple[str, float]:
         """The unit that they are shown in, and how many of it one of their own is."""
-        return text.display_unit(self.unit, self.display_unit)
+        return text.choose_unit(self.unit, self.display_unit)
 
     @property
     def colours(self) -> tuple[tuple[str, ...], ...]:

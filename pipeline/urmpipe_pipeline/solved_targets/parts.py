@@ -18,7 +18,7 @@ from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot
 from urmpipe_pipeline.presentation.section import Cell, Column, Event, Fact, Place, Table, Value
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import ghosts
-from urmpipe_pipeline.text import in_words, rows_text
+from urmpipe_pipeline.text import format_rounded, format_rows
 
 MANY = 10
 """Branches, jumps and stretches of joints too fast that are facts of each; the others are counted."""
@@ -58,15 +58,15 @@ def path_facts(one: IkResult, path: JointPath) -> Iterator[Fact]:
 
 def jump_words(one: IkResult, jump: BranchJump) -> str:
     """Return a jump with its time, its place and what moves."""
-    steps = ", ".join(f"{step.joint} by {in_words(step.step, step.unit)}" for step in jump.joints)
+    steps = ", ".join(f"{step.joint} by {format_rounded(step.step, step.unit)}" for step in jump.joints)
     change = "" if jump.from_branch == jump.to_branch else f"{jump.from_branch} → {jump.to_branch}: "
     since = f", since row {one.row[jump.last]}" if jump.last < jump.sample - 1 else ""
-    return f"{_at(one, jump.sample)}{since}, at ({text.point(jump.position)}) m: {change}{steps}"
+    return f"{_at(one, jump.sample)}{since}, at ({text.format_point(jump.position)}) m: {change}{steps}"
 
 
 def fast_words(one: IkResult, stretch: SpeedViolation) -> str:
     """Return how fast a joint would have to be, how fast it may be, and where."""
-    speed, allowed = (in_words(value, stretch.unit) for value in (stretch.speed, stretch.allowed))
+    speed, allowed = (format_rounded(value, stretch.unit) for value in (stretch.speed, stretch.allowed))
     rows = f"{_at(one, stretch.first)} to row {one.row[stretch.last]}"
     return f"{stretch.joint} at {speed} of {allowed} allowed, {rows}"
 
@@ -90,9 +90,9 @@ def _branches(one: IkResult) -> Iterator[str]:
 def _furthest(one: IkResult) -> str:
     """Return how far the tool is from its targets at most, and where."""
     miss = one.position_error[:, 0]
-    said = text.quantity(float(np.nanmax(miss)), "m")
+    said = text.format_quantity(float(np.nanmax(miss)), "m")
     if one.angle is not None:
-        said += f" and {text.quantity(float(np.nanmax(one.angle)), 'rad')}"
+        said += f" and {text.format_quantity(float(np.nanmax(one.angle)), 'rad')}"
     return f"{said} at most, {_at(one, int(np.nanargmax(miss)))}"
 
 
@@ -100,7 +100,7 @@ def _at(one: IkResult, sample: int) -> str:
     """Return when a sample is."""
     t = one.t
     row = f"row {one.row[sample]}"
-    return f"at {row}" if t is None else f"at t = {text.seconds(t[sample])} s ({row})"
+    return f"at {row}" if t is None else f"at t = {text.format_seconds(t[sample])} s ({row})"
 
 
 def tables(one: IkResult) -> Iterator[Table]:
@@ -162,7 +162,7 @@ def joints_table(one: IkResult) -> Table:
         speeds = {"fastest": speed.max(axis=0), "allowed": [joint.velocity for joint in joints]}
         for key, values in speeds.items():
             cells = [
-                f"{text.quantity(round(value, 9), unit)}/s" if np.isfinite(value) else None
+                f"{text.format_quantity(round(value, 9), unit)}/s" if np.isfinite(value) else None
                 for value, unit in zip(values, units, strict=True)
             ]
             columns.append(Column(key, key, cells))
@@ -173,7 +173,7 @@ def unreached(one: IkResult) -> Iterator[str]:
     """Yield why rows have no solution; if all are requested also why branches of other rows have none."""
     for rows, why in _stretches(one):
         if why:
-            yield f"{rows_text(one.row[rows])}: {why}"
+            yield f"{format_rows(one.row[rows])}: {why}"
         elif one.all_solutions and one.method != "iterative":
             yield from _branches_unreached(one, rows)
 
@@ -223,7 +223,7 @@ def events(one: IkResult) -> Iterator[Event]:
     """Yield rows that are not reached, jumps, joints that are too fast, and warnings, each at its row."""
     for rows, why in _stretches(one):
         if why:
-            yield Event(_time(one, rows[0]), f"not reached: {rows_text(one.row[rows])}: {why}", "error")
+            yield Event(_time(one, rows[0]), f"not reached: {format_rows(one.row[rows])}: {why}", "error")
     if one.path is not None:
         for jump in one.path.jumps:
             yield Event(_time(one, jump.sample), f"jump {jump_words(one, jump)}", "error")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
+from urmpipe_models.display import format_count
 from urmpipe_models.ik.closed import format_method
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Figure
@@ -27,7 +28,7 @@ from urmpipe_pipeline.solved_targets.parts import (
 )
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import opening_row, scene
-from urmpipe_pipeline.text import counted, enumerated
+from urmpipe_pipeline.text import join_words
 
 
 def present(one: IkResult) -> Presentation:
@@ -80,19 +81,23 @@ def headline(one: IkResult) -> str:
     found, wanted = int(one.reached.sum()), len(one)
     part = "" if found == wanted else f"{found} of "
     method = format_method(one.method)
-    said = f"{one.name}: {one.robot.name} reaches {part}{counted(wanted, 'target')} ({method})"
+    said = f"{one.name}: {one.robot.name} reaches {part}{format_count(wanted, 'target')} ({method})"
     if one.path is None:
         return said
     jumps, fast = len(one.path.jumps), len({stretch.joint for stretch in one.path.speed_violations})
-    others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
-    return f"{said}, with {enumerated(others)}" if others else said
+    others = [format_count(jumps, "jump")] * bool(jumps) + [f"{format_count(fast, 'joint')} too fast"] * bool(
+        fast
+    )
+    return f"{said}, with {join_words(others)}" if others else said
 
 
 def _checks(one: IkResult) -> Iterator[Check]:
     """Yield what the verdict rests on: every target is reached, without a jump or a joint too fast."""
     missed = len(one) - int(one.reached.sum())
     why = (
-        "" if not missed else f"{missed} of {counted(len(one), 'target')}: {': '.join(next(unreached(one)))}"
+        ""
+        if not missed
+        else f"{missed} of {format_count(len(one), 'target')}: {': '.join(next(unreached(one)))}"
     )
     yield Check("every target reached", "fail" if missed else "pass", why, kind="unreachable")
     if one.path is None:

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
 from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
@@ -18,7 +19,6 @@ from urmpipe_models.ik.solutions import SearchOptions
 from urmpipe_models.ik.solve import METHODS, Method
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
-from urmpipe_pipeline.text import counted
 
 TYPED = 1e-3
 """A start beyond a limit by this, in [rad] or [m], is on it: people type limits with few digits."""
@@ -144,7 +144,9 @@ def joint_values(arm: Chain, given: JointValues, parameter: str) -> FloatArray:
         allowed = f"{allowed}, in rad and m"
         raise OptionError(Finding(parameter=parameter, found=format_value(given), allowed=allowed)) from None
     if values.shape != (len(arm.coordinates),):
-        raise OptionError(Finding(parameter=parameter, found=counted(values.size, "value"), allowed=allowed))
+        raise OptionError(
+            Finding(parameter=parameter, found=format_count(values.size, "value"), allowed=allowed)
+        )
     if not np.isfinite(values).all():
         found, allowed = "a value that is not finite", f"{allowed}, in rad and m"
         raise OptionError(Finding(parameter=parameter, found=found, allowed=allowed))

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_norms
 from urmpipe_models.errors import Hint
 from urmpipe_models.ik.path import JointPath
 from urmpipe_models.ik.solutions import Solutions, Targets
 from urmpipe_models.kinematics.singularity import NEAR_SINGULAR, singularity_over_log
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.text import counted, in_words, rows_text
+from urmpipe_pipeline.text import format_rounded, format_rows
 
 MILLI = 1e-3
 """A target in mm that is read as m is a thousand times too far."""
@@ -41,7 +42,7 @@ def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) ->
         rows = row[(one.where & listed & solutions.reached).any(axis=1)]
         if len(rows):
             said = f"{one.free}; chosen: {one.chosen}" if one.free else "a direction of motion is lost there"
-            yield LogWarning("singular", f"{rows_text(rows)}: {one.family}: {said}")
+            yield LogWarning("singular", f"{format_rows(rows)}: {one.family}: {said}")
 
 
 def near_singular_warnings(
@@ -72,7 +73,7 @@ def near_singular_warnings(
         worst = int(np.argmin(least))
         where = f" in row {row[worst]}" if near.sum() > 1 else ""
         said = (
-            f"{rows_text(row[near])}: singular or nearly so: smallest singular value {least[worst]:.2g}"
+            f"{format_rows(row[near])}: singular or nearly so: smallest singular value {least[worst]:.2g}"
             f"{where}; the least change of the target may turn joints far"
         )
         yield LogWarning("near-singular", said)
@@ -119,7 +120,7 @@ def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarni
     if short.any():
         worst = int(np.argmax(short))
         said = (
-            f"{rows_text(row[short > 0.0])}: out of reach, the nearest point within the tolerance is taken:"
+            f"{format_rows(row[short > 0.0])}: out of reach, the nearest point within the tolerance is taken:"
             f" up to {1e3 * short[worst]:.4g} mm away, in row {row[worst]}"
         )
         yield LogWarning("nearest-point", said)
@@ -143,8 +144,8 @@ def far_warnings(
         far = ~reached & (away > FAR * reach) & (MILLI * away <= reach)
     if far.any():
         said = (
-            f"{rows_text(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name} reaches"
-            f" no farther than {reach:.4g} m: in mm?"
+            f"{format_rows(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name}"
+            f" reaches no farther than {reach:.4g} m: in mm?"
         )
         hints = (Hint("unit", {"": "mm"}, "applies this"),) if of_file else ()
         yield LogWarning("too-far", said, allowed="m", hints=hints)
@@ -161,11 +162,12 @@ def path_warnings(path: JointPath) -> Iterator[LogWarning]:
     """Yield why no arm can follow the joint values along a path: its jumps, and joints that are too fast."""
     if path.jumps:
         first = path.jumps[0]
-        steps = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in first.joints)
+        steps = ", ".join(f"{one.joint} by {format_rounded(one.step, one.unit)}" for one in first.joints)
         yield LogWarning("jump", _first_of(len(path.jumps), "jump", steps), first.sample + 1)
     if path.speed_violations:
         one = path.speed_violations[0]
-        said = f"{one.joint} at {in_words(one.speed, one.unit)} of {in_words(one.allowed, one.unit)} allowed"
+        speed, limit = format_rounded(one.speed, one.unit), format_rounded(one.allowed, one.unit)
+        said = f"{one.joint} at {speed} of {limit} allowed"
         count = len({one.joint for one in path.speed_violations})
         yield LogWarning("joint-too-fast", _first_of(count, "joint", said, " too fast"), one.first + 1)
 
@@ -183,4 +185,4 @@ def unreached_warnings(reasons: Sequence[str | None]) -> Iterator[LogWarning]:
 
 def _first_of(count: int, noun: str, first: str, more: str = "") -> str:
     """Return how many there are, and the first: "2 joints too fast, here the first: ..."."""
-    return f"{counted(count, noun)}{more}{', here the first' if count > 1 else ''}: {first}"
+    return f"{format_count(count, noun)}{more}{', here the first' if count > 1 else ''}: {first}"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, map_collecting_errors
 from urmpipe_pipeline.joint_log import Inference, LogWarning
@@ -30,7 +31,6 @@ from urmpipe_pipeline.sources.poses import as_poses
 from urmpipe_pipeline.sources.tables.numbers import Numbers
 from urmpipe_pipeline.sources.tables.padding import without_padding
 from urmpipe_pipeline.sources.tables.row_reader import first_left_out, lines_of_rows
-from urmpipe_pipeline.text import counted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +100,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     if numbers.left_out and layout.form is not None:
         line, text = first_left_out(layout)
         verb = "is" if numbers.left_out == 1 else "are"
-        said = f"{counted(numbers.left_out, 'line')} without the labels of the rows {verb} left out"
+        said = f"{format_count(numbers.left_out, 'line')} without the labels of the rows {verb} left out"
         warnings.append(LogWarning("other-lines", f"{said}, first line {line}: {text}"))
     if skip_bad and may_skip(numbers):
         numbers, skipped = without_unread(numbers)

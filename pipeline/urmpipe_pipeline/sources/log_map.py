@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, OptionError, escape_line, format_value
 from urmpipe_models.math3d import FORMS
 from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
@@ -20,7 +21,6 @@ from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
 from urmpipe_pipeline.sources.options import GivenInterval, ReadOptions, is_interval
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
-from urmpipe_pipeline.text import counted
 
 T = TypeVar("T")
 
@@ -202,10 +202,8 @@ def _frame(table: CheckedTable, key: str) -> tuple[float, ...]:
         return ()
     values = table.numbers(key, None, si=("m", "m", "m", "rad", "rad", "rad"))
     if len(values) not in (3, 6):
-        table.add_error(
-            key,
-            f"found {counted(len(values), 'number')}, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
-        )
+        count = format_count(len(values), "number")
+        table.add_error(key, f"found {count}, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad")
     return values
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, map_collecting_errors
 from urmpipe_pipeline.joint_log import LogWarning
@@ -20,7 +21,6 @@ from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import open_tables
 from urmpipe_pipeline.sources.tables.reachable import unchanged
 from urmpipe_pipeline.sources.vocabulary import Unit
-from urmpipe_pipeline.text import counted
 
 SI = {"angle": "rad", "length": "m", "time": "s"}
 """What the quantities are in that urmpipe knows."""
@@ -91,7 +91,7 @@ def _refuse_missing(file: Path, columns: Sequence[Column], values: FloatArray) -
     for place, column in enumerate(columns):
         missing = np.flatnonzero(~np.isfinite(values[:, place]))
         if len(missing):
-            said = f"found {counted(len(missing), 'row')} without a number, allowed: one in every row"
+            said = f"found {format_count(len(missing), 'row')} without a number, allowed: one in every row"
             findings.append(Finding(said, str(file), row=int(missing[0]) + 1, column=column.header))
     if findings:
         raise LogError(*findings)

@@ -25,7 +25,7 @@ from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, Export
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Table, Value
 from urmpipe_pipeline.sources.cells.cell import printable
 from urmpipe_pipeline.sources.vocabulary import key
-from urmpipe_pipeline.text import csv_text, exact
+from urmpipe_pipeline.text import format_exact, to_csv_text
 
 SLICE = 65_536  # rows written at a time: memory stays low
 MAX_LAST_LINE = 1 << 16  # bytes of the last line
@@ -128,7 +128,7 @@ def write_table(table: Table, part: Path, path: Path) -> None:
         OutputError: If it did not read back as it was written.
     """
     cells = zip(*(map(_format_cell, column.cells) for column in table.columns), strict=True)
-    rows = [[csv_text(column.key) for column in table.columns], *map(list, cells)]
+    rows = [[to_csv_text(column.key) for column in table.columns], *map(list, cells)]
     with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
     with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
@@ -139,17 +139,17 @@ def write_table(table: Table, part: Path, path: Path) -> None:
 def _format_cell(cell: Cell) -> str:
     match cell:
         case Value():
-            return exact(cell.number)
+            return format_exact(cell.number)
         case Judged():
             return cell.verdict or ""
         case Ref():
-            return csv_text(cell.title)
+            return to_csv_text(cell.title)
         case Place():
-            return " ".join(map(exact, cell.position))
+            return " ".join(map(format_exact, cell.position))
         case Advice():
-            return csv_text(cell.words)
+            return to_csv_text(cell.words)
         case _:
-            return csv_text(cell or "")
+            return to_csv_text(cell or "")
 
 
 # Lines
@@ -204,9 +204,9 @@ def find_line_differences(path: Path, head: str, columns: Sequence[Any], delimit
 
 
 def _quote(cell: str) -> str:
-    """Return a text as a cell of CSV, see `csv_text`, in quotes if it needs them."""
+    """Return a text as a cell of CSV, see `to_csv_text`, in quotes if it needs them."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="").writerow([csv_text(cell)])
+    csv.writer(text, lineterminator="").writerow([to_csv_text(cell)])
     return text.getvalue()
 
 
@@ -241,7 +241,7 @@ def _has_values(line: str, columns: Sequence[Any], row: int, delimiter: str) -> 
 
 def _is_same(cell: str, value: Any) -> bool:
     if isinstance(value, np.str_):
-        return cell == csv_text(value)
+        return cell == to_csv_text(value)
     if isinstance(value, str):  # a time, as it was written
         return cell == value
     try:

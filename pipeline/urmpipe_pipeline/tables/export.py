@@ -37,7 +37,7 @@ from urmpipe_pipeline.outputs import (
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.csv_files import write_csv, write_tum
 from urmpipe_pipeline.tables.typed_files import is_our_parquet, write_mat, write_parquet
-from urmpipe_pipeline.text import to_json_value, unique
+from urmpipe_pipeline.text import make_unique, to_json_value
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -258,7 +258,7 @@ def _export_poses(
     stems = [
         f"{target.stem}-{_file_name(poses.name)}" if poses.name else target.stem for poses in trajectories
     ]
-    targets = [target.with_name(name + target.suffix) for name in unique(stems)]
+    targets = [target.with_name(name + target.suffix) for name in make_unique(stems)]
     write_all(targets, [partial(write_tum, poses) for poses in trajectories], "tum", inputs)
     files = tuple(
         ExportedFile(path, len(poses.clock_ns)) for path, poses in zip(targets, trajectories, strict=True)

@@ -97,7 +97,7 @@ def _build_suite(section: Section, timestamp: str, warnings: Sequence[LogWarning
     if section.properties:
         properties = ET.SubElement(suite, "properties")
         for name, value in section.properties.items():
-            ET.SubElement(properties, "property", name=_escape(name), value=_escape(text.exact(value)))
+            ET.SubElement(properties, "property", name=_escape(name), value=_escape(text.format_exact(value)))
     for check in section.checks:
         case = _add_case(suite, check.about or section.title, check.name)
         if check.verdict == "fail":

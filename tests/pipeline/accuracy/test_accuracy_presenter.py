@@ -27,7 +27,7 @@ Make = Callable[..., AccuracyResult]
 
 
 def mm(value: float | None) -> str:
-    return text.number(value, "m")
+    return text.format_number(value, "m")
 
 
 def panels(figure: Figure) -> list[Panel]:

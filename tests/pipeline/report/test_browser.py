@@ -300,7 +300,9 @@ def test_the_pointer_tells_the_number_that_the_table_has(desk: Page, comparison:
     said = plot.locator(".hoverlayer").text_content() or ""
     assert "t = " in said
     (row,) = desk.locator(".summary tr", has=desk.locator("th a", has_text=best.name)).all()
-    assert text.number(one.max, "m") in row.locator("td").all_inner_texts()  # the pointer has more digits
+    assert (
+        text.format_number(one.max, "m") in row.locator("td").all_inner_texts()
+    )  # the pointer has more digits
     assert f"‖Δ‖ : {one.max * 1e3:.4f} mm" in said
 
 

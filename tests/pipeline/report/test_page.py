@@ -130,9 +130,9 @@ def test_numbers_are_those_of_the_json_and_the_recording(everything: Comparison,
                 for key in (*(("max",) if unit == "deg" else ()), "rms", "p95", "mean", "std"):
                     cell = row[f"{key} [{unit}]"]
                     assert cell == printed_again(cell, one[key], factor)
-                assert row["at t [s]"] == text.seconds(one["t_max"])
+                assert row["at t [s]"] == text.format_seconds(one["t_max"])
                 assert row["samples out"] == str(one["out_of_tolerance"])
-                assert row["out"] == text.percent(one["out_fraction"])
+                assert row["out"] == text.format_percent(one["out_fraction"])
                 assert row["Verdict"] == one["verdict"].upper()
 
 
@@ -141,7 +141,7 @@ def test_the_audit_is_told(page: Page, comparison: Comparison, bare_run: Run) ->
     for rows, run in zip(page.tables("Audit"), runs, strict=True):
         for row, item in zip(rows, run.audit, strict=True):
             assert row["Step [deg]"] == f"{np.degrees(item.step):+.1f}"  # four digits of some 350
-            assert row["Instant t_r [s]"] == text.seconds(item.t)
+            assert row["Instant t_r [s]"] == text.format_seconds(item.t)
             assert row["Row"] == str(item.row)
 
 
@@ -164,7 +164,7 @@ def test_no_number_of_the_results_stands_twice_on_a_page(comparison: Comparison)
     page = Page(render_report([present(comparison)]))
     words = [said for _, said in page.all("td", "dd")]
     largest = {
-        text.number(held.max, held.unit)
+        text.format_number(held.max, held.unit)
         for held in comparison.worst.statistics.values()
         if held.kind != "angle"
     }

@@ -11,7 +11,7 @@ import pytest
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS
 from urmpipe_pipeline.simulations.signal_groups import groups_of
 from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simulation
-from urmpipe_pipeline.text import display_unit
+from urmpipe_pipeline.text import choose_unit
 
 MakeSimulation = Callable[..., Simulation]
 
@@ -107,7 +107,7 @@ def test_blocks_that_differ_or_are_judged_are_plotted_by_themselves(
     ],
 )  # fmt: skip
 def test_a_display_unit_that_is_known_is_shown(unit: str, wanted: str, shown: str, of_one: float) -> None:
-    assert display_unit(unit, wanted) == (shown, of_one)
+    assert choose_unit(unit, wanted) == (shown, of_one)
 
 
 def test_signals_with_two_display_units_are_shown_in_their_own(make_simulation: MakeSimulation) -> None:

@@ -23,7 +23,7 @@ from urmpipe_pipeline.solved_targets.solution_warnings import (
     start_warnings,
     within_pi_warnings,
 )
-from urmpipe_pipeline.text import NAMED, rows_text
+from urmpipe_pipeline.text import MAX_NAMED_ROWS, format_rows
 
 
 @pytest.mark.parametrize(
@@ -38,18 +38,18 @@ from urmpipe_pipeline.text import NAMED, rows_text
     ],
 )
 def test_rows_are_named_by_stretches_and_the_rest_is_counted(rows: list[int], said: str) -> None:
-    assert rows_text(rows) == said
+    assert format_rows(rows) == said
 
 
 @given(st.sets(st.integers(1, 60), min_size=1))
 def test_every_row_is_named_or_counted(rows: set[int]) -> None:
-    said = rows_text(sorted(rows)).removeprefix("rows ").removeprefix("row ")
+    said = format_rows(sorted(rows)).removeprefix("rows ").removeprefix("row ")
     named, _, more = said.partition(" and ")
     found: set[int] = set()
     for part in named.split(", "):
         low, _, high = part.partition("-")
         found |= set(range(int(low), int(high or low) + 1))
-    assert len(named.split(", ")) <= NAMED
+    assert len(named.split(", ")) <= MAX_NAMED_ROWS
     assert found <= rows
     assert len(rows) - len(found) == int(more.removesuffix(" more") or 0)
 

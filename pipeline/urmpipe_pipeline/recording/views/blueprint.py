@@ -20,7 +20,7 @@ from urmpipe_pipeline.recording.views.events import events_view
 from urmpipe_pipeline.recording.views.plots import EntityOf, Plots
 from urmpipe_pipeline.recording.views.scene_drawing import scene_view
 from urmpipe_pipeline.recording.views.summary import summary
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -133,8 +133,8 @@ def _words(plots: Plots, parts: Sequence[_Part]) -> View | Container:
     texts = [text for part in parts for text in part.texts]
     for key, text in zip(keys([one.title for one in texts]), texts, strict=True):
         entity = shown_path("text", key)
-        plots.stream.log(entity, rr.TextDocument(encodable(text.text)), static=True)
-        views.append(rrb.TextDocumentView(origin=entity, name=encodable(text.title)))
+        plots.stream.log(entity, rr.TextDocument(drop_surrogates(text.text)), static=True)
+        views.append(rrb.TextDocumentView(origin=entity, name=drop_surrogates(text.title)))
     views += [_events(plots, part) for part in parts if part.events and not part.figures]
     return _tabs(views)
 
@@ -234,7 +234,7 @@ def _stacked(rows: Sequence[Row], name: str | None = None) -> Container:
     """Return views one below the other."""
     import rerun.blueprint as rrb
 
-    name = None if name is None else encodable(name)
+    name = None if name is None else drop_surrogates(name)
     return rrb.Vertical(*(view for view, _ in rows), row_shares=[share for _, share in rows], name=name)
 
 

@@ -47,4 +47,4 @@ def events_view(
 
 def _words(one: Event) -> str:
     said = one.words if isinstance(one.words, str) else f"{one.words.kind}: {one.words}"
-    return text.encodable(said)
+    return text.drop_surrogates(said)

@@ -16,7 +16,7 @@ from urmpipe_pipeline.presentation.figure import Computed, Line, Mark, Panel, Sh
 from urmpipe_pipeline.presentation.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.layout import scalar_column, times_at
 from urmpipe_pipeline.recording.views.axes import TALL, UNITLESS, factor_of, shown_unit, span_with_numbers
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 if TYPE_CHECKING:
     from rerun import RecordingStream, SeriesLines, SeriesPoints
@@ -107,7 +107,7 @@ class Plots:
         )
         legend = len(drawn.names) > 1
         self._instants(drawn, instants, f"{root}/instants")
-        said = encodable((f"{about}: {view.name}" if about else view.name) + f" [{shown_unit(panels)}]")
+        said = drop_surrogates((f"{about}: {view.name}" if about else view.name) + f" [{shown_unit(panels)}]")
         if not drawn.whole:
             return [self._view(said, drawn.entities, drawn.overrides, span, legend=legend)]
         peaks = f"{said}, every peak of {drawn.rows:,} rows"
@@ -214,7 +214,7 @@ class Plots:
             colours = {mark.name: rgb(mark.colour) for mark in panel.marks}
             style = rr.SeriesPoints(
                 colors=[colours[name] for name in names],
-                names=list(map(encodable, names)),
+                names=list(map(drop_surrogates, names)),
                 markers=[shape] * len(names),
                 marker_sizes=[MARK_SIZE] * len(names),
             )
@@ -287,7 +287,7 @@ class _Look:
         """Return it as Rerun has it."""
         import rerun as rr
 
-        colours, names = [rgb(colour) for colour in self.colours], list(map(encodable, self.names))
+        colours, names = [rgb(colour) for colour in self.colours], list(map(drop_surrogates, self.names))
         if self.points:
             return rr.SeriesPoints(colors=colours, names=names, marker_sizes=[MARK_SIZE] * len(names))
         return rr.SeriesLines(

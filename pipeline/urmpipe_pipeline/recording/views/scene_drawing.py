@@ -40,7 +40,7 @@ from urmpipe_pipeline.recording.views.geometry import (
 )
 from urmpipe_pipeline.recording.views.shapes import carrier_path, draw_body, hide_body
 from urmpipe_pipeline.recording.views.solids import draw_solids
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 if TYPE_CHECKING:
     from rerun import ComponentColumnList, LineStrips3D, Points3D, RecordingStream
@@ -146,7 +146,7 @@ def _view(scene: Scene, points: FloatArray, hidden: Sequence[str]) -> Spatial3DV
     return rrb.Spatial3DView(
         origin=VIEW_ROOT,
         contents=shown_path("scene") + "/**",
-        name=encodable(scene.title),
+        name=drop_surrogates(scene.title),
         eye_controls=eye,
         overrides={entity: [rrb.EntityBehavior(visible=False)] for entity in hidden},
     )
@@ -201,7 +201,9 @@ def _draw_masses(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
     import rerun as rr
 
     entity, moving = shown_path("scene", "robot", "masses"), arm.moving
-    labels = [encodable(f"{one.mass:.4g} kg at {one.joint or 'the base'}") for one in arm.chain.inertials]
+    labels = [
+        drop_surrogates(f"{one.mass:.4g} kg at {one.joint or 'the base'}") for one in arm.chain.inertials
+    ]
     radii = (MASS * size * ball_sizes([one.mass for one in arm.chain.inertials])).tolist()
     style = rr.Points3D.from_fields(colors=[rgb(MASS_COLOUR)], radii=radii, labels=labels, show_labels=False)
     stream.log(entity, style, static=True)
@@ -301,7 +303,7 @@ def _label(words: str, colour: str = LABEL_COLOUR) -> Points3D:
     """Return the label of a point that stands elsewhere: in the point's colour it could hardly be read."""
     import rerun as rr
 
-    labels = [encodable(words)] if words else None
+    labels = [drop_surrogates(words)] if words else None
     return rr.Points3D.from_fields(colors=[rgb(colour)], radii=[0.0], labels=labels, show_labels=True)
 
 
@@ -310,7 +312,7 @@ def _draw_label(stream: RecordingStream, label: DrawnLabel, entity: str) -> None
     import rerun as rr
 
     stream.log(entity, _label("", label.colour or LABEL_COLOUR), static=True)
-    texts = list(map(encodable, label.texts))
+    texts = list(map(drop_surrogates, label.texts))
     columns = rr.Points3D.columns(positions=label.position.astype(np.float32), labels=texts)
     _send(stream, entity, label.moving, columns, 1)
     _send_gone(stream, entity, label.moving, rr.Points3D.columns(positions=[], labels=[]))
@@ -375,7 +377,7 @@ def _missed(targets: DrawnTargets, size: float) -> Points3D:
     import rerun as rr
 
     few = len(targets.missed) <= LABELLED
-    labels = list(map(encodable, targets.reasons))
+    labels = list(map(drop_surrogates, targets.reasons))
     radii, colours = [(MISSED if few else TARGET) * size], [rgb(DEVIATION_COLOUR)]
     return rr.Points3D(targets.missed, colors=colours, radii=radii, labels=labels, show_labels=few)
 

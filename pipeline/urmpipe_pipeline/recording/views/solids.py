@@ -18,7 +18,7 @@ from urmpipe_pipeline.presentation.scene import Motion, MovingLines, PlaneView, 
 from urmpipe_pipeline.recording.layout import keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import eye_axes
 from urmpipe_pipeline.recording.views.tracks import drawn_rows, whole_rows
-from urmpipe_pipeline.text import encodable
+from urmpipe_pipeline.text import drop_surrogates
 
 if TYPE_CHECKING:
     from rerun import Points3D, RecordingStream
@@ -155,7 +155,11 @@ def _label(words: str, places: Sequence[FloatArray] | None = None) -> Points3D:
     import rerun as rr
 
     return rr.Points3D.from_fields(
-        positions=places, colors=[rgb(LABEL_COLOUR)], radii=[0.0], labels=[encodable(words)], show_labels=True
+        positions=places,
+        colors=[rgb(LABEL_COLOUR)],
+        radii=[0.0],
+        labels=[drop_surrogates(words)],
+        show_labels=True,
     )
 
 

@@ -43,7 +43,7 @@ def summary(shown: Presentation, scene: Scene | None = None) -> tuple[str, str]:
 
 
 def _where_to_go(shown: Presentation) -> str:
-    at = f"{text.seconds(shown.opens_at_ns / 1e9)} s" if shown.opens_at_ns else ""
+    at = f"{text.format_seconds(shown.opens_at_ns / 1e9)} s" if shown.opens_at_ns else ""
     at = f"row {shown.opens_at_row + 1}" if shown.opens_at_row else at
     opens = f"`urmpipe view` opens this at {at}, other programs at the beginning. " if at else ""
     return f"{opens}Everything else: `urmpipe report` with this file."
@@ -122,4 +122,4 @@ def _warnings(warnings: Sequence[LogWarning]) -> Iterator[str]:
 
 def plain(value: str) -> str:
     """Return a text so that Markdown shows it as it is."""
-    return re.sub(r"([\\`*_{}\[\]<>#|~!-])", r"\\\1", " ".join(text.encodable(value).split()))
+    return re.sub(r"([\\`*_{}\[\]<>#|~!-])", r"\\\1", " ".join(text.drop_surrogates(value).split()))

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError, format_value
 from urmpipe_models.math3d import column_count
 from urmpipe_pipeline.joint_log import LogWarning
@@ -37,7 +38,6 @@ from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import split_unit
-from urmpipe_pipeline.text import counted
 
 GIVEN = "given as an option"
 """The evidence for columns that the user named."""
@@ -105,7 +105,7 @@ def _path_by_place(
 ) -> Roles:
     """Return x, y, z and the orientation behind them: of the form told, or by what its numbers are."""
     if pose is None and len(columns) < 3:
-        raise LogError(Finding(f"found {counted(len(columns), 'column')}, allowed: x, y, z", file=file))
+        raise LogError(Finding(f"found {format_count(len(columns), 'column')}, allowed: x, y, z", file=file))
     form = options.rotation
     if pose is None and form is not None and len(columns) == 3 + column_count(form):
         pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), GIVEN)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.math3d import FORMS, RotationForm, column_count
@@ -18,7 +19,6 @@ from urmpipe_pipeline.sources.columns.families import Family, drop_unknown, find
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import FEW, Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
-from urmpipe_pipeline.text import counted
 
 ORTHOGONAL = 1e-2
 """Entries of R R^T may differ from those of I by this: matrices are printed with three digits or more."""
@@ -142,7 +142,7 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
     position = tuple(find_column(columns, text, about="position") for text in options.position)
     rotation = tuple(find_column(columns, text, about="orientation") for text in options.orientation)
     if len(position) != 3:
-        raise OptionError(f"position: found {counted(len(position), 'column')}, allowed: x, y, z")
+        raise OptionError(f"position: found {format_count(len(position), 'column')}, allowed: x, y, z")
     forms = _forms_of(rotation, options)
     if rotation and not forms:
         allowed = (
@@ -150,7 +150,7 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
             if options.rotation
             else "3, 4 or 9"
         )
-        raise OptionError(f"orientation: found {counted(len(rotation), 'column')}, allowed: {allowed}")
+        raise OptionError(f"orientation: found {format_count(len(rotation), 'column')}, allowed: {allowed}")
     return Pose(position, rotation, forms if rotation else (), "given as an option")
 
 
@@ -162,7 +162,9 @@ def _measured_pose(columns: Sequence[Column], options: ReadOptions) -> Pose:
     if len(position) != 3 or (rotation and not forms):
         widths = f"{column_count(options.rotation)}" if options.rotation else "3, 4 or 9"
         allowed = f"x, y, z, and {widths} of the orientation behind them, or none"
-        raise OptionError(Finding(parameter="measured", found=counted(len(named), "column"), allowed=allowed))
+        raise OptionError(
+            Finding(parameter="measured", found=format_count(len(named), "column"), allowed=allowed)
+        )
     return Pose(position, rotation, forms, "given as an option", measured=True)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
@@ -12,7 +13,6 @@ from urmpipe_pipeline.sources.columns.families import find_families, prefer_meas
 from urmpipe_pipeline.sources.columns.pose import odd_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
-from urmpipe_pipeline.text import counted
 
 TCP_NOT_READ = "tcp-not-read"
 
@@ -50,7 +50,9 @@ def about_odd_rows(rest: Sequence[Column], layouts: Sequence[Layout]) -> list[Lo
     for family in prefer_measured(find_families(rest, vocabulary().tcp_matrix, 0)):
         columns = family.ordered()
         if len(columns) in (9, 12, 16) and (rows := odd_rows(columns, layouts)):
-            found = f"{listed(columns, most=4)} hold no orientation in {counted(len(rows), 'row')}, first in"
+            found = (
+                f"{listed(columns, most=4)} hold no orientation in {format_count(len(rows), 'row')}, first in"
+            )
             hints = (Hint("", effect="correct the row, or leave these cells empty"),)
             return [LogWarning(TCP_NOT_READ, f"{found} this one: none is read", rows[0], hints=hints)]
     return []

@@ -10,6 +10,7 @@ from itertools import islice
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding
 from urmpipe_pipeline.sources.cells.cell import (
     is_missing,
@@ -32,7 +33,6 @@ from urmpipe_pipeline.sources.tables.numbers import (
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.text import COMMENTS, MOST_HEAD
 from urmpipe_pipeline.sources.vocabulary import split_unit
-from urmpipe_pipeline.text import counted
 
 _SHOWN_TEXT = 60
 _LAST_BYTES = 1 << 12
@@ -230,7 +230,7 @@ class RowReader:
         if len(values) != width and any([*values[width:], len(values) < width]):
             numbers = any(not isinstance(v, str) or is_number(v, self.layout.decimal) for v in values)
             shown = "" if numbers else f" ({_shown(text)})"
-            self._report(f"found {counted(len(values), 'cell')}{shown}, allowed: {width}")
+            self._report(f"found {format_count(len(values), 'cell')}{shown}, allowed: {width}")
             return False
         del values[width:]
         return True

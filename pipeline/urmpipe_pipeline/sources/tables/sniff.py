@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import (
@@ -30,7 +31,7 @@ from urmpipe_pipeline.sources.tables.form import Form
 from urmpipe_pipeline.sources.tables.header_lines import header_of, numbered, only_count
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.text import FEWEST_LINES, HeadLine, Segment, head_lines
-from urmpipe_pipeline.text import counted, without_apostrophe
+from urmpipe_pipeline.text import strip_apostrophe
 
 LEAST_FIT = 0.2
 """A delimiter that fits less than this is not believed because it makes several columns."""
@@ -331,7 +332,7 @@ def _names(
         names = tuple(str(k + 1) for k in range(width - trailing))
         said = Inference("header", "none", "the first line is numbers: columns by number")
         return names + ("",) * trailing, said
-    line, cells = header[0], [without_apostrophe(cell) for cell in header[1]]
+    line, cells = header[0], [strip_apostrophe(cell) for cell in header[1]]
     found = Inference("header", f"line {line}", "the last line of names before the numbers")
     if len(cells) == width:
         return tuple(cells), found
@@ -346,8 +347,10 @@ def _names(
         _refuse_few(segment, lines, rows, uncounted, 0, f"a count, as before what line {line} names")
         _refuse_few(segment, lines, rows, ends, -1, f"no cell behind what line {line} names")
     number = abs(len(cells) - width)
-    remedy = f"{'add' if len(cells) < width else 'remove'} {counted(number, 'name')}"
-    wrong = f"found {len(cells)} names over rows of {counted(width, 'cell')}, allowed: one name per column;"
+    remedy = f"{'add' if len(cells) < width else 'remove'} {format_count(number, 'name')}"
+    wrong = (
+        f"found {len(cells)} names over rows of {format_count(width, 'cell')}, allowed: one name per column;"
+    )
     wrong += f" {remedy}, or delete line {line}: without names the columns are taken as joints in order"
     raise LogError(Finding(wrong, file=str(segment.path), line=line))
 

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import (
@@ -30,7 +31,6 @@ from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.units.evidence import mean_turn, spread
 from urmpipe_pipeline.sources.units.unit_evidence import ONE_TURN, peak
-from urmpipe_pipeline.text import counted
 
 MOST_BETWEEN = 8
 """Rows between two samples: a log of 125 Hz resampled to 1 kHz has 7 or 8."""
@@ -77,8 +77,9 @@ def without_interpolated(values: FloatArray, names: Sequence[str]) -> tuple[Floa
     kept, row = values.copy(), int(np.argmax(between)) + 1
     kept[between] = np.nan
     what = {3: "+180 and -180 deg", 4: "q and -q"}[values.shape[1]]
-    said = f"{', '.join(names)} were interpolated between {what} in {counted(count, 'row')} of {len(values)}"
-    said = f"{said}, first in this one: no orientation of the motion; it is not used there"
+    rows = f"{format_count(count, 'row')} of {len(values)}"
+    said = f"{', '.join(names)} were interpolated between {what} in {rows}, first in this one"
+    said = f"{said}: no orientation of the motion; it is not used there"
     return kept, [LogWarning(KIND, said, row)]
 
 
@@ -146,7 +147,9 @@ def without_contradicted(
     kept, rows = rotation.copy(), doubtful[off]
     kept[rows] = np.nan
     said = f"{', '.join(names)} contradict the kinematics by up to {np.degrees(miss.max()):.0f} deg"
-    said = f"{said} in {counted(count, 'row')} of {len(rotation)}, first in this one, and agree elsewhere"
+    said = (
+        f"{said} in {format_count(count, 'row')} of {len(rotation)}, first in this one, and agree elsewhere"
+    )
     said = f"{said}, as where an orientation is interpolated across a jump: it is not used there"
     return kept, [LogWarning(KIND, said, int(rows[0]) + 1)]
 

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Hint
 from urmpipe_models.hand_eye import rotation_residual, solve_hand_eye
@@ -21,7 +22,6 @@ from urmpipe_pipeline.sources.units.told import Told
 from urmpipe_pipeline.sources.units.unit_evidence import ONE_TURN, TWO_TURNS, peak, usual_peak, wraps
 from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints, which_unit
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
-from urmpipe_pipeline.text import counted
 
 PURE = Unit("1", "ratio", 1.0)
 """The unit of quaternions and of matrices."""
@@ -162,7 +162,7 @@ def _about_lengths(names: str, length: FloatArray) -> LogWarning:
     count, row = int(np.count_nonzero(off)), int(np.argmax(off))
     few = 2 * count < len(off)
     typical = length[row] if few else np.nanmedian(length)
-    where = f" in {counted(count, 'row')} of {len(off)}, first in this one" if few else ""
+    where = f" in {format_count(count, 'row')} of {len(off)}, first in this one" if few else ""
     said = f"{names} hold quaternions of length {typical:.4g}{where}, allowed: 1; they are not used"
     return LogWarning("orientation", said, row + 1 if few else None)
 
@@ -331,4 +331,6 @@ def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | 
         known = np.concatenate(([0.0], np.cumsum(lengths)))[:, np.newaxis]
     likely, turn = ("deg", "360") if peak(values) > ONE_TURN else ("rad", "6.28")
     count = int(wraps(known, likely).sum())
-    return (likely, f"{counted(count, 'step')} of about {turn} from one row to the next") if count else None
+    return (
+        (likely, f"{format_count(count, 'step')} of about {turn} from one row to the next") if count else None
+    )

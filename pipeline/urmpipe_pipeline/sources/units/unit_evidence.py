@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_pipeline.text import counted
 
 TURN = {"rad": math.tau, "deg": 360.0}
 """A turn in each unit."""
@@ -86,7 +86,7 @@ def degrees_proof(values: FloatArray, bounds: Bounds | None = None) -> str | Non
     if peak(values) <= math.tau:
         return None
     if count := int(wraps(values, "deg").sum()):
-        return f"{counted(count, 'step')} of about 360 from one row to the next"
+        return f"{format_count(count, 'step')} of about 360 from one row to the next"
     reach = np.asarray((bounds or Bounds()).reach)
     beyond = _usual_size(values) > np.maximum(BEYOND * reach, TWO_TURNS)
     if beyond.any() and (np.radians(_largest(values)) <= reach).all():
@@ -118,7 +118,7 @@ def radians_proof(values: FloatArray) -> str | None:
     if peak(values) > ONE_TURN:
         values = values[:, [j for j, one in enumerate(values.T) if peak(one) <= ONE_TURN]]
     count = int(wraps(values, "rad").sum())
-    return f"{counted(count, 'step')} of about 6.28 from one row to the next" if count else None
+    return f"{format_count(count, 'step')} of about 6.28 from one row to the next" if count else None
 
 
 @np.errstate(over="ignore", invalid="ignore")

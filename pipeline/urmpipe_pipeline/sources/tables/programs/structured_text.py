@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import Inference
@@ -24,7 +25,6 @@ from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 from urmpipe_pipeline.sources.tables.programs.program import Program, shortened
 from urmpipe_pipeline.sources.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
-from urmpipe_pipeline.text import counted
 
 _DECLARED = re.compile(
     r"(?<!\w)(?P<name>\w+)\s*(?:AT\s*%[\w.*]+\s*)?:\s*"
@@ -83,7 +83,7 @@ def read(program: Program) -> Held:
         )
     columns = _columns(program, arrays)
     rows = len(next(iter(columns.values())))
-    found = Inference("program", "structured text", f"{counted(len(arrays), 'array')} of {rows} values")
+    found = Inference("program", "structured text", f"{format_count(len(arrays), 'array')} of {rows} values")
     clock, said = _clock(program, columns, list(scalars.values()), rows)
     table = pa.table({name: column(values) for name, values in (*clock.items(), *columns.items())})
     return Held(program.path.stem, table, path=program.path, inferences=(found, *said))

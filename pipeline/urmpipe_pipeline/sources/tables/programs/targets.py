@@ -16,12 +16,12 @@ from itertools import groupby
 import numpy as np
 import pyarrow as pa
 
+from urmpipe_models.display import format_count
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 from urmpipe_pipeline.sources.tables.programs.program import Program, shortened
-from urmpipe_pipeline.text import counted
 
 PATH, TABLE = "path", "table"
 """The sources that take the positions of the tool, and of the joints."""
@@ -123,7 +123,9 @@ def _rows(
     if arrays:
         lengths = {name: len(array) for name, array in arrays.items()}
         if len(set(lengths.values())) > 1:
-            found = ", ".join(f"{name} of {counted(count, kind.name)}" for name, count in lengths.items())
+            found = ", ".join(
+                f"{name} of {format_count(count, kind.name)}" for name, count in lengths.items()
+            )
             delete = Hint("", effect="delete the others")
             raise program.error(shortened(found, 200), "one array, or several of one length", None, delete)
         return _Rows(kind, arrays, f"of {', '.join(arrays)}")
@@ -154,7 +156,7 @@ def _chosen(program: Program, found: Sequence[_Rows]) -> _Rows:
 
 
 def _words(rows: _Rows) -> str:
-    return counted(rows.count, rows.kind.name)
+    return format_count(rows.count, rows.kind.name)
 
 
 def _evidence(found: Sequence[_Rows], targets: Sequence[Target]) -> str:
