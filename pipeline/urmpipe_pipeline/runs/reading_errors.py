@@ -130,7 +130,7 @@ def swap_edits(joints: int) -> Iterator[Edits]:
 def joint_unit_edits(revolute: Sequence[bool]) -> Iterator[Edits]:
     """Yield revolute joints, one, all except one, or all, in deg that are read as rad, or the reverse."""
     joints = np.flatnonzero(revolute).tolist()
-    groups = [(j,) for j in joints]
+    groups: list[tuple[int, ...]] = [(j,) for j in joints]
     if len(joints) > 2:
         groups += [tuple(j for j in joints if j != excluded) for excluded in joints]
     if len(joints) > 1:
