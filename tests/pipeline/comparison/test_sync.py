@@ -25,9 +25,9 @@ from urmpipe_pipeline.comparison.sync import (
     sync_warnings,
     synchronise,
 )
-from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.operands import load_runs
-from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory
+from urmpipe_pipeline.trajectories import AlignMode, Trajectory
 
 Motion = Callable[[FloatArray], FloatArray]
 
@@ -234,14 +234,6 @@ def test_two_arms_that_follow_one_path_with_other_joints_are_matched_by_the_path
     assert synchronise(reference, log, "auto").offset == 2.0
 
 
-def test_joints_are_put_together_by_name() -> None:
-    t = times(0.0, 20.0, 0.005)
-    q = smooth(4, 6)(t)
-    log = joints(q[200:, ::-1], t[200:])
-    log = replace(log, joints=JOINTS[::-1])
-    assert synchronise(joints(q, t), log, "auto").offset == 1.0
-
-
 @pytest.mark.slow
 def test_more_samples_than_are_looked_at_tell_the_offset_as_well() -> None:
     t = times(0.0, 1500.0, 0.005)
@@ -259,70 +251,6 @@ def test_the_inputs_stay_as_they_are() -> None:
     np.testing.assert_array_equal(p, kept)
 
 
-def test_start_and_seconds_look_at_nothing() -> None:
-    nowhere = path(np.full((3, 3), np.nan), times(0.0, 0.015, 0.005))
-    assert synchronise(nowhere, nowhere, "start") == Sync()
-    assert synchronise(nowhere, nowhere, 0.25) == Sync("given", 0.25)
-
-
-def test_no_motion_tells_no_offset() -> None:
-    t = times(0.0, 20.0, 0.005)
-    still = np.ones((len(t), 6))
-    moving, resting = joints(smooth(7, 6)(t), t, "wanted"), joints(still, t)
-    assert refused(moving, resting) == (
-        f"log.csv: sync (--sync): auto: found no motion of the joints in this log, {ALLOWED}"
-    )
-    assert refused(resting, moving) == (
-        f"wanted.csv: sync (--sync): auto: found no motion of the joints in log, {ALLOWED}"
-    )
-    one, other = np.random.default_rng(1).normal(scale=1e-4, size=(2, len(t), 6))
-    assert "found low similarity of the joints to" in refused(joints(one, t), joints(other, t))
-
-
-def test_a_motion_that_repeats_itself_names_the_offsets() -> None:
-    t = times(0.0, 10.0, 0.005)
-    swing = np.column_stack([np.sin(np.pi * t), np.cos(np.pi * t)])  # every 2 s
-    assert refused(joints(swing, t, "wanted"), joints(swing[100:], t[100:])) == (
-        "log.csv: sync (--sync): auto: found a motion of the joints that several offsets to wanted explain"
-        " equally"
-        " well (similarity): 0.5 s (1.000), -1.5 s (1.000), 2.5 s (1.000), -3.5 s (1.000), 4.5 s (1.000),"
-        f" {ALLOWED}"
-    )
-
-
-def test_cycles_that_begin_and_end_at_rest_do_not_repeat_themselves() -> None:
-    t = times(0.0, 20.0, 0.005)
-    swing = np.sin(np.pi * np.clip(t - 1.0, 0.0, 16.0))[:, np.newaxis] ** 2
-    log = joints(swing[100:], t[100:])
-    assert synchronise(joints(swing, t), log, "auto").offset == 0.5
-
-
-def test_a_steady_motion_tells_no_offset_but_its_ramps_do() -> None:
-    t = times(0.0, 10.0, 0.005)
-    steady = joints(np.outer(t, [1.0, -0.5]), t, "wanted")
-    said = refused(steady, joints(np.outer(t, [1.0, -0.5]), t))
-    assert said.startswith(
-        "log.csv: sync (--sync): auto: found no clear best offset to wanted by the joints: about "
-    )
-    assert said.endswith(f" s with a similarity of 1.000, {ALLOWED}")
-    ramp = np.outer(np.clip(t - 2.0, 0.0, 6.0), [1.0, -0.5])
-    assert synchronise(joints(ramp, t), joints(ramp[50:], t[50:]), "auto").offset == 0.25
-
-
-def test_a_turn_on_a_circle_tells_an_offset_only_where_the_frames_are_known() -> None:
-    t = times(0.0, 5.0, 0.005)
-    circle = np.column_stack([np.cos(t), np.sin(t), 0.0 * t])
-    assert synchronise(path(circle, t), path(circle[100:], t[100:]), "auto").offset == 0.5
-    assert "no clear best offset" in refused(path(circle, t), path(circle[100:], t[100:]), "rigid")
-
-
-def test_two_motions_without_likeness_are_told() -> None:
-    t = times(0.0, 20.0, 0.005)
-    said = refused(joints(smooth(8, 6)(t), t, "wanted"), joints(smooth(9, 6)(t), t))
-    assert said.startswith("log.csv: sync (--sync): auto: found low similarity of the joints to wanted: ")
-    assert said.endswith(f" at best, 0.8 is needed, {ALLOWED}")
-
-
 LOW = "log.csv: sync (--sync): auto: found low similarity of the "
 
 
@@ -334,47 +262,6 @@ def test_random_motions_are_not_taken_for_each_other() -> None:
         for side, channels in ((joints, 6), (path, 3)):
             one, other = (side(make(1000 + 2 * seed + k, channels)(t), t) for k in (0, 1))
             assert refused(one, other).startswith(("log.csv: sync (--sync): auto: found no ", LOW))
-
-
-def test_logs_without_samples_to_speak_of_are_refused() -> None:
-    t = times(0.0, 20.0, 0.005)
-    q = smooth(10, 2)(t)
-    whole = joints(q, t, "wanted")
-    for log in (joints(q[:1], t[:1]), joints(np.full_like(q, np.nan), t)):
-        assert "found no motion of the joints in this log" in refused(whole, log)
-    for rows in (2, 3, 5):
-        assert refused(whole, joints(q[:rows], t[:rows])).startswith("log.csv: sync (--sync): auto: found ")
-
-
-def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
-    t = times(0.0, 20.0, 0.005)
-    q = smooth(11, 2)(t)
-    holes, crossed = q.copy(), q.copy()
-    holes[::2] = np.nan
-    crossed[::2, 0] = crossed[1::4, 1] = np.nan  # each joint has rates, but never both
-    for log in (holes, crossed):
-        assert refused(joints(q, t, "wanted"), joints(log, t)) == (
-            f"log.csv: sync (--sync): auto: found no offset at which the joints move as in wanted, {ALLOWED}"
-        )
-
-
-def test_what_is_not_known_well_is_told() -> None:
-    assert sync_warnings("log", Sync("auto", 0.25, "joints", 0.0005, 0.9), 0.005) == []
-    assert sync_warnings("log", Sync("given", 0.25), 0.005) == []
-    assert sync_warnings("log", Sync("auto", 0.25, "joints", 0.00084, 0.85), 0.005) == [
-        LogWarning(
-            "sync-uncertain",
-            "the offset of 0.25 s, estimated by the joints, is known to +-0.84 ms (standard error);"
-            " the period is 5 ms",
-            about="log",
-        ),
-        LogWarning(
-            "sync-unlike",
-            "the offset of 0.25 s, estimated by the joints, gives a similarity of 0.85 only,"
-            " of 1: do both logs show the same motion?",
-            about="log",
-        ),
-    ]
 
 
 def test_similarity_is_that_of_the_best_turn_where_frames_may_be_turned() -> None:
