@@ -59,9 +59,9 @@ class Call:
     def note(self, line: str) -> None:
         """Print a line that is not a warning on standard error."""
         if not self.quiet:
-            from urmpipe.printing.terminal import say
+            from urmpipe.printing.terminal import print_line
 
-            say(f"note: {line}", err=True)
+            print_line(f"note: {line}", err=True)
 
     def progress(
         self, title: str, *, shown: bool = True
@@ -73,9 +73,9 @@ class Call:
 
     def working(self, title: str) -> AbstractContextManager[None]:
         """Show the elapsed time of work of unknown length on standard error, on a terminal only."""
-        from urmpipe.printing.terminal import clock
+        from urmpipe.printing.terminal import elapsed_time
 
-        return clock(title, quiet=self.quiet)
+        return elapsed_time(title, quiet=self.quiet)
 
     def given(self, is_meant: Callable[[str], bool] = lambda name: True) -> list[str]:
         """Return the options on the command line, by their long names.
@@ -202,7 +202,7 @@ def _iter_warnings(answer: Answer) -> Iterator[tuple[str, Sequence[LogWarning]]]
 
 
 def _print_text(answer: Answer) -> None:
-    from urmpipe.printing.terminal import say
+    from urmpipe.printing.terminal import print_line
 
     if answer.print_text is not None:
         answer.print_text()
@@ -213,7 +213,7 @@ def _print_text(answer: Answer) -> None:
         if is_result(answer.result):
             print_presentation(present(answer.result), every=answer.all_columns)
     for line in answer.lines:
-        say(line)
+        print_line(line)
 
 
 def command(

@@ -49,11 +49,11 @@ class Defaults:
         """Print the defaults of each file and the warnings about files on standard error, unless quiet."""
         if quiet:
             return
-        from urmpipe.printing.terminal import print_warnings, say
+        from urmpipe.printing.terminal import print_line, print_warnings
 
         for path, values in self.by_file.items():
             settings = (f"{name}={_format_value(value)}" for name, value in values.items())
-            say(f"note: defaults of {path}: {', '.join(settings)}", err=True)
+            print_line(f"note: defaults of {path}: {', '.join(settings)}", err=True)
         print_warnings(self.warnings)
 
     def origins(self, options: Collection[str]) -> Iterator[str]:

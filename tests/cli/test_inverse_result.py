@@ -135,7 +135,7 @@ def test_progress_is_told_and_changes_nothing(robot: str, every: bool) -> None:
 def test_a_notebook_shows_the_table() -> None:
     found = urmpipe.ik(TARGETS, "arm6")
     shown = found._repr_html_()
-    assert shown.startswith("<p><b>SolvedTargets</b> PASS targets: arm6 reaches 2 targets (")
+    assert shown.startswith("<p><b>IkResult</b> PASS targets: arm6 reaches 2 targets (")
     assert "theta1" in shown
     assert all(branch in shown for branch in found.branch)
 

@@ -64,7 +64,7 @@ def demo(call: Call, output: Path) -> Answer:
 def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     """Print the verdicts, and how to go on from there."""
     from urmpipe.printing.results import print_presentation
-    from urmpipe.printing.terminal import recording_line, say
+    from urmpipe.printing.terminal import print_line, recording_line
     from urmpipe_datasets import LOGS
     from urmpipe_pipeline.results import present
 
@@ -73,7 +73,7 @@ def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     click.echo(EXPECTED_LINE if as_expected else f"These verdicts differ from the expected ones: {EXPECTED}")
     for run in result.runs:
         if run.diagnosis is not None:
-            say(f"  {run.name}: {run.diagnosis.summary}")
-    say(f"Logs:      {LOGS}  (try the commands with them)")
-    say(f"Report:    {report.path}  (open it in any browser)")
-    say(recording_line(result.recording))
+            print_line(f"  {run.name}: {run.diagnosis.summary}")
+    print_line(f"Logs:      {LOGS}  (try the commands with them)")
+    print_line(f"Report:    {report.path}  (open it in any browser)")
+    print_line(recording_line(result.recording))

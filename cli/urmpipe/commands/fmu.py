@@ -67,7 +67,7 @@ def build(
       urmpipe fmu build my_unit.py
     """
     from urmpipe.arm_placing import place_robot
-    from urmpipe.printing.terminal import prints_apart
+    from urmpipe.printing.terminal import redirect_prints
     from urmpipe.printing.units import print_built
     from urmpipe.systems.logs import read_mapped_table
     from urmpipe.systems.units import check_robot_and_log, parse_columns
@@ -81,7 +81,7 @@ def build(
     arm = place_robot(robot)
     columns = parse_columns(of_unit.pop("columns", None))
     table = log and read_mapped_table(log, columns, robot=arm, log_map=map)
-    with prints_apart(), call.working(f"Building {unit}"):
+    with redirect_prints(), call.working(f"Building {unit}"):
         built = urmpipe.build_fmu(
             unit, robot=robot, log=table, options=of_unit, on_message=call.note, **options
         )

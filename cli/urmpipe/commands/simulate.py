@@ -58,11 +58,11 @@ def simulate(
 
 def _run(call: Call, system: str, output: Path, options: Mapping[str, Any]) -> Answer:
     """Run a system."""
-    from urmpipe.printing.terminal import prints_apart
+    from urmpipe.printing.terminal import redirect_prints
     from urmpipe.systems.blocks import ON_PYTHON
 
     is_replaced = output.exists()
-    with prints_apart(), call.progress(f"Simulating {system}") as progress:
+    with redirect_prints(), call.progress(f"Simulating {system}") as progress:
         result = urmpipe.simulate(system, output=output, on_message=call.note, progress=progress, **options)
     failure = f"{result.failed}; the samples until then are in {result.recording}"
     return Answer(

@@ -46,7 +46,7 @@ def echo_json(value: Any, indent: int | None = None) -> None:
     click.echo(text)
 
 
-def say(line: str, *, err: bool = False) -> None:
+def print_line(line: str, *, err: bool = False) -> None:
     """Print one line, on standard output or standard error, with unprintable characters as escapes."""
     click.echo(escape_line(line), err=err)
 
@@ -68,9 +68,9 @@ def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
     """Print warnings on standard error, one unwrapped line each, with the name of their log if given."""
     prefix = f"warning: {log}: " if log else "warning: "
     for warning in warnings[:LISTED]:
-        say(f"{prefix}{warning}", err=True)
+        print_line(f"{prefix}{warning}", err=True)
     if len(warnings) > LISTED:
-        say(f"{prefix}and {len(warnings) - LISTED} more", err=True)
+        print_line(f"{prefix}and {len(warnings) - LISTED} more", err=True)
 
 
 @contextmanager
@@ -88,7 +88,7 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
 
 
 @contextmanager
-def clock(title: str, *, quiet: bool = False) -> Iterator[None]:
+def elapsed_time(title: str, *, quiet: bool = False) -> Iterator[None]:
     """Show the elapsed time on standard error during work of unknown length, if it is a terminal."""
     if quiet or not sys.stderr.isatty():
         yield
@@ -109,7 +109,7 @@ def _new_progress(*columns: ProgressColumn) -> Progress:
 
 
 @contextmanager
-def prints_apart() -> Iterator[None]:
+def redirect_prints() -> Iterator[None]:
     """Redirect what a user's unit prints to standard error: standard output is for results, such as JSON."""
     with redirect_stdout(sys.stderr):
         yield

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from urmpipe.printing.terminal import LISTED, join_lines, new_console, new_table, say
+from urmpipe.printing.terminal import LISTED, join_lines, new_console, new_table, print_line
 from urmpipe.systems.units import FROM_LOG, example_of, example_subject
 from urmpipe_fmus.blocks import block_names, block_option_help, block_summary, normalise_block_name
 from urmpipe_fmus.build.description import TITLES as VARIABLE_HEADS
@@ -77,8 +77,8 @@ def print_units() -> None:
             table.add_row(*first, written, line)
             first = ("", "")
     new_console().print(table)
-    say("Its inputs, outputs and parameters: urmpipe fmu list UNIT")
-    say("Build one: urmpipe fmu build UNIT [--robot R] [--log LOG] [-s NAME=VALUE]")
+    print_line("Its inputs, outputs and parameters: urmpipe fmu list UNIT")
+    print_line("Build one: urmpipe fmu build UNIT [--robot R] [--log LOG] [-s NAME=VALUE]")
 
 
 def print_unit(name: str) -> None:
@@ -90,12 +90,14 @@ def print_unit(name: str) -> None:
         table.add_row(*row)
     new_console().print(table)
     for equation in unit.equations:
-        say(equation)
+        print_line(equation)
     subject, kind = example_subject(name)
     if subject:
         another = f"Those for another {kind}: build it, then urmpipe fmu check"
-        say(f"These are the variables for {subject}. {another}")
-    say("A parameter is set where the unit runs: in a system by start, in another tool as its start value")
+        print_line(f"These are the variables for {subject}. {another}")
+    print_line(
+        "A parameter is set where the unit runs: in a system by start, in another tool as its start value"
+    )
 
 
 def _causality_order(part: str) -> int:
@@ -110,18 +112,18 @@ def print_systems(systems: Sequence[System]) -> None:
         arguments = join_lines(f"{name}={value}" for name, value in system.arguments.items())
         table.add_row(system.name, system.description, arguments)
     new_console().print(table)
-    say("Run one: urmpipe simulate SYSTEM [--set NAME=VALUE]")
-    say("Change anything else: urmpipe simulate SYSTEM --write-system FILE.toml")
+    print_line("Run one: urmpipe simulate SYSTEM [--set NAME=VALUE]")
+    print_line("Change anything else: urmpipe simulate SYSTEM --write-system FILE.toml")
 
 
 def print_built(fmu: BuiltFmu) -> None:
     """Print the unit, path and content of a built FMU."""
-    say(f"Built {fmu.unit.name}: {fmu.unit.description}")
+    print_line(f"Built {fmu.unit.name}: {fmu.unit.description}")
     content = f"{fmu.backend}, {', '.join(fmu.platforms)}"
     size = f"{fmu.path.stat().st_size / 1e3:.0f} kB"
-    say(f"FMU: {fmu.path}  ({content}, {size}, guid {fmu.guid})")
+    print_line(f"FMU: {fmu.path}  ({content}, {size}, guid {fmu.guid})")
     if fmu.note:
-        say(f"note: {fmu.note}", err=True)
+        print_line(f"note: {fmu.note}", err=True)
 
 
 def checked_dict(report: CheckReport) -> dict[str, Any]:
@@ -135,13 +137,13 @@ def print_checked(report: CheckReport) -> None:
     console = new_console()
     run = f"{report.steps} steps of {1e3 * report.step:.6g} ms" if report.ran else "it did not run"
     platforms = ", ".join(report.platforms) or "no platform"
-    say(f"{report.path}: {report.name} of {report.generator or 'an unknown tool'}, {platforms}; {run}")
+    print_line(f"{report.path}: {report.name} of {report.generator or 'an unknown tool'}, {platforms}; {run}")
     for problem in report.problems:
-        say(f"problem: {problem}")
+        print_line(f"problem: {problem}")
     for warning in report.warnings:
-        say(f"warning: {warning}")
+        print_line(f"warning: {warning}")
     if not report.problems:
-        say("No problem found.")
+        print_line("No problem found.")
     heads = ("Variable", "Causality", "Type", "Unit", "Start", "Min", "Max", "Before", "After", "Description")
     if console.width < MIN_DESCRIPTION_WIDTH:
         heads = heads[:-1]
@@ -151,7 +153,7 @@ def print_checked(report: CheckReport) -> None:
         table.add_row(*_variable_cells(name, elements)[: len(heads)])
     console.print(table)
     if console.width < MIN_DESCRIPTION_WIDTH:
-        say(f"Descriptions: in a terminal of {MIN_DESCRIPTION_WIDTH} columns, or --json")
+        print_line(f"Descriptions: in a terminal of {MIN_DESCRIPTION_WIDTH} columns, or --json")
     if len(rows) > LISTED:
         console.print(f"... and {len(rows) - LISTED} more; --json has all")
 

@@ -102,9 +102,7 @@ def test_the_lines_say_what_each_holds(results: dict[str, Any]) -> None:
     assert repr(results["Run"]) == "<Run <b>&log: urm6, 100 rows in 0.495 s, grid of 100 samples>"
     line = "<Comparison <b>&log-against-path: pass, on 1 assumption: <b>&log pass (4.56e-05 m), 1 warning>"
     assert repr(results["Comparison"]) == line
-    assert repr(results["SolvedTargets"]) == (
-        "<SolvedTargets targets: pass, ur5e, 1 of 1 target reached, iterative>"
-    )
+    assert repr(results["IkResult"]) == ("<IkResult targets: pass, ur5e, 1 of 1 target reached, iterative>")
 
 
 @pytest.mark.slow
