@@ -63,9 +63,9 @@ _PLACEHOLDERS: Mapping[str, Any] = {  # of other parameters: the name in capital
 
 _NO_OPTION = {  # keywords that are positional arguments of commands, or of Python alone
     *("defaults", "drives", "font", "inputs", "lazy", "logs", "name", "name_or_path", "names", "network"),
-    *("offsets", "orientation", "path", "position", "progress", "q", "recorded_tcp", "recordings"),
-    *("reference", "result", "results", "run", "shared", "side", "signs", "starts", "system", "t", "targets"),
-    *("on_message", "title", "width"),
+    *("offsets", "on_message", "orientation", "path", "position", "progress", "q", "recorded_tcp"),
+    *("recordings", "reference", "result", "results", "run", "shared", "side", "signs", "starts", "system"),
+    *("t", "targets", "title", "width"),
 }
 
 _QUOTES = "'\u2018\u2019\u201a\u201b"  # single quotes of PowerShell

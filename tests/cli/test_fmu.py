@@ -228,7 +228,7 @@ def test_units_on_python_are_a_warning_of_the_simulation(monkeypatch: pytest.Mon
     )
     told: list[str] = []
     with pytest.warns(UserWarning, match="the units run on Python"):
-        result = urmpipe.simulate("one-drive", duration=0.002, told=told.append)
+        result = urmpipe.simulate("one-drive", duration=0.002, on_message=told.append)
     said = "the units run on Python, a hundred times slower than native ones: casadi is not installed"
     assert [(one.kind, one.message) for one in result.warnings] == [("on-python", said)]
     assert told[0] == said

@@ -420,9 +420,9 @@ def test_a_step_and_a_duration_are_positive(following: Path) -> None:
 def test_a_cold_build_is_told(following: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "cache"))
     lines: list[str] = []
-    simulate(following, told=lines.append, backend="python")
+    simulate(following, on_message=lines.append, backend="python")
     assert lines == ["building follower for block lag ..."]
-    simulate(following, told=lines.append, backend="python")
+    simulate(following, on_message=lines.append, backend="python")
     assert lines == ["building follower for block lag ..."]
 
 

@@ -63,7 +63,7 @@ def simulate(system: PathLike, **options: Unpack[Simulate]) -> Simulation:
         start_worker() as worker,
     ):  # it loads what it needs meanwhile
         blocks = Blocks(
-            loaded, bundled=bundled, backend=values["backend"], told=values["on_message"],
+            loaded, bundled=bundled, backend=values["backend"], on_message=values["on_message"],
             reading={name: values[name] for name in params_of(LogReading)},
         )  # fmt: skip
         plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period)

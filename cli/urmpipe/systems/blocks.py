@@ -46,7 +46,7 @@ class Blocks:
         bundled: Names of logs that were shipped with urmpipe; they precede files with these names.
         backend: The backend of the FMUs of units.
         reading: How to read a log where it does not show it: keywords that override its map.
-        told: Called with a line when an FMU is built, and if native FMUs cannot be built.
+        on_message: Called with a line when an FMU is built, and if native FMUs cannot be built.
 
     Attributes:
         units: The unit of each block that is one.
@@ -64,10 +64,10 @@ class Blocks:
         bundled: Collection[str] = (),
         backend: Backend | None = None,
         reading: Mapping[str, Any] | None = None,
-        told: Callable[[str], None] | None = None,
+        on_message: Callable[[str], None] | None = None,
     ) -> None:
         self._bundled, self._reading = bundled, reading or {}
-        self._on_message = told or (lambda line: None)
+        self._on_message = on_message or (lambda line: None)
         self._backend, reason = select_backend(backend)
         self.units: dict[str, BlockModel] = {}
         self.chains: dict[str, Chain] = {}
