@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import zipfile
 from collections.abc import Callable
@@ -17,6 +16,7 @@ import pytest
 import urmpipe
 from foreign_fmus import HANGS, Foreign, Scalar, fmu, trouble_in
 from urmpipe.api.build_fmu import build_fmu
+from urmpipe.systems.units import unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.check import check_fmu
@@ -181,17 +181,6 @@ def test_check_of_a_broken_fmu_is_1(urmpipe: RunCommand, meter: Path) -> None:
     assert any("furlong" in one for one in json.loads(ran.out)["problems"])
 
 
-@pytest.mark.parametrize("content", [b"", b"t,q1\n0,1\n", b"PK\x03\x04"])
-def test_check_of_what_is_no_fmu_is_2(urmpipe: RunCommand, tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "file.fmu").write_bytes(content)
-    ran = urmpipe("fmu", "check", "file.fmu")
-    assert (ran.code, ran.out) == (2, "")
-    damaged = {b"": "an empty file", b"PK": "a zip that is cut off or damaged"}
-    found = damaged.get(content[:2], "no zip, as an FMU is one")
-    allowed = "an FMU, such as urmpipe fmu build makes of a unit"
-    assert (ran.code, ran.err) == (2, f"error: file.fmu: found {found}, allowed: {allowed}\n")
-
-
 def test_check_of_a_missing_file_is_2(urmpipe: RunCommand) -> None:
     ran = urmpipe("fmu", "check", "missing.fmu", "--json")
     assert ran.code == 2
@@ -232,58 +221,6 @@ def test_units_on_python_are_a_warning_of_the_simulation(monkeypatch: pytest.Mon
     said = "the units run on Python, a hundred times slower than native ones: casadi is not installed"
     assert [(one.kind, one.message) for one in result.warnings] == [("on-python", said)]
     assert told[0] == said
-
-
-def test_the_variables_of_a_unit_are_listed(urmpipe: RunCommand) -> None:
-    listed = json.loads(urmpipe("fmu", "list", "dc_drive", "--json").out)
-    parts = {one["name"]: (one["part"], one["unit"], one["start"]) for one in listed["variables"]}
-    assert parts["u"] == ("input, continuous", "V", "0")
-    assert parts["Mk"] == ("output, continuous", "N.m", "computed")
-    assert parts["C"] == ("parameter, tunable", "N.m/A", "0.05")
-    ran = urmpipe("fmu", "list", "kinematic_chain")
-    assert (ran.code, ran.err) == (0, "")
-    assert "phi[1] .. [6]" in ran.out
-
-
-def test_start_values_have_six_digits_in_the_table_and_all_in_json(urmpipe: RunCommand) -> None:
-    printed = urmpipe("fmu", "list", "kinematic_chain").out
-    assert "3.14159 (180" in printed
-    assert "0.907571 (52" in printed
-    assert not re.search(r"\d\.\d{7}", printed)
-    variables = json.loads(urmpipe("fmu", "list", "kinematic_chain", "--json").out)["variables"]
-    (tilts,) = [one["start"] for one in variables if one["name"].startswith("tilts")]
-    assert tilts == "0.9075712110370514 (52 deg)"
-
-
-def test_words_of_a_unit_are_joined_by_either_sign(urmpipe: RunCommand, tmp_path: Path) -> None:
-    listed = urmpipe("fmu", "list", "dc_drive", "--json").out
-    assert urmpipe("fmu", "list", "dc-drive", "--json").out == listed
-    example = [urmpipe("fmu", "list", name).out for name in ("kinematic-chain", "kinematic_chain")]
-    assert example[0] == example[1]
-    assert (
-        "These are the variables for urm6. Those for another arm: build it, then urmpipe fmu check"
-        in example[0]
-    )
-    ran = urmpipe("fmu", "build", "delta-meter", "--backend", "python")
-    assert (ran.code, [one.name for one in tmp_path.glob("*.fmu")]) == (0, ["delta_meter.fmu"])
-
-
-def test_a_unit_that_is_none_is_told_with_those_that_are(urmpipe: RunCommand) -> None:
-    ran = urmpipe("fmu", "list", "dc-driv")
-    names = ", ".join(block_names())
-    said = (
-        f"unit: found 'dc-driv' (did you mean dc_drive?), allowed: {names}, or a .py file with a unit in it"
-    )
-    assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")
-
-
-def test_what_a_unit_does_not_have_is_told_before_it_is_read(urmpipe: RunCommand) -> None:
-    ran = urmpipe("fmu", "build", "dc-drive", "--robot", "urm7", "--log", "missing.csv")
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err.splitlines() == [
-        "error: unit dc_drive: found a robot (urm7), allowed: none, the unit has no such option",
-        "error: unit dc_drive: found a log (missing.csv), allowed: none, the unit has no such option",
-    ]
 
 
 def test_what_was_built_is_told_and_a_folder_gets_it(urmpipe: RunCommand, tmp_path: Path) -> None:
@@ -335,10 +272,27 @@ def test_check_of_an_fmu_that_does_not_come_to_its_end_is_1(
     assert f"problem: fmi2FreeInstance {said}" in ran.out.splitlines()
 
 
-def test_check_unpacks_nothing_outside_of_its_folder(urmpipe: RunCommand, tmp_path: Path) -> None:
-    with zipfile.ZipFile(tmp_path / "out.fmu", "w") as archive:
-        archive.writestr("../out.txt", "")
-    ran = urmpipe("fmu", "check", "out.fmu")
-    allowed = "paths below the FMU's folder, with / between their parts"
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err == f"error: out.fmu: found the path ../out.txt, allowed: {allowed}\n"
+def test_the_list_as_json_has_all_digits_and_names_with_either_sign(urmpipe: RunCommand) -> None:
+    listed = {name: urmpipe("fmu", "list", name, "--json").out for name in ("dc_drive", "dc-drive")}
+    assert listed["dc_drive"] == listed["dc-drive"]
+    parts = {one["name"]: one for one in json.loads(listed["dc_drive"])["variables"]}
+    assert [parts["Mk"][key] for key in ("part", "unit", "start")] == [
+        "output, continuous",
+        "N.m",
+        "computed",
+    ]
+    variables = json.loads(urmpipe("fmu", "list", "kinematic_chain", "--json").out)["variables"]
+    (tilts,) = [one["start"] for one in variables if one["name"].startswith("tilts")]
+    assert tilts == "0.9075712110370514 (52 deg)"
+    listed_units = json.loads(urmpipe("fmu", "list", "--json").out)["units"]
+    assert tuple(one["name"] for one in listed_units) == block_names()
+    options = {one["name"]: [option["name"] for option in one["options"]] for one in listed_units}
+    assert options["log_source"] == ["log", "columns", "interpolate"]
+
+
+@pytest.mark.slow
+def test_a_path_is_p_and_a_folder_of_plots_is_one_log() -> None:
+    assert unit_of("log_source", log=LOGS / "path.csv").variables[0].names == ("p[1]", "p[2]", "p[3]")
+    plots = unit_of("log_source", log=LOGS / "solidworks").table
+    assert plots is not None
+    assert plots.columns == 6

@@ -16,7 +16,7 @@ from thinned_logs import lay_thinned_logs
 from urmpipe.api.recordings import read_recording
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
-from urmpipe_models.errors import UrmpipeError, shell_quote
+from urmpipe_models.errors import shell_quote
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 RunCommand = Callable[..., Any]
@@ -226,18 +226,9 @@ def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand, tmp
     logs = ("--set", "log=counter_rotating.csv", "--set", "reference=path.csv")
     ran = urmpipe("simulate", "log-to-delta", *logs, "--duration", "10s", "--json", "-q")
     result = json.loads(ran.out)
-    assert (ran.code, ran.err) == (1, "")
+    assert ran.code == 1
+    assert ran.err.startswith("FAIL  delta of log-to-delta out of tolerance, ")
     assert (result["verdict"], result["verdicts"][0]["block"]) == ("fail", "delta")
-
-
-def test_a_verdict_of_few_samples_says_so(urmpipe: RunCommand, tmp_path: Path) -> None:
-    inputs = ", ".join(f'"{name}[{i}]" = 0.001' for name in ("reference", "actual") for i in (1, 2, 3))
-    meter = f"[blocks.m]\nunit = 'delta_meter'\nstart = {{ {inputs} }}\n"
-    (tmp_path / "few.toml").write_text(f"[system]\nduration = 0.1\nrecord_every = 3\n{meter}")
-    ran = urmpipe("simulate", "few.toml")
-    assert ran.code == 0
-    said = "warning: block m: the verdict covers one communication point in 3 (system.record_every)"
-    assert said in ran.err.splitlines()
 
 
 @pytest.mark.slow
@@ -252,43 +243,6 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
     assert [one["name"] for one in listed] == names
     assert listed[2]["arguments"]["log"] == "coppeliasim.csv"
     assert "log=coppeliasim.csv" in urmpipe("simulate", "--list").out
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ((), "error: found neither a system nor --list, allowed: one of the two"),
-        (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of crank-rocker, driven-arm"),
-        (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo' (did you mean log?), allowed: log"),
-        (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
-        (
-            ("log-to-delta", "--set", "log=missing.csv", "--set", "reference=path.csv"),
-            "error: log-to-delta.toml:16: blocks.log: missing.csv: found no such file",
-        ),
-        (
-            ("log-to-delta", "--set", "log=mine.csv"),
-            "error: argument reference: not set, but log is mine.csv; allowed: a file of the same motion"
-            " (log-to-delta's own path.csv has another motion)",
-        ),
-        (
-            ("one-drive", "--write-system", "mine.toml", "--step", "1ms", "--set", "C=2", "-o", "run.rrd"),
-            "error: step (--step): found for a system that is only written, allowed: when the system runs;"
-            " edit the"
-            " file instead",
-        ),
-        (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
-        (("log-to-delta", "-o", "missing/run.rrd"), "found no folder missing, allowed: a folder that exists"),
-    ],
-)
-def test_what_is_wrong_is_told_before_the_first_step(
-    urmpipe: RunCommand, tmp_path: Path, arguments: tuple[str, ...], said: str
-) -> None:
-    ran = urmpipe("simulate", *arguments)
-    assert (ran.code, ran.out) == (2, "")
-    assert said in ran.err
-    assert "Traceback" not in ran.err
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
@@ -321,67 +275,6 @@ def test_a_written_system_asks_for_the_logs_that_stay_with_the_shipped_one(
 
 
 @pytest.mark.slow
-def test_a_bundled_log_is_not_held_against_a_file_that_is_called_as_another_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "path.csv").write_text("t,x,y,z\n0,0,0,9\n1,0,0,9\n")
-    monkeypatch.chdir(tmp_path)
-    named = {"log": "coppeliasim.csv", "reference": "path.csv"}
-    with pytest.raises(UrmpipeError, match=r"blocks\.log: coppeliasim\.csv: found no such file"):
-        simulate("log-to-delta", arguments=named, duration=0.02, backend="python")
-
-
-def refusal(system: Path, **options: Any) -> list[str]:
-    """Return all that is wrong with a system."""
-    with pytest.raises(UrmpipeError) as error:
-        simulate(system, **options)
-    return [str(one) for one in error.value.findings]
-
-
-def test_all_that_is_wrong_with_the_parts_is_told_at_once(following: Path) -> None:
-    text = FOLLOWING.replace('column = "u"', 'column = "w"').replace('gain = "$gain"', "gain = nan")
-    arm = '[blocks.arm]\nunit = "kinematic_chain"\nrobot = 6\n'
-    meter = '[blocks.meter]\nunit = "delta_meter"\njoints = 1\n'
-    following.write_text(text + arm + meter, encoding="utf-8")
-    told = "\n".join(refusal(following))
-    assert "found no column 'w', allowed: t, u (V)" in told
-    assert "blocks.arm: robot: found 6, allowed: a name or a file" in told
-    assert "blocks.meter: unit delta_meter: option joints: found, allowed: none, it has no options;" in told
-
-
-def test_a_start_value_that_is_no_number_is_refused(following: Path) -> None:
-    following.write_text(FOLLOWING.replace('gain = "$gain"', "gain = nan"), encoding="utf-8")
-    assert refusal(following) == [
-        f"{following}:12: blocks.lag.start.gain: found nan, allowed: a finite number"
-    ]
-
-
-def test_a_meter_without_a_tolerance_judges_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "meter.toml"
-    path.write_text(
-        '[system]\nduration = 1.0\n[blocks.meter]\nunit = "delta_meter"\n'
-        "start = { tolerance = 0.0, reference = 0.0, actual = 0.0 }\n",
-        encoding="utf-8",
-    )
-    assert refusal(path) == ["block meter: tolerance: found 0, allowed: above 0, in m"]
-
-
-@pytest.mark.parametrize("output", ["following.toml", "voltage.csv", "follower.py"])
-def test_no_input_is_ever_replaced(following: Path, tmp_path: Path, output: str) -> None:
-    before = (tmp_path / output).read_bytes()
-    (said,) = refusal(following, draw=tmp_path / output)
-    assert "found an input of this command, allowed: any other name for the drawing" in said
-    assert (tmp_path / output).read_bytes() == before
-
-
-def test_two_outputs_have_two_names(following: Path, tmp_path: Path) -> None:
-    both = tmp_path / "run.rrd"
-    assert refusal(following, output=both, draw=both) == [
-        f"found {both} as recording and as drawing; allowed: a name for each"
-    ]
-
-
-@pytest.mark.slow
 def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tmp_path: Path) -> None:
     unit = tmp_path / "follower.py"
     unit.write_text(FOLLOWER.replace("v.u - v.x}", "(v.u - v.x) / (v.gain - v.gain)}"), encoding="utf-8")
@@ -405,15 +298,6 @@ def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
     q = simulate(system, step=0.01, backend="python").signal("log.q").values
     # one product of two doubles: a unit in the last place
     np.testing.assert_allclose(q, np.radians([[180.0, 90.0], [170.0, 80.0]]), rtol=2.3e-16)
-    system.write_text('[blocks.meter]\nunit = "delta_meter"\nmap = "lab.toml"\n', encoding="utf-8")
-    assert any("without a log, allowed: with log = ..." in one for one in refusal(system))
-
-
-def test_a_step_and_a_duration_are_positive(following: Path) -> None:
-    assert refusal(following, step=float("nan"), duration=0.0) == [
-        "step (--step): found nan, allowed: a positive time in s, such as 0.005 or 5ms",
-        "duration (--duration): found 0.0, allowed: a positive time in s, such as 0.005 or 5ms",
-    ]
 
 
 @pytest.mark.slow
@@ -431,27 +315,3 @@ def test_progress_rises_to_1(following: Path, tmp_path: Path) -> None:
     simulate(following, output=tmp_path / "run.rrd", progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
-
-
-@pytest.mark.slow
-def test_no_meter_judges_positions_of_which_nothing_tells_the_unit(
-    urmpipe: RunCommand, tmp_path: Path
-) -> None:
-    t, x, y, z = np.loadtxt(LOGS / "path.csv", delimiter=",", skiprows=1)[:50].T
-    table = np.column_stack((t, 1e3 * x, 1e3 * y, 1e3 * z))
-    np.savetxt(tmp_path / "path.csv", table, "%.9g", ",", header="t,x,y,z", comments="")
-    (tmp_path / "matlab.csv").write_bytes((LOGS / "matlab.csv").read_bytes())
-    given = (
-        "--set",
-        "log=matlab.csv",
-        "--set",
-        "reference=path.csv",
-        "--duration",
-        "0.1",
-        "--backend",
-        "python",
-    )
-    ran = urmpipe("simulate", "log-to-delta", *given)
-    assert ran.code == 2
-    assert "no unit is given for x, y, z" in ran.err
-    assert not list(tmp_path.glob("*.rrd"))
