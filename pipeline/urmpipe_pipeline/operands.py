@@ -29,28 +29,20 @@ from urmpipe_models.errors import (
     map_collecting_errors,
 )
 from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
-from urmpipe_pipeline.networks.network_motion import NetworkMotion
-from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.repolarization.audit import is_revolute
 from urmpipe_pipeline.repolarization.interval import check_joint_names
 from urmpipe_pipeline.results import read_recording, result_kind
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
-from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.simulations.motion import run_of_block
+from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
 
 NOT_A_RUN = "found the recording of {}, allowed: one that ingest wrote"
 BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
 BASELINE_HINT = Hint("baseline", None, "compares it, alone, with an earlier one")
-
-# Results that are a run, or contain one.
-RunLike: TypeAlias = Run | IkResult | PlannedPath | NetworkMotion
-RUN_LIKE: tuple[type[RunLike], ...] = (Run, IkResult, PlannedPath, NetworkMotion)
 
 Operand: TypeAlias = Path | Held | RunLike | Simulation
 
@@ -102,6 +94,8 @@ def load_runs(
             if isinstance(operand, (Path, Held)):
                 run = _ingest(operand, replace(read, side=side), robot, tsp, derivative)
             elif isinstance(operand, Simulation):
+                from urmpipe_pipeline.simulations.motion import run_of_block  # few operands are simulations
+
                 run = run_of_block(operand, blocks.next(), robot)
             else:
                 run = with_robot(operand.as_run(), robot)
@@ -268,7 +262,7 @@ def _read_run_like(path: Path, comparison_hints: Sequence[Hint]) -> RunLike | Si
         RecordingError: If it is another kind of result.
     """
     result = read_recording(path)
-    if isinstance(result, (RUN_LIKE, Simulation)):
+    if isinstance(result, (RunLike, Simulation)):
         return result
     hints = tuple(comparison_hints) if isinstance(result, Comparison) else ()
     raise RecordingError(Finding(NOT_A_RUN.format(result_kind(result).with_article), str(path), hints=hints))

@@ -7,85 +7,134 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, TypeGuard
 
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.accuracy import exports as accuracy_exports
-from urmpipe_pipeline.accuracy import presenter as accuracy
-from urmpipe_pipeline.accuracy.result import AccuracyResult
-from urmpipe_pipeline.comparison import exports as comparison_exports
-from urmpipe_pipeline.comparison import presenter as comparison
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.diagnosis.result import Diagnosis
-from urmpipe_pipeline.networks import network_motion
-from urmpipe_pipeline.networks import presenter as networks
-from urmpipe_pipeline.networks.network_motion import NetworkMotion
-from urmpipe_pipeline.networks.result import NetworkResult
-from urmpipe_pipeline.planned_paths import presenter as planned_paths
-from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.recording.reader import read_result
 from urmpipe_pipeline.recording.writer import write_result
-from urmpipe_pipeline.runs import exports as run_exports
-from urmpipe_pipeline.runs import presenter as runs
-from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.simulations import exports as simulation_exports
-from urmpipe_pipeline.simulations import presenter as simulations
-from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.solved_targets import presenter as solved_targets
-from urmpipe_pipeline.solved_targets.result import IkResult
 
 
 class Kind(NamedTuple):
-    """A kind of result.
+    """A kind of result, whose modules are imported when they are used.
 
     Attributes:
         name: Its name in a recording.
-        cls: Its dataclass.
-        present: Returns the presentation of a result.
-        exports: Returns the tables of a result; None if the kind has none.
+        class_path: Its dataclass, as "module:name".
+        presenter: The function that returns the presentation of a result, likewise.
+        exporter: The function that returns the tables of a result, likewise; empty if the kind has none.
     """
 
     name: str
-    cls: type[Result]
-    present: Callable[[Any], Presentation]
-    exports: Callable[[Any], Exports] | None = None
+    class_path: str
+    presenter: str
+    exporter: str = ""
 
     @property
     def with_article(self) -> str:
         """Its name in a sentence: a run, an accuracy."""
         return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name}"
 
+    @property
+    def cls(self) -> type[Result]:
+        """Its dataclass."""
+        cls: type[Result] = _load(self.class_path)
+        return cls
 
+    def contains(self, value: object) -> bool:
+        """Return whether a value is a result of this kind."""
+        return f"{type(value).__module__}:{type(value).__qualname__}" == self.class_path
+
+    def present(self, result: Result) -> Presentation:
+        """Return the presentation of a result."""
+        presentation: Presentation = _load(self.presenter)(result)
+        return presentation
+
+    def export(self, result: Result) -> Exports:
+        """Return the tables of a result.
+
+        Raises:
+            OptionError: If the kind has none.
+        """
+        if not self.exporter:
+            raise OptionError(f"{self.with_article} has no tables")
+        tables: Exports = _load(self.exporter)(result)
+        return tables
+
+
+def _load(path: str) -> Any:
+    module, _, name = path.partition(":")
+    return getattr(import_module(module), name)
+
+
+# Each module of a kind by name: a command imports those of its own kind alone, a third of its start.
+_ROOT = "urmpipe_pipeline"
 KINDS: tuple[Kind, ...] = (
-    Kind("run", Run, runs.present, run_exports.exports),
-    Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
-    Kind("diagnosis", Diagnosis, comparison.present_diagnosis),
-    Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
-    Kind("solved targets", IkResult, solved_targets.present, solved_targets.exports),
-    Kind("plan", PlannedPath, planned_paths.present, planned_paths.exports),
-    Kind("accuracy", AccuracyResult, accuracy.present, accuracy_exports.exports),
-    Kind("network", NetworkResult, networks.present),
-    Kind("network motion", NetworkMotion, network_motion.present, network_motion.exports),
+    Kind("run", f"{_ROOT}.runs.run:Run", f"{_ROOT}.runs.presenter:present", f"{_ROOT}.runs.exports:exports"),
+    Kind(
+        "comparison",
+        f"{_ROOT}.comparison.comparison:Comparison",
+        f"{_ROOT}.comparison.presenter:present",
+        f"{_ROOT}.comparison.exports:exports",
+    ),
+    Kind(
+        "diagnosis",
+        f"{_ROOT}.diagnosis.result:Diagnosis",
+        f"{_ROOT}.comparison.presenter:present_diagnosis",
+    ),
+    Kind(
+        "simulation",
+        f"{_ROOT}.simulations.simulation:Simulation",
+        f"{_ROOT}.simulations.presenter:present",
+        f"{_ROOT}.simulations.exports:exports",
+    ),
+    Kind(
+        "solved targets",
+        f"{_ROOT}.solved_targets.result:IkResult",
+        f"{_ROOT}.solved_targets.presenter:present",
+        f"{_ROOT}.solved_targets.presenter:exports",
+    ),
+    Kind(
+        "plan",
+        f"{_ROOT}.planned_paths.result:PlannedPath",
+        f"{_ROOT}.planned_paths.presenter:present",
+        f"{_ROOT}.planned_paths.presenter:exports",
+    ),
+    Kind(
+        "accuracy",
+        f"{_ROOT}.accuracy.result:AccuracyResult",
+        f"{_ROOT}.accuracy.presenter:present",
+        f"{_ROOT}.accuracy.exports:exports",
+    ),
+    Kind("network", f"{_ROOT}.networks.result:NetworkResult", f"{_ROOT}.networks.presenter:present"),
+    Kind(
+        "network motion",
+        f"{_ROOT}.networks.network_motion:NetworkMotion",
+        f"{_ROOT}.networks.network_motion:present",
+        f"{_ROOT}.networks.network_motion:exports",
+    ),
 )
 
 
 def is_result(value: Any) -> TypeGuard[Result]:
     """Return whether a value is a result of any kind."""
-    return any(kind.cls is type(value) for kind in KINDS)
+    return any(kind.contains(value) for kind in KINDS)
 
 
 def result_kind(result: Result) -> Kind:
     """Return the kind of a result."""
-    return next(kind for kind in KINDS if kind.cls is type(result))
+    return next(kind for kind in KINDS if kind.contains(result))
 
 
 def enclosing_result(result: Result) -> Result:
     """Return the result that is recorded and reported: of a diagnosis its comparison, if it has one."""
-    return (result.comparison if isinstance(result, Diagnosis) else None) or result
+    comparison: Result | None = getattr(result, "comparison", None)  # only a diagnosis has one
+    return comparison or result
 
 
 def write_recording(
@@ -117,7 +166,9 @@ def read_recording(path: Path, *, lazy: bool = False) -> Result:
     Raises:
         RecordingError: If it is no recording, is incomplete, not by urmpipe, or of another layout.
     """
-    result: Result = read_result(path, {kind.name: kind.cls for kind in KINDS}, lazy=lazy)
+    result: Result = read_result(
+        path, {kind.name: partial(_load, kind.class_path) for kind in KINDS}, lazy=lazy
+    )
     return result
 
 
@@ -133,7 +184,4 @@ def exports(result: Result) -> Exports:
     Raises:
         OptionError: If it has none.
     """
-    kind = result_kind(result)
-    if kind.exports is None:
-        raise OptionError(f"{kind.with_article} has no tables")
-    return kind.exports(result)
+    return result_kind(result).export(result)

@@ -126,7 +126,7 @@ def export_swing(one: Swing) -> Exports:
 
 @pytest.fixture(autouse=True)
 def known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    kind = Kind("swing", Swing, present_swing, export_swing)
+    kind = Kind("swing", *(f"{__name__}:{part}" for part in ("Swing", "present_swing", "export_swing")))
     monkeypatch.setattr(results, "KINDS", (*results.KINDS, kind))
     monkeypatch.chdir(tmp_path)
 

@@ -33,8 +33,6 @@ from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.comparison.warnings import CLOCKS_DIFFER, LARGE_NOISE, SWAPPED, large_noises
 from urmpipe_pipeline.operands import (
     BASELINE_HINT,
-    RUN_LIKE,
-    RunLike,
     is_log,
     load_comparison,
     load_runs,
@@ -43,7 +41,7 @@ from urmpipe_pipeline.operands import (
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.results import present, read_recording, result_kind
 from urmpipe_pipeline.runs.recorded_tcp import MISSING_TOOL
-from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import Held, ReadOptions, TableLike, held_of, is_table
 from urmpipe_pipeline.tables.csv_files import write_table
@@ -168,7 +166,7 @@ def normalise_operands(operands: Mapping[str, Sequence[Any]], *further: type) ->
     Raises:
         OptionError: With everything that is not an operand.
     """
-    types = (*RUN_LIKE, Simulation, Held, *further)
+    types = (RunLike, Simulation, Held, *further)
     named = {name: list(_with_tables(name.removesuffix("s"), given)) for name, given in operands.items()}
     map_collecting_errors(lambda item: check_types(*item, types, OPERANDS), named.items())
     return [operand for given in named.values() for operand in given]

@@ -42,7 +42,6 @@ from urmpipe_pipeline.presentation.parts import (
     recording_fact,
     table_of,
 )
-from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.scene import Scene
 from urmpipe_pipeline.presentation.section import (
     Block,
@@ -60,7 +59,7 @@ from urmpipe_pipeline.presentation.section import (
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs.figures import joint_panels
-from urmpipe_pipeline.runs.run import SCHEMA, Run
+from urmpipe_pipeline.runs.run import SCHEMA, Run, RunLike
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,7 +151,7 @@ class MotionForces:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class NetworkMotion(Result):
+class NetworkMotion(RunLike):
     """The motion of a driven network on one branch.
 
     Attributes:

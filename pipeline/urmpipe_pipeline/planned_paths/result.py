@@ -21,16 +21,15 @@ from urmpipe_pipeline.planned_paths.motion import run_of_plan
 from urmpipe_pipeline.planned_paths.obstacles import Infeasibility
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.planned_paths.request import Law
-from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.run import SCHEMA, Run
+from urmpipe_pipeline.runs.run import SCHEMA, Run, RunLike
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PlannedPath(Result):
+class PlannedPath(RunLike):
     """A path of lines and arcs with its time law, and the joints of the arm that follows it.
 
     Attributes:

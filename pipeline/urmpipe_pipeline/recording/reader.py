@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from rerun.chunk import LazyStore
 
 
-def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) -> Any:
-    """Return the result of one of the named kinds that a recording holds, see `urmpipe_pipeline.results`.
+def read_result(path: Path, kinds: Mapping[str, Callable[[], type]], *, lazy: bool = False) -> Any:
+    """Return the result that a recording holds, of one of the kinds whose classes are found by their names.
 
     Results in a result come back without the path of the recording that they were read from. If `lazy`,
     arrays are read when they are used (`LazyArray`).
@@ -58,11 +58,11 @@ def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) ->
     """
     store = Store(path)
     document = _read_document(store)
-    cls = kinds.get(str(document.get("kind", "")))
-    if cls is None:
+    find_class = kinds.get(str(document.get("kind", "")))
+    if find_class is None:
         raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {', '.join(kinds)}")
     try:
-        result = decode(cls, document.get("result"), _array_reader(store, lazy, document))
+        result = decode(find_class(), document.get("result"), _array_reader(store, lazy, document))
     except CodecError as error:
         raise store.error(f"found damaged metadata, {error}") from error
     has_path = any(field.name == "recording" for field in fields(result))

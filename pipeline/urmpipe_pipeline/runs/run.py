@@ -1,6 +1,6 @@
 """A run: an ingested log as plain arrays.
 
-- `Run`: the arrays, as a table (`to_frame`) and as JSON (`to_dict`).
+- `Run`: the arrays, as a table (`to_frame`) and as JSON (`to_dict`); `RunLike`: what has one.
 - `TorqueSummary`, `summarise_torques`: the largest and the rms torque of each joint, and its effort limit.
 - `slice_run`: some rows of a run.
 """
@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -128,8 +129,18 @@ class RowJoints:
     q: FloatArray
 
 
+class RunLike(Result):
+    """A result that is a run, or contains one."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def as_run(self) -> Run:
+        """Return the run."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Run(Result):
+class Run(RunLike):
     """One ingested log: repolarized, on a uniform grid, with the arm's kinematics.
 
     Attributes:

@@ -18,9 +18,8 @@ from urmpipe_models.ik.path import JointPath
 from urmpipe_models.ik.solutions import Solutions, Targets, pose_errors
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, ns_to_seconds
-from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.run import SCHEMA, Run
+from urmpipe_pipeline.runs.run import SCHEMA, Run, RunLike
 from urmpipe_pipeline.solved_targets.motion import run_of_solutions
 from urmpipe_pipeline.solved_targets.solution_warnings import path_warnings, unreached_warnings
 
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class IkResult(Result):
+class IkResult(RunLike):
     """The joint values that bring the tool centre point of an arm to n targets.
 
     Attributes:

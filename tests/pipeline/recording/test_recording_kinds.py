@@ -73,7 +73,9 @@ def shown(result: Accuracy) -> Presentation:
 @pytest.fixture
 def known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add the kind to those of results, which is all that recording asks for."""
-    monkeypatch.setattr(results, "KINDS", (*results.KINDS, Kind("accuracy", Accuracy, shown)))
+    monkeypatch.setattr(
+        results, "KINDS", (*results.KINDS, Kind("accuracy", f"{__name__}:Accuracy", f"{__name__}:shown"))
+    )
 
 
 @pytest.mark.usefixtures("known")
