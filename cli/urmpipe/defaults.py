@@ -25,7 +25,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from urmpipe.command_line import ParamOption
     from urmpipe_models.errors import Finding
     from urmpipe_pipeline.joint_log import LogWarning
 
@@ -196,9 +195,7 @@ def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Co
         yield from (Finding(f"key {table}{fault}", str(path)) for fault in faults if fault)
 
 
-def _key_fault(
-    name: str, options: Mapping[str, ParamOption], all_options: Mapping[str, ParamOption]
-) -> str | None:
+def _key_fault(name: str, options: Mapping[str, Any], all_options: Mapping[str, Any]) -> str | None:
     """Return what is wrong with a key, or None; its value is read as that of an option."""
     from urmpipe_models.errors import format_names, format_suggestion
 
@@ -212,7 +209,7 @@ def _key_fault(
     )
 
 
-def _options(command: click.Command) -> dict[str, ParamOption]:
+def _options(command: click.Command) -> dict[str, Any]:
     """Return the options of a command by their long names without dashes."""
     return {
         name.removeprefix("--"): option
@@ -223,7 +220,7 @@ def _options(command: click.Command) -> dict[str, ParamOption]:
     }
 
 
-def _to_option_value(value: Any, option: ParamOption, folder: Path) -> Any:
+def _to_option_value(value: Any, option: Any, folder: Path) -> Any:
     """Return a value as click passes it to its option: numbers as texts, files from its folder."""
     if option.is_flag:
         return value

@@ -23,7 +23,7 @@ from typing import Any
 
 import click
 
-from urmpipe import __version__
+from urmpipe import __version__, commands
 from urmpipe.answers import (
     ERROR,
     discard_output,
@@ -35,7 +35,6 @@ from urmpipe.answers import (
 from urmpipe.command_line import Group, long_name
 from urmpipe.defaults import Defaults, deciding_defaults, find_defaults, shared_files
 
-FOLDER = Path(__file__).with_name("commands")
 ORDER = (  # of the data; other commands follow by their names
     "demo", "ingest", "compare", "iso", "diagnose", "report", "view", "export", "robot", "ik", "plan",
     "accuracy", "network", "fmu", "simulate",
@@ -47,21 +46,24 @@ GARBAGE_THRESHOLD = (
 
 
 def find_commands() -> dict[str, str]:
-    """Return the commands with their short help: the modules in `commands`, and the first line of each.
+    """Return the commands with their short help: the modules of `commands`, and the first line of each.
 
     `urmpipe --help` needs them without importing the modules.
     """
-    names = [path.stem for path in FOLDER.glob("[!_]*.py")]
+    modules = {path.stem: path for folder in commands.__path__ for path in Path(folder).glob("[!_]*.py")}
     order = {name: place for place, name in enumerate(ORDER)}
-    return {
-        name: _read_short_help(FOLDER / f"{name}.py")
-        for name in sorted(names, key=lambda name: (order.get(name, len(order)), name))
-    }
+    names = sorted(modules, key=lambda name: (order.get(name, len(order)), name))
+    return {name: _read_short_help(modules[name]) for name in names}
 
 
 def _read_short_help(module: Path) -> str:
     with module.open(encoding="utf-8") as file:
         return file.readline().strip().strip('"')
+
+
+def _is_command(name: str) -> bool:
+    is_name = name.isidentifier() and not name.startswith("_")
+    return is_name and any((Path(folder) / f"{name}.py").is_file() for folder in commands.__path__)
 
 
 class LazyGroup(Group):
@@ -73,7 +75,7 @@ class LazyGroup(Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Load one command."""
-        if not (cmd_name.isidentifier() and (FOLDER / f"{cmd_name}.py").is_file()):
+        if not _is_command(cmd_name):
             return None
         command = self._load(cmd_name)
         takes_defaults = not isinstance(command, click.Group) and not ctx.resilient_parsing
@@ -101,8 +103,8 @@ class LazyGroup(Group):
         self, ctx: click.Context, command: click.Command, files: Sequence[Path]
     ) -> dict[str, Any]:
         """Return the defaults in files, the nearest first, and leave their origin in the context."""
-        commands = {name: self._load(name) for name in find_commands()}
-        by_file = deciding_defaults(command, files, commands)
+        all_commands = {name: self._load(name) for name in find_commands()}
+        by_file = deciding_defaults(command, files, all_commands)
         names = {param.name: long_name(param) for param in command.params}
         ctx.obj = Defaults(
             {
@@ -122,19 +124,19 @@ class LazyGroup(Group):
 def _suggest_command(words: Sequence[str]) -> str:
     """Return the message about files in the place of a command, or an empty string."""
     files = list(takewhile(lambda word: "\0" not in word and Path(word).exists(), words))
-    if not files or (FOLDER / f"{files[0]}.py").is_file():
+    if not files or _is_command(files[0]):
         return ""
     from urmpipe_models.errors import format_value, shell_quote
 
     several = ("logs", "compare") if len(files) > 1 else ("a log", "ingest")
-    kind, *commands = {
+    kind, *names = {
         ".rrd": ("a recording", "view", "report"),
         ".toml": ("a TOML file", "simulate", "network check", "robot show"),
         ".urdf": ("a robot", "robot show"),
         ".fmu": ("an FMU", "fmu check"),
     }.get(Path(files[0]).suffix.lower(), several)
     quoted = " ".join(map(shell_quote, files if several[0] in ("logs", kind) else files[:1]))
-    calls = " or ".join(f"urmpipe {command} {quoted}" for command in commands)
+    calls = " or ".join(f"urmpipe {name} {quoted}" for name in names)
     return f"found {format_value(files[0])}, {kind}, allowed: a command before it, such as {calls}"
 
 

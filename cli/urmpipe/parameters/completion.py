@@ -6,6 +6,7 @@ import csv
 import re
 import shlex
 from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -164,6 +165,21 @@ def _files(suffixes: Sequence[str], incomplete: str) -> list[CompletionItem]:
     return [_item(incomplete, "dir"), *(_item(f"{folder}{name}") for name in names)]
 
 
+def list_names(place: str) -> Callable[[], Iterable[str]]:
+    """Return a function that calls `module:function`, and imports it only then."""
+    module, _, function = place.partition(":")
+
+    def names() -> Iterable[str]:
+        listed: Iterable[str] = getattr(import_module(module), function)()
+        return listed
+
+    return names
+
+
+robots = list_names("urmpipe_models.robots.catalogue:robot_names")
+networks = list_names("urmpipe_models.networks.file:network_names")
+
+
 def values_by_name(names: Callable[[click.Context], Iterable[str]]) -> Complete:
     """Return the completion of NAME=VALUE: the names with their sign, and robots and networks as values.
 
@@ -172,7 +188,6 @@ def values_by_name(names: Callable[[click.Context], Iterable[str]]) -> Complete:
     """
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        from urmpipe.parameters.kinds import networks, robots
         from urmpipe_models.errors import UrmpipeError
 
         name, _, begun = incomplete.partition("=")

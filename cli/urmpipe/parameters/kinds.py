@@ -15,7 +15,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from importlib import import_module
 from itertools import chain
 from numbers import Integral, Real
 from pathlib import Path
@@ -26,6 +25,9 @@ from urmpipe.parameters.completion import (
     columns,
     files,
     folders,
+    list_names,
+    networks,
+    robots,
     tolerances,
     unique_words,
     units,
@@ -129,7 +131,12 @@ def _read_numbers(value: Any, si: str, length: int = 0) -> tuple[float, ...]:
 def _read_joint_values(value: Any) -> Any:
     """Read joint values; texts stay texts, as their joints decide whether they are angles or lengths."""
     if not isinstance(value, str):
-        return value
+        if hasattr(value, "__array__"):
+            return value
+        values = _read_list(value)
+        if not all(isinstance(item, str) or _is_number(item) for item in values):
+            raise TypeError
+        return values
     parts = tuple(value.split(","))
     if any(all(math.isnan(quantity_to_si(part, WRITTEN[si])) for si in ("rad", "m")) for part in parts):
         raise ValueError
@@ -386,21 +393,6 @@ def _read_instance(value: Any, classes: Sequence[str]) -> Any:
     raise TypeError
 
 
-def _list_names(place: str) -> Callable[[], Iterable[str]]:
-    """Return a function that calls `module:function`, and imports it only then."""
-    module, _, function = place.partition(":")
-
-    def names() -> Iterable[str]:
-        listed: Iterable[str] = getattr(import_module(module), function)()
-        return listed
-
-    return names
-
-
-robots = _list_names("urmpipe_models.robots.catalogue:robot_names")
-networks = _list_names("urmpipe_models.networks.file:network_names")
-
-
 # 5. The kinds
 
 
@@ -595,13 +587,13 @@ SYSTEM = file_or(
     "SYSTEM|FILE.toml",
     "the name of a system, or a system file (TOML)",
     (),
-    files(".toml", names=_list_names("urmpipe_fmus.cosim:system_names")),
+    files(".toml", names=list_names("urmpipe_fmus.cosim:system_names")),
 )
 UNIT_MODEL = file_or(
     "UNIT|FILE.py",
     "the name of a unit, a Python file with one, or a BlockModel",
     ("BlockModel",),
-    files(".py", names=_list_names("urmpipe_fmus.blocks:block_names")),
+    files(".py", names=list_names("urmpipe_fmus.blocks:block_names")),
 )
 LOG = Kind(
     "LOG.csv",

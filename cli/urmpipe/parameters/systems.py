@@ -23,7 +23,6 @@ from urmpipe.parameters.shared import (
 )
 
 if TYPE_CHECKING:
-    from urmpipe.systems.logs import LogTable
     from urmpipe_models.networks.forces import Wrench
     from urmpipe_pipeline.runs.run import Run
     from urmpipe_pipeline.sources import LogMap, TableLike
@@ -92,7 +91,7 @@ class BuildFmu(OnMessage, total=False):
     """The parameters of `build_fmu`."""
 
     log: Annotated[
-        "PathLike | LogTable | None",
+        Any,  # PathLike | LogTable | None
         Param(
             kinds.file_or("LOG", "a log: CSV, or a folder of plots", ("LogTable",), kinds.files()),
             "Log, for units that play one back.",
