@@ -11,7 +11,7 @@ import pytest
 
 from four_logs import NOISE, Captured, compare, lay_logs, names, read_lines, recorded, said
 from urmpipe.main import run
-from urmpipe_pipeline.comparison.baseline_section import since_words
+from urmpipe_pipeline.comparison.tables import since_words
 
 
 @pytest.fixture(autouse=True)

@@ -40,7 +40,7 @@ def export(result: PathLike | Result, output: PathLike | None = None, **options:
         recording: Path | None = result.recording
     else:
         check_types("result", [result], (), "a recording, or a result such as a Run or a Comparison")
-        recording = Path(cast(PathLike, result))
+        recording = Path(cast("PathLike", result))
         require_recordings([recording])
         result = read_recording(recording, lazy=True)
     kept = [*([recording] if recording else []), *values["inputs"]]

@@ -10,7 +10,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.parts import format_velocity, select_shown_motion
 from urmpipe_pipeline.accuracy.result import AccuracyResult
-from urmpipe_pipeline.comparison.scene import drawn_larger
+from urmpipe_pipeline.comparison.figures import drawn_larger
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import ends, spot_at

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.baseline_section import baseline_checks, baseline_section, worse_facts
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.facts import (
@@ -19,14 +18,22 @@ from urmpipe_pipeline.comparison.facts import (
     remedy_hints,
     sync_words,
 )
-from urmpipe_pipeline.comparison.figures import deviation_figures, overview_figure, path_figure, speed_cloud
+from urmpipe_pipeline.comparison.figures import (
+    comparison_scene,
+    deviation_figures,
+    overview_figure,
+    path_figure,
+    speed_cloud,
+)
 from urmpipe_pipeline.comparison.iso_presenter import present_test
-from urmpipe_pipeline.comparison.scene import comparison_scene
 from urmpipe_pipeline.comparison.tables import (
+    baseline_checks,
+    baseline_section,
     comparison_lines,
     ranking_tables,
     statistics_rows,
     statistics_tables,
+    worse_facts,
 )
 from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.comparison.wording import (

@@ -13,7 +13,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import (
     compare_with_baseline,
 )
-from urmpipe_pipeline.comparison.baseline_section import worse_words
+from urmpipe_pipeline.comparison.tables import worse_words
 
 ROUNDING = 1e-15
 """Positions of 1 m round at 2e-16 m, and are taken apart twice."""

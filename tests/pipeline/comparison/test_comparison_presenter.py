@@ -16,7 +16,7 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES
-from urmpipe_pipeline.comparison.scene import LEAST_SEEN
+from urmpipe_pipeline.comparison.figures import LEAST_SEEN
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.figure import Figure, SpaceFigure
 from urmpipe_pipeline.presentation.palette import run_colour
