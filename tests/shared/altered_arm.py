@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -43,9 +42,6 @@ Numbers = Mapping[str, FloatArray]
 
 Noise = Callable[[np.random.Generator, FloatArray], FloatArray]
 """Positions in [m], shape (3, n), with noise."""
-
-Outcome = Literal["named", "undecided", "undecided, without it", "nothing", "part", "more", "other"]
-"""The causes; they among others; others, not told apart; nothing; some of them; they and more; others."""
 
 
 @cache
@@ -219,29 +215,19 @@ class Named:
         """What all explanations have."""
         return self.best.intersection(*self.others)
 
-    def outcome(self, wanted: frozenset[str]) -> Outcome:
-        """Return how that answers causes that are there."""
-        if self.others:
-            return "undecided" if wanted in (self.best, *self.others) else "undecided, without it"
-        if self.best == wanted:
-            return "named"
-        if not self.best:
-            return "nothing"
-        return "part" if self.best < wanted else "more" if self.best > wanted else "other"
+    def is_only(self, causes: frozenset[str]) -> bool:
+        """Return whether exactly these causes are named, and nothing is undecided."""
+        return self.best == causes and not self.others
 
 
 def named(search: Search, found: Found) -> Named:
     """Return what a search names, by kinds and names."""
 
-    def of(one: Explanation) -> frozenset[str]:
-        return names_of(
-            search,
-            found,
-            [called(g) for k, g in enumerate(search.model.groups) if k in one.subset],
-            one.state.edits,
-        )
+    def of(explanation: Explanation) -> frozenset[str]:
+        numbers = [called(group) for k, group in enumerate(search.model.groups) if k in explanation.subset]
+        return names_of(search, found, numbers, explanation.state.edits)
 
-    return Named(of(found.best), tuple(of(one) for one in found.rivals))
+    return Named(of(found.best), tuple(map(of, found.rivals)))
 
 
 def names_of(search: Search, found: Found, numbers: Sequence[str], edits: Edits = ()) -> frozenset[str]:

@@ -117,7 +117,7 @@ def test_the_side_that_disagrees_with_its_tool_centre_point_has_the_causes(
         sides.append(side(T, q, tcp, name))
         if q is not None and tcp is not None:
             distances[name] = np.linalg.norm(place(q) - tcp, axis=1)
-    diagnosis = urmpipe.diagnose(*sides)
+    diagnosis = urmpipe.diagnose(sides[0], sides[1])
     assert {check.name: check.agrees for check in diagnosis.recorded_tcp} == agree
     for check in diagnosis.recorded_tcp:
         assert check.rms == pytest.approx(np.sqrt((distances[check.name] ** 2).mean()), rel=1e-9)

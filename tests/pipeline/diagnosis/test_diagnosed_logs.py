@@ -202,7 +202,7 @@ def test_of_equivalent_causes_that_of_full_size_is_named(tmp_path: Path) -> None
 
 def test_motions_that_have_nothing_in_common_are_unrelated() -> None:
     runs = [run_of(np.asarray(rich_motion(URM6, seed)(times(100))), URM6) for seed in (1, 2)]
-    diagnosis = urmpipe.diagnose(*runs)
+    diagnosis = urmpipe.diagnose(runs[0], runs[1])
     assert diagnosis.unexplained.is_unrelated_motion
     assert diagnosis.summary.startswith("probably different motions: rms ")
 
