@@ -14,9 +14,8 @@ import urmpipe
 from asserting import there
 from pages import DOCS, command_lines, lay_files, snippets, text_of
 from urmpipe.main import run
-from urmpipe_pipeline.comparison.iso import STANDARD_CYCLES
+from urmpipe_pipeline.comparison.iso import STANDARD_CYCLES, IsoOptions
 from urmpipe_pipeline.iso9283.criteria import UNITS
-from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 
 PAGE = text_of("docs/iso.md")
 DRAWN = runpy.run_path(str(DOCS / "iso_figures.py"))

@@ -30,6 +30,7 @@ from urmpipe_pipeline.comparison.compare import (
     skip_failed_logs,
 )
 from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
+from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.comparison.warnings import CLOCKS_DIFFER, LARGE_NOISE, SWAPPED, large_noises
 from urmpipe_pipeline.operands import (
     BASELINE_HINT,
@@ -88,7 +89,7 @@ def log_by_log(values: Mapping[str, Any], *, diagnose: bool = False) -> CompareO
     tolerance = values["tolerance"]
     return CompareOptions(
         tolerance.by_kind, values["tcp"], values["sync"], values.get("align", "none"), tolerance.from_text,
-        diagnose, None, values["defaults"],
+        diagnose, values["defaults"],
     )  # fmt: skip
 
 
@@ -97,7 +98,7 @@ def run_comparison(
     logs: Any,
     robot: Robot | None,
     values: Mapping[str, Any],
-    judge: Callable[[object, ReadOptions], CompareOptions],
+    judge: Callable[[object, ReadOptions], CompareOptions | IsoOptions],
     judged: Sequence[Hint] = (BASELINE_HINT,),
 ) -> Comparison:
     """Return a comparison, and write what is named: all or none.
@@ -188,7 +189,7 @@ def _check_log_parameters(operands: Sequence[Any], values: Mapping[str, Any]) ->
 def _compare(
     operands: Sequence[Path | str | Held | RunLike | Simulation | Comparison],
     load: Callable[..., list[Run]],
-    options: CompareOptions,
+    options: CompareOptions | IsoOptions,
     checked: Callable[[Comparison], Comparison],
     unjudged: list[FailedLog] | None,
 ) -> Comparison:
@@ -197,8 +198,10 @@ def _compare(
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
     given = (Path(one) if isinstance(one, (str, Path)) else one for one in operands)
     first, *others = load([one for one in given if not isinstance(one, Comparison)], failed=unjudged)
-    if options.iso is not None and not others:
-        raise OptionError(Finding(about="logs", found="none", allowed="a reference and its cycles"))
+    if isinstance(options, IsoOptions):
+        if not others:
+            raise OptionError(Finding(about="logs", found="none", allowed="a reference and its cycles"))
+        return checked(measure_iso(first, others, options))
     if not others:
         return checked(compare_with_recorded_tcp(first, options))
 

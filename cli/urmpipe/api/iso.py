@@ -15,11 +15,10 @@ from urmpipe.parameters.comparing import Iso
 from urmpipe.public_functions import public_function, reject_recording
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.comparison.compare import CompareOptions
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.iso import IsoOptions
 from urmpipe_pipeline.iso9283.poses import Poses
-from urmpipe_pipeline.planned_paths.command_marks import bends_of, stops_of
+from urmpipe_pipeline.planned_paths.command_marks import find_rounded_corners, find_stops
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.solved_targets.given_targets import TargetsLike, given_targets
@@ -52,22 +51,18 @@ def iso(
     """
     values: Mapping[str, Any] = options  # as their kinds read them
 
-    def judge(operand: object, read: ReadOptions) -> CompareOptions:
+    def judge(operand: object, read: ReadOptions) -> IsoOptions:
         """Return how the test is judged."""
         tolerance = values["tolerance"]
         plan = _find_plan(operand)
-        test = IsoOptions(
-            cycles=values["cycles"],
+        return IsoOptions(
+            tolerance={} if tolerance is None else tolerance.by_kind,
             targets=None if values["targets"] is None else _read_targets(values["targets"], read),
-            bends=() if plan is None else bends_of(plan),
-            stops=() if plan is None else stops_of(plan),
-            planes=values["planes"],
-            band=values["band"],
+            corners=() if plan is None else find_rounded_corners(plan),
+            stops=() if plan is None else find_stops(plan),
+            from_text=tolerance is not None and tolerance.from_text,
+            **{name: values[name] for name in ("tcp", "sync", "cycles", "planes", "band", "defaults")},
         )
-        return CompareOptions(
-            {} if tolerance is None else tolerance.by_kind, values["tcp"], values["sync"],
-            from_text=tolerance is not None and tolerance.from_text, iso=test, defaults=values["defaults"],
-        )  # fmt: skip
 
     return run_comparison(reference, logs, robot, values, judge)
 

@@ -31,7 +31,6 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import align
 from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.iso import evaluate_test
 from urmpipe_pipeline.comparison.measure import joints_not_compared, measure
 from urmpipe_pipeline.comparison.sync import (
     SyncOption,
@@ -54,7 +53,6 @@ from urmpipe_pipeline.comparison.warnings import (
     weak_evidence,
 )
 from urmpipe_pipeline.diagnosis.diagnose import Compared, Limit, diagnose
-from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
 from urmpipe_pipeline.presentation.meshes import mesh_warnings
 from urmpipe_pipeline.provenance import build_provenance
@@ -83,8 +81,6 @@ Tcp = Literal["fk", "recorded"]
 
 MAX_RECORDED_DISTANCE = 1e-3  # m from the recorded TCP, if not judged: a third of the default tolerance
 
-NO_ALIGNMENT_ISO = "none with iso: an alignment would hide AP and AT"
-CYCLES_CLOCKS = "auto, start or an offset with iso: each cycle is put beside one reference"
 NO_ALIGNMENT = "none with a diagnosis: base and tool are possible causes"
 
 Made = TypeVar("Made")
@@ -107,8 +103,6 @@ class CompareOptions:
         diagnose: Whether the causes of each deviation are searched for. Base and tool are causes then: no
             alignment may be given, and only a log that was measured in a separate frame, whose base and tool
             are always unknown, is moved first.
-        iso: How the logs are evaluated as the cycles of a test after ISO 9283, whose criteria the tolerance
-            is for; None: each log is judged alone.
         defaults: Options that a file set, for the line of the verdict: "sync=auto from ../urmpipe.toml".
     """
 
@@ -118,26 +112,14 @@ class CompareOptions:
     align: AlignMode = "none"
     from_text: bool = False
     diagnose: bool = False
-    iso: IsoOptions | None = None
     defaults: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.iso is not None:
-            errors = []
-            if self.align != "none":
-                errors.append(Finding(parameter="align", found=self.align, allowed=NO_ALIGNMENT_ISO))
-            if self.sync == "stamps":
-                errors.append(Finding(parameter="sync", found=self.sync, allowed=CYCLES_CLOCKS))
-            if self.diagnose:
-                errors.append(Finding(parameter="diagnose", found="with iso", allowed="one of the two"))
-            if errors:
-                raise OptionError(*errors)
-        check_tolerance(self.tolerance, iso=self.iso is not None)
+        check_tolerance(self.tolerance)
         check_choice("tcp", self.tcp, get_args(Tcp))
         check_sync(self.sync)
         check_choice("align", self.align, get_args(AlignMode))
-        if self.iso is None:  # of a test the criteria are judged, and of each cycle the shares
-            object.__setattr__(self, "tolerance", complete_tolerance(self.tolerance))
+        object.__setattr__(self, "tolerance", complete_tolerance(self.tolerance))
 
 
 def tcp_trajectory(run: Run, tcp: Tcp = "fk", *, joints_alone: bool = False) -> Trajectory:
@@ -181,31 +163,11 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     options = options or CompareOptions()
     if not runs:
         raise OptionError("compare: no log to compare with the reference; at least one is needed")
-    if options.iso is None or len(runs) > 1:
-        _check_static_poses(reference, runs, options)
-    options = _join_frames([(run, _is_recorded(run, options.tcp)) for run in (reference, *runs)], options)
-    alone = _compares_joints_alone((reference, *runs), options)
-    runs = [reference, *runs]
-    names = text.make_unique([run.name for run in runs])  # warnings name their log
-    runs = [
-        run if run.name == name else replace(run, name=name) for name, run in zip(names, runs, strict=True)
-    ]
-    reference_side, *sides = (
-        Side(run, tcp_trajectory(run, options.tcp, joints_alone=alone), not _is_recorded(run, options.tcp))
-        for run in runs
-    )
-    reference, *runs = runs
+    check_static_poses(reference, runs, options)
+    (reference_side, *sides), options = prepare_sides((reference, *runs), options)
+    reference, runs = reference_side.run, [side.run for side in sides]
     warnings = [warning.of(reference.name) for warning in reference.warnings]
     same = [warning for side in sides for warning in same_data(reference_side, side)]
-    if options.iso is not None:
-        sync = "start" if options.sync is None else options.sync
-        cycles = evaluate_test(reference_side, sides, options.iso, sync, options.tolerance)
-        own = [warning.of(runs[0].name) for warning in runs[0].warnings] if len(runs) == 1 else []
-        warnings = [*own, *warnings, *cycles.warnings, *same]  # the cycles are parts of a single log
-        assumed = _assumptions(reference, runs, options)
-        result = _build_comparison(cycles.command, cycles.deviations, options, warnings, assumed)
-        log = f"{runs[0].name}-" if len(runs) == 1 else ""
-        return replace(result, name=f"{log}against-{reference.name}", iso=cycles.test)
     deviations = map_collecting_errors(lambda side: _deviation(reference_side, side, options), sides)
     warnings += [*swapped_operands(reference, runs), *same]
     for side, deviation in zip(sides, deviations, strict=True):
@@ -223,8 +185,26 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
             for run, deviation in zip(runs, deviations, strict=True):
                 if deviation.worst_statistics.verdict == "fail":
                     warnings += [hint.of(run.name) for hint in missing_tool_warning(run.robot, run.log)]
-    assumed = _assumptions(reference, runs, options)
-    return _build_comparison(reference_side.trajectory, deviations, options, warnings, assumed)
+    assumptions = find_assumptions((reference, *runs), options)
+    return _build_comparison(reference_side.trajectory, deviations, options, warnings, assumptions)
+
+
+def prepare_sides(runs: Sequence[Run], options: CompareOptions) -> tuple[list[Side], CompareOptions]:
+    """Return the sides of a comparison, the reference first, and options that join their frames.
+
+    No two sides have the same name, so that a warning names its log.
+
+    Raises:
+        LogError: If a run has no positions to compare, or nothing joins frames that differ.
+    """
+    options = _join_frames([(run, _is_recorded(run, options.tcp)) for run in runs], options)
+    alone = _compares_joints_alone(runs, options)
+    sides = []
+    for name, run in zip(text.make_unique([run.name for run in runs]), runs, strict=True):
+        named = run if run.name == name else replace(run, name=name)
+        trajectory = tcp_trajectory(named, options.tcp, joints_alone=alone)
+        sides.append(Side(named, trajectory, not _is_recorded(run, options.tcp)))
+    return sides, options
 
 
 def _compares_joints_alone(runs: Sequence[Run], options: CompareOptions) -> bool:
@@ -242,14 +222,14 @@ def _compares_joints_alone(runs: Sequence[Run], options: CompareOptions) -> bool
     raise LogError(*dict.fromkeys(kinematics_missing(run, *hints) for run in without))
 
 
-def _assumptions(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:
-    """Return what a verdict assumes of runs and the reference.
+def find_assumptions(runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:
+    """Return what a verdict assumes of the reference and the logs.
 
     Raises:
         LogError: With each reading that needs an answer first.
     """
     sides = []
-    for run in (reference, *runs):
+    for run in runs:
         by_joints = bool(run.log.joints) and options.tcp == "fk"
         roles: set[Role] = {"joint"} if by_joints or "joint" in options.tolerance else set()
         sides.append(
@@ -268,7 +248,7 @@ def _recorded_roles(options: CompareOptions, *oriented: AlignMode) -> set[Role]:
     return {"position", "rotation"} if use_orientations else {"position"}
 
 
-def _check_static_poses(reference: Run, runs: Sequence[Run], options: CompareOptions) -> None:
+def check_static_poses(reference: Run, runs: Sequence[Run], options: CompareOptions) -> None:
     """Raise if static poses are compared with a motion, or with more or fewer poses.
 
     They are compared row by row; any other offset would interpolate between them.
@@ -284,7 +264,7 @@ def _check_static_poses(reference: Run, runs: Sequence[Run], options: CompareOpt
         raise LogError(
             *(run_finding(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in unequal)
         )
-    if options.sync not in (None, "start") and not (options.iso and options.sync == "auto"):
+    if options.sync not in (None, "start"):
         found = f"{options.sync} of still poses"
         raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
 
@@ -371,12 +351,11 @@ def _build_comparison(
     deviations: Sequence[Deviation],
     options: CompareOptions,
     warnings: Sequence[LogWarning],
-    assumed: tuple[str, ...],
+    assumptions: tuple[str, ...],
 ) -> Comparison:
-    warnings = [*warnings]
-    if not options.from_text:
-        warnings[:0] = large_tolerances(deviation_tolerances(options.tolerance))
-    for deviation in deviations if options.iso is None else ():
+    large = [] if options.from_text else large_tolerances(deviation_tolerances(options.tolerance))
+    warnings = [*large, *warnings]
+    for deviation in deviations:
         run = deviation.run
         warnings += sync_warnings(deviation.name, deviation.sync, run.tsp)
         warnings += left_out_warnings(deviation, reference)
@@ -384,28 +363,52 @@ def _build_comparison(
         if reference.joints and run.log.joints and deviation.joint_delta is None:
             message = f"no joint is compared: {joints_not_compared(reference, run)}"
             warnings.append(LogWarning("joints-not-compared", message, about=deviation.name))
-    runs = [deviation.run for deviation in deviations]
-    # A recording has the names of mesh files only.
-    lost_meshes = dict.fromkeys(w for run in runs if run.robot for w in mesh_warnings(run.robot))
-    warnings += [w for w in lost_meshes if not any(w in run.warnings for run in runs)]
-    inputs = [*reference.files, *(file for run in runs for file in run.log.files)]
-    settings = {name: getattr(options, name) for name in ("tolerance", "tcp", "sync", "align")}
-    settings["tolerance"] = dict(options.tolerance)
+    settings = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
     if options.sync is None and not any(deviation.sync.mode == "stamps" for deviation in deviations):
         settings["sync"] = "start"
     settings |= {"diagnose": True} if options.diagnose else {}
-    if options.iso is not None:
-        test = {name: getattr(options.iso, name) for name in ("cycles", "planes", "band")}
-        settings |= {"iso": True, **test}
-    name = f"{deviations[0].name}-" if len(deviations) == 1 else ""
+    log = f"{deviations[0].name}-" if len(deviations) == 1 else ""
+    return build_comparison(
+        f"{log}against-{reference.name}", reference, deviations, warnings, assumptions,
+        options.tolerance, settings, options.defaults,
+    )  # fmt: skip
+
+
+def build_comparison(
+    name: str,
+    reference: Trajectory,
+    deviations: Sequence[Deviation],
+    warnings: Sequence[LogWarning],
+    assumptions: tuple[str, ...],
+    tolerance: Mapping[str, float],
+    settings: Mapping[str, object],
+    defaults: tuple[str, ...],
+) -> Comparison:
+    """Return a comparison with its provenance, and warnings about meshes that cannot be drawn any more.
+
+    Args:
+        name: Its name.
+        reference: The reference.
+        deviations: The deviation of each log, or of each cycle of a test.
+        warnings: Warnings about it.
+        assumptions: What its verdict assumes.
+        tolerance: The tolerance, by kind or criterion.
+        settings: The other options that repeat it, by name.
+        defaults: Options that a file set.
+    """
+    runs = [deviation.run for deviation in deviations]
+    # A recording has the names of mesh files only.
+    lost_meshes = dict.fromkeys(w for run in runs if run.robot for w in mesh_warnings(run.robot))
+    lost = [w for w in lost_meshes if not any(w in run.warnings for run in runs)]
+    inputs = [*reference.files, *(file for run in runs for file in run.log.files)]
     return Comparison(
-        f"{name}against-{reference.name}",
+        name,
         reference,
         tuple(deviations),
-        dict(options.tolerance),
-        tuple(warnings),
-        build_provenance("compare", settings, inputs, options.defaults),
-        assumptions=assumed,
+        dict(tolerance),
+        (*warnings, *lost),
+        build_provenance("compare", {"tolerance": dict(tolerance), **settings}, inputs, defaults),
+        assumptions=assumptions,
         on_rows=True,
     )
 

@@ -1,5 +1,7 @@
 """Evaluate logs as the cycles of a test after ISO 9283.
 
+`measure_iso` compares logs with a reference as `compare.compare_runs` does, with these differences:
+
 1. Cycles: one log each, or the parts of one log in which the motion repeats. If the reference repeats it as
    well, its first cycle is the command.
 2. A cycle that does not follow the reference, or shows too little of it, is a failed cycle; the criteria
@@ -11,22 +13,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, get_args
 
 import numpy as np
 
 from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, check_choice
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.compare import (
+    CompareOptions,
+    Tcp,
+    build_comparison,
+    check_static_poses,
+    find_assumptions,
+    prepare_sides,
+)
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.measure import measure, measure_shares
 from urmpipe_pipeline.comparison.path_distance import distance_from_path
-from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.verdict import MIN_SHARES, deviation_tolerances
+from urmpipe_pipeline.comparison.sync import SyncOption, check_sync
+from urmpipe_pipeline.comparison.verdict import MIN_SHARES, check_tolerance, deviation_tolerances
+from urmpipe_pipeline.comparison.warnings import large_tolerances, same_data
 from urmpipe_pipeline.comparison.wording import share_words
-from urmpipe_pipeline.iso9283.command_path import Planes
+from urmpipe_pipeline.iso9283.command_path import Planes, RoundedCorner, Stop
 from urmpipe_pipeline.iso9283.criteria import euler_angles, min_cycles
 from urmpipe_pipeline.iso9283.cycles import (
     FoundCycles,
@@ -37,7 +49,6 @@ from urmpipe_pipeline.iso9283.cycles import (
 )
 from urmpipe_pipeline.iso9283.evaluate import (
     CommandStations,
-    IsoOptions,
     MatchedCycle,
     command_to_stations,
     evaluate_cycles,
@@ -49,7 +60,7 @@ from urmpipe_pipeline.iso9283.result import Cycle, FailedCycle, IsoTest
 from urmpipe_pipeline.iso9283.tables import format_failed_cycle
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR
-from urmpipe_pipeline.runs.run import slice_run
+from urmpipe_pipeline.runs.run import Run, slice_run
 from urmpipe_pipeline.trajectories import Side, Sync, Trajectory, match, reference_rows, run_finding
 
 FAILED = "failed-cycle"
@@ -62,22 +73,61 @@ NO_RESTS = "no-rests"
 
 MAX_RY = np.radians(85.0)  # rad; beyond it rz and rx are known twelve times worse than the orientation
 STANDARD_CYCLES = {"poses": 30, "paths": 10}  # of ISO 9283
+MAX_PLANES = 10_000  # more are closer together than the rows of any cycle, and each is sought in every cycle
+CLOCKS = "auto, start or an offset with iso: each cycle is put beside one reference"  # plain: ok
 
 
-class EvaluatedCycles(NamedTuple):
-    """The cycles of a test, and its result.
+@dataclass(frozen=True, slots=True, eq=False)
+class IsoOptions:
+    """How a test after ISO 9283 is evaluated.
 
     Attributes:
-        command: The reference, once.
-        deviations: The deviation of each cycle from the reference at the same times.
-        test: The criteria.
-        warnings: The warnings of the test.
+        tolerance: Largest absolute values allowed, by criterion; least shares of a cycle, 0..1. Other
+            criteria have no tolerance.
+        tcp: Which tool centre point: by forward kinematics of the joints, or as recorded.
+        sync: How the clock of each cycle is aligned: auto (by the planes that both cross), start (both start
+            together), or the offset in [s]: t_reference = t_cycle + offset, both from their first samples.
+        cycles: First and last row of each cycle of one log, from 1; None: found by its returns to the start.
+        planes: Number of planes that cut the command path.
+        band: Half of the width of the band around a final pose in [m].
+        targets: Poses to judge; None: those in which the reference rests.
+        corners: Corners that the reference is known to round.
+        stops: Where the reference is known to stop, even if only for a moment.
+        from_text: Whether the tolerance was read from a text, in which a large value has its unit.
+        defaults: Options that a file set, for the line of the verdict: "sync=auto from ../urmpipe.toml".
+
+    Raises:
+        OptionError: If an option is out of its range.
     """
 
-    command: Trajectory
-    deviations: tuple[Deviation, ...]
-    test: IsoTest
-    warnings: tuple[LogWarning, ...]
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    tcp: Tcp = "fk"
+    sync: SyncOption = "start"
+    cycles: tuple[tuple[int, int], ...] | None = None
+    planes: int = 50
+    band: float = 1e-4
+    targets: Poses | None = None
+    corners: tuple[RoundedCorner, ...] = ()
+    stops: tuple[Stop, ...] = ()
+    from_text: bool = False
+    defaults: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        findings = []
+        if not 1 <= self.planes <= MAX_PLANES:
+            allowed = "1 or more" if self.planes < 1 else f"{MAX_PLANES} at most"
+            findings.append(Finding(parameter="planes", found=str(self.planes), allowed=allowed))
+        if not 0.0 < self.band < np.inf:
+            findings.append(
+                Finding(parameter="band", found=f"{self.band:g}", allowed="a positive length in m")
+            )
+        if self.sync == "stamps":
+            findings.append(Finding(parameter="sync", found=self.sync, allowed=CLOCKS))
+        if findings:
+            raise OptionError(*findings)
+        check_tolerance(self.tolerance, iso=True)
+        check_choice("tcp", self.tcp, get_args(Tcp))
+        check_sync(self.sync)
 
 
 class _Candidate(NamedTuple):
@@ -97,33 +147,62 @@ class _Kept(NamedTuple):
     shares: dict[str, Share]
 
 
-def evaluate_test(
-    reference: Side,
-    logs: Sequence[Side],
-    options: IsoOptions,
-    sync: SyncOption,
-    tolerance: Mapping[str, float],
-) -> EvaluatedCycles:
+def measure_iso(reference: Run, runs: Sequence[Run], options: IsoOptions | None = None) -> Comparison:
     """Evaluate a test after ISO 9283: n logs, or one in which the motion repeats.
 
     Args:
-        reference: The reference.
-        logs: The logs, at least one.
+        reference: The commanded motion: a path, or a run.
+        runs: The logs, at least one.
         options: How they are evaluated.
-        sync: How each cycle's clock is aligned with the reference's; auto: by the planes that both cross.
-        tolerance: Largest absolute values allowed, by criterion; least shares of a cycle, 0..1.
+
+    Returns:
+        The comparison of the cycles that follow the reference; its `iso` has the criteria.
 
     Raises:
         LogError: If no cycle follows the reference, or a criterion with a tolerance has no value, however
-            many cycles there are.
+            many cycles there are; and as of `compare_runs`.
         OptionError: If rows are given for the cycles of several logs, or are wrong.
+
+    Source: [Iso9283]_ section 7.
     """
+    options = options or IsoOptions()
+    if not runs:
+        raise OptionError("compare: no log to compare with the reference; at least one is needed")
+    compared = CompareOptions(tcp=options.tcp, sync=None if options.sync == "auto" else options.sync)
+    if len(runs) > 1:
+        check_static_poses(reference, runs, compared)
+    (command, *logs), compared = prepare_sides((reference, *runs), compared)
+    same = [warning for log in logs for warning in same_data(command, log)]
+    warnings: list[LogWarning] = []
+    if not options.from_text:
+        warnings += large_tolerances(deviation_tolerances(options.tolerance))
+    if len(logs) == 1:  # the cycles are parts of it
+        warnings += [warning.of(logs[0].run.name) for warning in logs[0].run.warnings]
+    warnings += [warning.of(command.run.name) for warning in command.run.warnings]
+    trajectory, deviations, test, of_test = _evaluate(command, logs, options)
+    assumptions = find_assumptions([side.run for side in (command, *logs)], compared)
+    settings = {
+        "tcp": options.tcp, "sync": options.sync, "align": "none", "iso": True,
+        "cycles": options.cycles, "planes": options.planes, "band": options.band,
+    }  # fmt: skip
+    log_name = f"{logs[0].run.name}-" if len(logs) == 1 else ""
+    result = build_comparison(
+        f"{log_name}against-{command.run.name}", trajectory, deviations, [*warnings, *of_test, *same],
+        assumptions, options.tolerance, settings, options.defaults,
+    )  # fmt: skip
+    return replace(result, iso=test)
+
+
+def _evaluate(
+    reference: Side, logs: Sequence[Side], options: IsoOptions
+) -> tuple[Trajectory, tuple[Deviation, ...], IsoTest, list[LogWarning]]:
+    """Return the command of each cycle, the deviations of the cycles, the test, and its warnings."""
     reference, rows = _first_cycle(reference) if len(logs) == 1 else (reference, None)
     command = _build_motion(reference)
     candidates, warnings = _find_candidates(command, logs, options)
-    stations = command_to_stations(command, options)
-    least_shares = {name: tolerance.get(name, share) for name, share in MIN_SHARES.items()}
-    tolerance = deviation_tolerances(tolerance)
+    stations = command_to_stations(command, options.targets, options.corners, options.stops, options.planes)
+    least_shares = {name: options.tolerance.get(name, share) for name, share in MIN_SHARES.items()}
+    tolerance = deviation_tolerances(options.tolerance)
     kept, failed = _match_cycles(command, stations, candidates, reference, least_shares)
     if not kept and stations.path is not None and len(stations.poses) and options.targets is None:
         stations = stations._replace(poses=Poses(np.empty((0, 3)), None))
@@ -140,7 +219,7 @@ def evaluate_test(
     criteria, poses, path = evaluate_cycles(
         stations, [cycle.matched for cycle in kept], options.band, tolerance
     )
-    clocks = [_align_clock(sync, cycle.matched, reference.run.timed) for cycle in kept]
+    clocks = [_align_clock(options.sync, cycle.matched, reference.run.timed) for cycle in kept]
     cycles = []
     for (candidate, _, _), clock in zip(kept, clocks, strict=True):
         offset = clock.offset if candidate.motion.timed else None
@@ -158,7 +237,7 @@ def evaluate_test(
         *_noise_warnings(motions, test),
         *_angle_warnings(command, motions, test),
     ]
-    return EvaluatedCycles(reference.trajectory, deviations, test, tuple(warnings))
+    return reference.trajectory, deviations, test, warnings
 
 
 def _first_cycle(reference: Side) -> tuple[Side, tuple[int, int] | None]:

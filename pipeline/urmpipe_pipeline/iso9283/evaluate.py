@@ -10,14 +10,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, OptionError
 from urmpipe_pipeline.iso9283.command_path import (
     CommandPath,
     Crossings,
@@ -49,43 +47,6 @@ from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath
 
 DRAWN_SPEEDS = 1000  # points along the path at which speeds are drawn
 PLANE_DISTANCE = 1e-9  # m: planes that are nearer to each other are one
-MAX_PLANES = 10_000  # more are closer together than the rows of any cycle, and each is sought in every cycle
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class IsoOptions:
-    """How a test after ISO 9283 is evaluated.
-
-    Attributes:
-        cycles: First and last row of each cycle of one log, from 1; None: found by its returns to the start.
-        planes: Number of planes that cut the command path.
-        band: Half of the width of the band around a final pose in [m].
-        targets: Poses to judge; None: those in which the reference rests.
-        bends: Corners that the reference is known to round.
-        stops: Where the reference is known to stop, even if only for a moment.
-
-    Raises:
-        OptionError: If the number of planes or the band is out of range.
-    """
-
-    cycles: tuple[tuple[int, int], ...] | None = None
-    planes: int = 50
-    band: float = 1e-4
-    targets: Poses | None = None
-    bends: tuple[RoundedCorner, ...] = ()
-    stops: tuple[Stop, ...] = ()
-
-    def __post_init__(self) -> None:
-        findings = []
-        if not 1 <= self.planes <= MAX_PLANES:
-            allowed = "1 or more" if self.planes < 1 else f"{MAX_PLANES} at most"
-            findings.append(Finding(parameter="planes", found=str(self.planes), allowed=allowed))
-        if not 0.0 < self.band < np.inf:
-            findings.append(
-                Finding(parameter="band", found=f"{self.band:g}", allowed="a positive length in m")
-            )
-        if findings:
-            raise OptionError(*findings)
 
 
 class CommandStations(NamedTuple):
@@ -134,24 +95,38 @@ class Evaluation(NamedTuple):
     path: CutPath | None
 
 
-def command_to_stations(command: Motion, options: IsoOptions) -> CommandStations:
-    """Return the poses of a command, and the planes that cut its path."""
-    poses = options.targets or command_poses(command, options.stops)
+def command_to_stations(
+    command: Motion,
+    targets: Poses | None,
+    corners: Sequence[RoundedCorner],
+    stops: Sequence[Stop],
+    planes: int,
+) -> CommandStations:
+    """Return the poses of a command, and the planes that cut its path.
+
+    Args:
+        command: The commanded motion.
+        targets: Poses to judge; None: those in which the command rests.
+        corners: Corners that it is known to round.
+        stops: Where it is known to stop, even if only for a moment.
+        planes: Number of planes that cut its path.
+    """
+    poses = targets or command_poses(command, stops)
     points = np.vstack((command.position, poses.position))
     reach = SAME_PATH * float(np.ptp(points, axis=0).max(initial=0.0))
     if not command.timed or bool(command.is_resting.all()):
         return CommandStations(poses, reach if len(poses) > 1 else np.inf)
-    path = CommandPath(command, options.bends)
-    even = path.even_planes(options.planes)
+    path = CommandPath(command, corners)
+    even = path.even_planes(planes)
     anchors = [corner.anchors for corner in path.corners]
     s = np.concatenate([even.s, *anchors, *([leg.start, leg.end] for leg in path.legs)])
-    planes = path.planes_at(s)
+    cut = path.planes_at(s)
     firsts = len(even.s) + np.cumsum([0, *map(len, anchors)])
     for corner, first in zip(path.corners, firsts.tolist(), strict=False):
         if len(corner.anchors) == 3:  # the plane in the middle bisects the corner
             bisector = corner.before + corner.after
-            planes.normal[first + 1] = bisector / np.linalg.norm(bisector)
-            planes.point[first + 1] = corner.point
+            cut.normal[first + 1] = bisector / np.linalg.norm(bisector)
+            cut.point[first + 1] = corner.point
     order = np.argsort(s, kind="stable")
     is_new = np.diff(s[order], prepend=-1.0) > PLANE_DISTANCE  # planes at one place are crossed at one time
     numbers = np.empty(len(s), np.int64)
@@ -161,7 +136,7 @@ def command_to_stations(command: Motion, options: IsoOptions) -> CommandStations
         poses,
         reach,
         path,
-        Planes(*(values[kept] for values in planes)),
+        Planes(*(values[kept] for values in cut)),
         tuple(at[: len(even.s)]),
         tuple(tuple(at[a:b]) for a, b in pairwise(firsts.tolist())),
         tuple((at[k], at[k + 1]) for k in range(firsts[-1], len(s), 2)),

@@ -15,9 +15,8 @@ from asserting import there
 from made_runs import path_run
 from repeated import along, curve, eight, evaluated, judged, logs, repeated, still, told, value, written
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.iso9283.evaluate import IsoOptions
+from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.results import present, read_recording
 
 START = np.array([0.1, 0.1, 0.4])  # m
@@ -142,8 +141,8 @@ DISTURBANCES: dict[str, Callable[[FloatArray], FloatArray]] = {
 
 
 def compared(log: FloatArray, tolerance: dict[str, float] = TOLERANCE, **options: object) -> Comparison:
-    chosen = CompareOptions(tolerance, iso=IsoOptions(**options))  # type: ignore[arg-type]
-    return compare_runs(path_run(once(), tsp=TICK), [path_run(log, name="log", tsp=TICK)], chosen)
+    chosen = IsoOptions(tolerance, **options)  # type: ignore[arg-type]
+    return measure_iso(path_run(once(), tsp=TICK), [path_run(log, name="log", tsp=TICK)], chosen)
 
 
 def way(first: FloatArray, last: FloatArray) -> FloatArray:

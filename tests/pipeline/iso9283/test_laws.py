@@ -15,9 +15,8 @@ from made_runs import path_run
 from repeated import TICK, along, overall, still, told, value, values_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import to_matrices, to_quaternions
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.iso9283.criteria import UNITS, repeatability
-from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.runs.run import Run
 
@@ -86,8 +85,7 @@ def evaluated(reference: FloatArray, *cycles: FloatArray, planes: int = 20) -> I
         return path_run(rows[:, :3], rows[:, 3:] if rows.shape[1] > 3 else None, name=name, tsp=TICK)
 
     runs = [run(cycle, f"cycle{k}") for k, cycle in enumerate(cycles)]
-    options = CompareOptions({}, iso=IsoOptions(planes=planes))
-    return there(compare_runs(run(reference, "command"), runs, options).iso)
+    return there(measure_iso(run(reference, "command"), runs, IsoOptions(planes=planes)).iso)
 
 
 def moved(rotation: FloatArray, shift: Sequence[float]) -> IsoTest:

@@ -16,11 +16,10 @@ from made_runs import path_run
 from presented import cells, every_section, facts, scene_of
 from repeated import along, evaluated, still
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.exports import exports
+from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.iso9283.criteria import judge_criterion
-from urmpipe_pipeline.iso9283.evaluate import IsoOptions
 from urmpipe_pipeline.iso9283.tables import format_tolerance, sort_worst_first, to_value
 from urmpipe_pipeline.presentation.section import Presentation, Table
 from urmpipe_pipeline.report.render import render_report
@@ -36,7 +35,7 @@ def repetition(
     path = along(SQUARE, 0.2, rests=(2,)) if path is None else path
     rng = np.random.default_rng(7)
     runs = [path_run(path + 1e-4 + rng.normal(0.0, 1e-4, 3), name=f"cycle{k}") for k in range(count)]
-    return compare_runs(path_run(path), runs, CompareOptions(dict(tolerance or {}), iso=IsoOptions()))
+    return measure_iso(path_run(path), runs, IsoOptions(tolerance or {}))
 
 
 def table(shown: Presentation, title: str) -> Table:

@@ -17,9 +17,8 @@ from presented import scene_of
 from recorded import entities, static, times_of
 from repeated import along, late
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.iso9283.evaluate import IsoOptions
+from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.iso9283.figures import (
     FACTORS,
     MAX_DISPLAYED,
@@ -52,7 +51,7 @@ def result() -> Comparison:
     rng, done = np.random.default_rng(7), late(path, 3)
     runs = [path_run(done + 1e-4 + rng.normal(0.0, 1e-4, 3), name=f"c{k}") for k in range(CYCLES)]
     allowed = {"AT": 1e-3, "RT": 5e-3}
-    return compare_runs(path_run(path), runs, CompareOptions(allowed, iso=IsoOptions(planes=40)))
+    return measure_iso(path_run(path), runs, IsoOptions(allowed, planes=40))
 
 
 @pytest.fixture(scope="module")
@@ -278,6 +277,6 @@ def test_the_arm_of_one_cycle_stands_in_the_scene() -> None:
     q = np.column_stack([0.3 * np.sin(t + k) for k in range(6)])
     rng = np.random.default_rng(1)
     runs = [run_of(q + rng.normal(0.0, 1e-4, 6), URM6, name=f"c{k}") for k in range(3)]
-    result = compare_runs(run_of(q, name="wanted"), runs, CompareOptions({}, iso=IsoOptions()))
+    result = measure_iso(run_of(q, name="wanted"), runs)
     (arm,) = scene_of(present(result)).arms
     assert arm.chain == URM6 and arm.t_ns is not None and arm.t_ns[0] == 0
