@@ -169,6 +169,27 @@ def test_what_cannot_be_diagnosed_is_refused(arguments: list[str], said: str, ca
 
 
 @pytest.mark.slow
+def test_a_finished_comparison_is_diagnosed_as_its_logs_are(capsys: Captured) -> None:
+    logs = [RIGHT, WRONG]
+    wanted = [one.diagnosis.to_dict() for one in urmpipe.diagnose(PATH, logs, "urm6").runs if one.diagnosis]
+    compared = urmpipe.compare(PATH, logs, "urm6", output="made.rrd")
+    for finished in (compared, "made.rrd"):
+        made = urmpipe.diagnose(finished)
+        assert isinstance(made, Comparison)
+        assert [one.diagnosis.to_dict() for one in made.runs if one.diagnosis] == wanted
+        assert made.verdict == compared.verdict
+    two = [urmpipe.ingest(name, "urm6") for name in logs]  # the reference has joints
+    (one,), (other,) = urmpipe.diagnose(two[0], [two[1]]).runs, urmpipe.diagnose(urmpipe.compare(*two)).runs
+    assert there(one.diagnosis).to_dict() == there(other.diagnosis).to_dict()
+    capsys.readouterr()
+    assert run(["diagnose", "made.rrd", "-q", "-o", "why.rrd", "--junit", "why.xml"]) == 1
+    assert capsys.readouterr().err.startswith("FAIL  1 of 2 logs (counter_rotating) out of tolerance")
+    assert "module 3 (phi3) counter-rotates" in Path("why.xml").read_text("utf-8")
+    assert run(["diagnose", "made.rrd", "--tolerance", "1mm"]) == 2
+    assert "--tolerance: found with the recording of a comparison (made.rrd)" in capsys.readouterr().err
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("operands", [[PATH, "made.rrd"]])
 def test_the_recording_of_a_comparison_is_no_log(operands: list[str], capsys: Captured) -> None:
     run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])

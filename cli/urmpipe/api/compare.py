@@ -100,6 +100,7 @@ def run_comparison(
     values: Mapping[str, Any],
     judge: Callable[[object, ReadOptions], CompareOptions | IsoOptions],
     judged: Sequence[Hint] = (BASELINE_HINT,),
+    finished: Comparison | None = None,
 ) -> Comparison:
     """Return a comparison, and write what is named: all or none.
 
@@ -110,6 +111,7 @@ def run_comparison(
         values: Values of the parameters of `compare`, `iso` or `diagnose`.
         judge: Returns how the logs are judged, of the reference and of how logs are read.
         judged: Where the recording of a comparison, which is not a log, can be given.
+        finished: The comparison to write, where it is made already.
     """
     several = as_list(logs)
     operands = normalise_operands(
@@ -145,7 +147,9 @@ def run_comparison(
             _raise_warnings(values["strict"], comparison)
             return comparison
 
-        ready = None if operands[1:] or earlier is None else _load_made(reference, values["output"])
+        ready = finished
+        if ready is None and earlier is not None and not operands[1:]:
+            ready = _load_made(reference, values["output"])
         failed: list[FailedLog] | None = [] if values.get("keep_going") else None
         result = checked(ready) if ready else _compare(operands, load, options, checked, failed)
         if earlier is not None:

@@ -94,8 +94,13 @@ def iter_lines(recording: Path | None, is_replaced: bool, options: Mapping[str, 
     yield recording_line(recording, is_replaced)
 
 
-def load_finished(call: Call, reference: Path) -> Any:
+def load_finished(call: Call, reference: Path, *also: str) -> Any:
     """Return the comparison that the reference is the recording of; None if it is anything else.
+
+    Args:
+        call: The call.
+        reference: The reference.
+        also: Options that apply to a finished comparison, in addition to those of each command.
 
     Raises:
         UsageError: If options were given that say how a comparison is made.
@@ -103,7 +108,7 @@ def load_finished(call: Call, reference: Path) -> Any:
     from urmpipe_pipeline.operands import load_comparison
 
     comparison = load_comparison(reference)
-    options = call.given(lambda name: name not in OF_RESULTS)
+    options = call.given(lambda name: name not in OF_RESULTS and name not in also)
     if comparison is not None and options:
         raise click.UsageError(
             f"{', '.join(options)}: found with the recording of a comparison ({reference}), which stands as"

@@ -9,7 +9,7 @@ from typing import Any
 import urmpipe
 from urmpipe.answers import Answer, Call, command, default_output
 from urmpipe.command_line import operand
-from urmpipe.commands.compare import iter_lines
+from urmpipe.commands.compare import iter_lines, load_finished
 from urmpipe.parameters import kinds
 from urmpipe.parameters.comparing import Diagnose
 from urmpipe.parameters.shared import ROBOT
@@ -27,6 +27,7 @@ def diagnose(
     scales, lengths and angles of the arm, base and tool, unit of the path, clock, a different arm. It also
     names the causes that this data cannot distinguish. REFERENCE, LOGs, verdict and exit code are those
     of compare; with REFERENCE alone, the log is compared with the tool centre point (TCP) that it recorded.
+    REFERENCE alone may be the recording of a comparison, whose logs are diagnosed as they were compared.
 
     \b
     Examples:
@@ -34,11 +35,13 @@ def diagnose(
       urmpipe diagnose robot_data.csv --robot ur5e
       urmpipe diagnose rtde.csv --sides target,actual --robot ur5e
       urmpipe diagnose path.csv a.csv b.csv --robot urm6 --junit v.xml
+      urmpipe diagnose log-against-path.rrd
       urmpipe diagnose path.csv log.csv --robot urm6 --json
 
     Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
     """
     options = call.without_log_options((reference, *logs), options)
+    finished = None if logs else load_finished(call, reference, "output")
     if not options["baseline"] and not call.given("noise".__eq__):
         options["noise"] = None  # urmpipe.toml sets it for the calls with a baseline
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
@@ -48,7 +51,7 @@ def diagnose(
     operands = logs[0] if len(logs) == 1 else list(logs)
     with call.progress(f"Writing {output}") as progress:
         result = urmpipe.diagnose(
-            reference, operands or None, output=output, defaults=defaults,
+            finished or reference, operands or None, output=output, defaults=defaults,
             progress=progress, **options,
         )  # fmt: skip
     comparison = getattr(result, "comparison", None) or result
