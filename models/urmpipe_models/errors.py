@@ -421,7 +421,7 @@ MAX_COMPARED_LENGTH = 200  # longer names are not compared: the time grows with 
 def check_choice(parameter: str, value: str, allowed: Sequence[str]) -> None:
     """Raise an `OptionError` if the value of a parameter is not one of the allowed words."""
     if value not in allowed:
-        raise OptionError(Finding(parameter=parameter, found=value, allowed=", ".join(allowed)))
+        raise OptionError(Finding(parameter=parameter, found=value, allowed=", ".join(allowed)))  # plain: ok
 
 
 def format_suggestion(name: str, allowed: Iterable[str]) -> str:

@@ -85,7 +85,7 @@ def ingest_log(
         allowed = f"a positive time below {MAX_TSP:g} s"
         if 0 < tsp < MIN_TSP:
             allowed = f"{MIN_TSP:g} s or more: times are in ns"
-        raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
+        raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))  # plain: ok
     if derivative is not None:
         check_choice("derivative", derivative, get_args(Method))
     numbers = read_numbers(files, options, robot)
