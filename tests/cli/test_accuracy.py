@@ -1,4 +1,4 @@
-"""`urmpipe accuracy`: the running speed is looked for from below; what makes no sense is told."""
+"""`urmpipe accuracy`: the running speed, the command and the call; accuracy.cases has its errors."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from urmpipe.main import run
 from urmpipe_models.planning.path import cube_rows
 
 Captured = pytest.CaptureFixture[str]
-
-CUBE = ("--path", "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1")
 
 
 def runs(good: Callable[[float], bool]) -> tuple[list[float], Within]:
@@ -48,61 +46,6 @@ def test_the_first_velocity_that_fails_bounds_it() -> None:
 @pytest.mark.parametrize(("good", "speed"), [(True, 10.0), (False, None)])
 def test_all_or_none_within(good: bool, speed: float | None) -> None:
     assert running_speed(runs(lambda _: good)[1], [0.1, 1.0]) == speed
-
-
-SPEED = "allowed: a speed in m/s, such as 0.25 or 250mm/s"
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (
-            ["--velocities", "0,-1"],
-            "velocities (--velocities): found 0.0, -1.0, allowed: finite numbers of m/s"
-            " above 0",
-        ),
-        (["--velocities", "nan"], f"velocities (--velocities): found 'nan', {SPEED}"),
-        (["--velocities", "abc"], f"velocities (--velocities): found 'abc', {SPEED}"),
-        (
-            ["--limit", "0"],
-            "limit (--limit): found '0', allowed: a positive length in m, such as 0.0004 or"
-            " 0.4mm",
-        ),
-        (
-            ["--force", "1,2"],
-            "force (--force): found '1,2', allowed: three finite numbers of N, such as"
-            " 0,0,-50",
-        ),
-        (
-            ["--law", "limit"],
-            "law (--law): found 'limit' (did you mean limits?), allowed: trapezoid, jerk,"
-            " limits",
-        ),
-    ],
-)  # fmt: skip
-def test_values_that_are_refused(capsys: Captured, options: list[str], said: str) -> None:
-    assert run(["accuracy", "--robot", "irb60", *CUBE, *options]) == 2
-    assert capsys.readouterr().err == f"error: {said}\n"
-
-
-def test_path_and_robot_are_asked_for(capsys: Captured) -> None:
-    assert run(["accuracy", "--robot", "irb60"]) == 2
-    assert capsys.readouterr().err.startswith("error: found no --path, allowed: urmpipe accuracy ")
-    assert run(["accuracy", *CUBE]) == 2
-    assert (
-        capsys.readouterr().err
-        == "error: robot (--robot): found none, allowed: an arm with masses and drives\n"
-    )
-
-
-def test_the_log_of_a_plan_is_no_path(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run(["plan", CUBE[1], "--robot", "irb60", "-o", "plan.csv", "-q"]) == 0
-    assert run(["accuracy", "--robot", "irb60", "--path", "plan.csv"]) == 2
-    said = "error: plan.csv: found the log of a plan, allowed: the rows that it was made of\n"
-    assert capsys.readouterr().err == said
 
 
 @pytest.fixture
@@ -165,41 +108,3 @@ def test_an_arm_that_diverges(folder: Path, capsys: Captured) -> None:
     found = json.loads(capsys.readouterr().out)
     assert found["errors"] == [None]
     assert found["diverged"][0]["joint"] in ("a", "b")
-
-
-def test_an_arm_without_masses_and_drives(folder: Path, capsys: Captured) -> None:
-    (folder / "arm.toml").write_text(ARM)
-    assert run([*GIVEN[:-1]]) == 2
-    drives = "not found, allowed: the drive of the joint, or { k, l } of a spring that holds it"
-    assert capsys.readouterr().err.splitlines() == [
-        "error: robot flat: key inertials: not found, allowed: its masses",
-        f"error: robot flat: key drives.a: {drives}",
-        f"error: robot flat: key drives.b: {drives}",
-    ]
-
-
-def test_each_joint_needs_a_drive_or_a_spring_and_one_a_drive(folder: Path, capsys: Captured) -> None:
-    spring = "\n[drives.{}]\nk = 100.0\nl = 1.0\n"
-    (folder / "arm.toml").write_text(ARM + MASSES + drive("a"))
-    assert run([*GIVEN[:-1]]) == 2
-    (folder / "arm.toml").write_text(ARM + MASSES + spring.format("a") + spring.format("b"))
-    assert run([*GIVEN[:-1]]) == 2
-    assert capsys.readouterr().err.splitlines() == [
-        "error: robot flat: key drives.b: not found, allowed: the drive of the joint, or { k, l } of a spring"
-        " that holds it",
-        "error: robot flat: key drives: found no joint with a drive, allowed: at least one",
-    ]
-
-
-def test_a_path_out_of_reach_and_a_recording_are_refused(folder: Path, capsys: Captured) -> None:
-    (folder / "short.csv").write_text("x,y,z\n0.5,0.5,0\n1.5,0.5,0\n")
-    assert run([*GIVEN[:-1]]) == 2
-    (far,) = capsys.readouterr().err.splitlines()
-    assert far.startswith("error: short.csv:3: found (1.5, 0.5, 0) m, 0.681 m out of reach of flat,")
-    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.4,0\n")
-    assert run(["plan", "path.csv", "-o", "plan.rrd", "-q"]) == 0
-    capsys.readouterr()
-    assert run([*GIVEN[:3], "--path", "plan.rrd"]) == 2
-    (said,) = capsys.readouterr().err.splitlines()
-    assert said.startswith("error: plan.rrd: ")
-    assert "a table (CSV) of rows, or a test cube (cube:...)" in said
