@@ -211,7 +211,7 @@ def _print_text(answer: Answer) -> None:
         from urmpipe_pipeline.results import is_result, present
 
         if is_result(answer.result):
-            print_presentation(present(answer.result), every=answer.all_columns)
+            print_presentation(present(answer.result), all_columns=answer.all_columns)
     for line in answer.lines:
         print_line(line)
 

@@ -35,8 +35,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_fmus.si_units import coherent_unit, display_conversion, is_same_unit
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import Element, FloatArray
-from urmpipe_models.errors import Finding, FmuError, UnitError, format_count, format_value
+from urmpipe_models.errors import Finding, FmuError, UnitError, format_value
 
 Causality = Literal["parameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]

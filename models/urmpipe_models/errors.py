@@ -451,12 +451,8 @@ def format_names(name: str, allowed: Iterable[str]) -> str:
     if len(names) <= MAX_LISTED:
         return ", ".join(names) or "none"
     first = ((name and _sort_by_similarity(name, names, 0.0)) or names)[:MAX_LISTED]
-    return f"{', '.join(first)} and {format_count(len(names) - len(first), 'other')}"
-
-
-def format_count(count: int, noun: str) -> str:
-    """Return a count with its noun: "1 column", "2 columns"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    more = len(names) - len(first)
+    return f"{', '.join(first)} and {more} other{'s' * (more != 1)}"
 
 
 def _sort_by_similarity(name: str, allowed: Iterable[str], min_similarity: float) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe.systems.logs import held_warning, snap_to_points
+from urmpipe.systems.logs import hold_warning, snap_to_points
 from urmpipe_fmus.block import Table
 from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.runs.grid import row_clock
@@ -27,14 +27,14 @@ def test_each_communication_point_of_a_regular_log_reads_its_own_row(rate: float
     read = Table(times, k[:, None].astype(float)).rows_at(k * step)
     np.testing.assert_array_equal(read.before[0], k)
     np.testing.assert_array_equal(read.fraction, 0.0)
-    assert held_warning("log", times, step, len(times) - 1) is None
+    assert hold_warning("log", times, step, len(times) - 1) is None
 
 
 def test_samples_off_the_points_stay_where_they_are_and_are_told() -> None:
     times = np.array([0, 5_000_000, 7_500_000, 15_000_010], dtype=np.int64)
     met = snap_to_points(times, 0.005)
     assert met.tolist() == [0, 5_000_000, 7_500_000, 15_000_000]
-    said = held_warning("log", met, 0.005, 9)
+    said = hold_warning("log", met, 0.005, 9)
     assert said is not None
     assert said.message == (
         "block log: 1 of 4 communication points lie between samples of the log, where the previous"

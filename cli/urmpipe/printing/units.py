@@ -144,9 +144,9 @@ def print_checked(report: CheckReport) -> None:
         print_line(f"warning: {warning}")
     if not report.problems:
         print_line("No problem found.")
-    heads = ("Variable", "Causality", "Type", "Unit", "Start", "Min", "Max", "Before", "After", "Description")
-    if console.width < MIN_DESCRIPTION_WIDTH:
-        heads = heads[:-1]
+    heads = ["Variable", "Causality", "Type", "Unit", "Start", "Min", "Max", "Before", "After"]
+    if console.width >= MIN_DESCRIPTION_WIDTH:
+        heads.append("Description")
     table = new_table(*heads, title=format_count(len(report.variables), "variable"))
     rows = _arrays(report.variables)
     for name, elements in rows[:LISTED]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe.arm_placing import place_robot
 from urmpipe.reading import resolve_reading
-from urmpipe.systems.logs import LogTable, held_warning, read_table, snap_to_points
+from urmpipe.systems.logs import LogTable, hold_warning, read_table, snap_to_points
 from urmpipe.systems.units import Backend, parse_columns, unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.block import Table
@@ -75,7 +75,7 @@ class Blocks:
         self.warnings: list[LogWarning] = []
         self.end: float | None = None
         self.period: float | None = None
-        self._held: dict[str, IntArray] = {}
+        self._hold_times: dict[str, IntArray] = {}
         self._errors: dict[str, UrmpipeError] = {}
         self._columns: dict[Port, LogTable] = {}
         for block in system.blocks:
@@ -86,7 +86,7 @@ class Blocks:
             if followed.log:
                 with self._keep_error(str(followed.destination)):
                     self._columns[followed.destination] = self._read(followed.log, [followed.column])
-        self._snap_held_logs(system.step or self.period or DEFAULT_STEP)
+        self._snap_hold_times(system.step or self.period or DEFAULT_STEP)
         if reason and self.units:
             message = f"the units run on Python, a hundred times slower than native ones: {reason}"
             self.warnings.append(LogWarning(SLOW, message))
@@ -115,15 +115,15 @@ class Blocks:
         log = self._columns[followed.destination]
         return LogColumn(log.table.t_ns, log.table.values[:, 0], log.columns[0].unit)
 
-    def held_warnings(self, step: float, count: int) -> Iterator[LogWarning]:
+    def hold_warnings(self, step: float, count: int) -> Iterator[LogWarning]:
         """Yield a warning for each joint log that is held at communication points between its samples.
 
         Args:
             step: Communication step in [s].
             count: Number of steps.
         """
-        for block, t_ns in self._held.items():
-            if warning := held_warning(block, t_ns, step, count):
+        for block, t_ns in self._hold_times.items():
+            if warning := hold_warning(block, t_ns, step, count):
                 yield warning
 
     @contextmanager
@@ -155,8 +155,8 @@ class Blocks:
         named = (robot, options.get("network"))
         self.files += [Path(name) for name in named if isinstance(name, str) and Path(name).is_file()]
         if log is None and log_map is not None:
-            found = f"{log_map} without a log"
-            raise OptionError(Finding(about="map", found=found, allowed="with log = ..."))
+            message = f"found {log_map} without a log, allowed: with log = ..."
+            raise OptionError(Finding(message, about="map"))
         if log is None:
             return unit_of(block.unit, robot=arm, options=options)
         columns = parse_columns(options.pop("columns", None))
@@ -164,7 +164,7 @@ class Blocks:
         has_joints = columns is None and any(column.name in ("q", "s") for column in table.columns)
         if has_joints and not options.get("interpolate"):
             clock = row_clock(table.table.t_ns)
-            self._held[block.name] = clock.t_ns
+            self._hold_times[block.name] = clock.t_ns
             self.end = max(self.end or 0.0, float(clock.t_ns[-1]) / 1e9)
             if period := clock.period / 1e9:
                 self.period = min(self.period or period, period)
@@ -181,13 +181,13 @@ class Blocks:
         self.end = max(self.end or 0.0, float(log.table.t_ns[-1]) / 1e9)
         return log
 
-    def _snap_held_logs(self, step: float) -> None:
+    def _snap_hold_times(self, step: float) -> None:
         """Move samples of held logs that are near communication points onto these."""
-        for block in self._held.keys() & self.units.keys():
-            self._held[block] = snap_to_points(self._held[block], step)
+        for block in self._hold_times.keys() & self.units.keys():
+            self._hold_times[block] = snap_to_points(self._hold_times[block], step)
             unit = self.units[block]
             if unit.table is not None:
-                self.units[block] = replace(unit, table=Table(self._held[block], unit.table.values))
+                self.units[block] = replace(unit, table=Table(self._hold_times[block], unit.table.values))
 
 
 def _parse_text(name: str, value: Any) -> str | None:

@@ -75,7 +75,7 @@ def read_table(
 
     The variables of its motion are q, the angles of revolute joints, and s, the positions of prismatic ones;
     qd, qdd, sd and sdd, their recorded rates; and p, a path or the recorded tool centre point. A column by
-    name, such as a voltage, is a variable of its own.
+    name, such as a voltage, is a separate variable.
 
     Args:
         log: A log or path (CSV), or a folder whose CSV files make one log.
@@ -105,7 +105,9 @@ def read_table(
     _check_complete(str(files[0]), quantities)
     table = Table(motion.t_ns, np.column_stack([values for _, _, values in quantities]))
     columns = tuple(Quantity(name, unit, values.shape[1]) for name, unit, values in quantities)
-    return LogTable(table, columns, tuple(files), tuple(one.of(motion.name) for one in motion.warnings))
+    return LogTable(
+        table, columns, tuple(files), tuple(warning.of(motion.name) for warning in motion.warnings)
+    )
 
 
 def _iter_quantities(log: JointLog) -> Iterator[tuple[str, str, FloatArray]]:
@@ -179,7 +181,7 @@ def snap_to_points(t_ns: IntArray, step: float) -> IntArray:
     return np.where(np.abs(points - t_ns) <= REGULAR * np.diff(t_ns).min(), points, t_ns)
 
 
-def held_warning(block: str, t_ns: IntArray, step: float, count: int) -> LogWarning | None:
+def hold_warning(block: str, t_ns: IntArray, step: float, count: int) -> LogWarning | None:
     """Return a warning about communication points between two samples of a log; None if there are none.
 
     Args:
@@ -193,9 +195,10 @@ def held_warning(block: str, t_ns: IntArray, step: float, count: int) -> LogWarn
     delay = points - t_ns[np.searchsorted(t_ns, points, side="right") - 1]
     if not np.any(delay):
         return None
-    found = f"{np.count_nonzero(delay)} of {len(points)} communication points lie between samples of the log"
-    held = f"where the previous sample is held for at most {delay.max() / 1e6:.4g} ms"
-    return LogWarning("held", f"block {block}: {found}, {held}: deviations there are not those of the log")
+    share = f"{np.count_nonzero(delay)} of {len(points)}"
+    hold = f"where the previous sample is held for at most {delay.max() / 1e6:.4g} ms"
+    message = f"block {block}: {share} communication points lie between samples of the log, {hold}"
+    return LogWarning("held", f"{message}: deviations there are not those of the log")
 
 
 def _point_times(k: FloatArray | IntArray, step: float) -> IntArray:

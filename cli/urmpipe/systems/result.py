@@ -94,7 +94,7 @@ def simulation_of(plan: Plan, recorded: CosimulationRecord, blocks: Blocks, svg:
         failed=recorded.failed,
         warnings=(
             *blocks.warnings,
-            *blocks.held_warnings(plan.step, plan.count),
+            *blocks.hold_warnings(plan.step, plan.count),
             *(LogWarning("co-simulation", note) for note in recorded.notes),
             *_coverage_warnings(system),
             *_non_finite_warnings(non_finite),

@@ -11,8 +11,9 @@ from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, Rec
 from urmpipe_fmus.blocks.coordinates import check_count, check_flag, option_error
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.delta import delta, exceeds_tolerance
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError, format_count, format_value
+from urmpipe_models.errors import UnitError, format_value
 from urmpipe_models.wraps import WrapState, repolarize_sample
 
 LOG_SOURCE_OPTIONS: Mapping[str, str] = {

@@ -21,7 +21,8 @@ from urmpipe_fmus.cosim.job import TYPES
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
 from urmpipe_fmus.fmu_file import host_binaries, open_fmu
 from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, is_same_unit, parse_unit
-from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_count, format_unknown_name
+from urmpipe_models.display import format_count
+from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_unknown_name
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 
 ELEMENT = re.compile(r"(.+)\[(\d+(?:,\s*\d+)*)\]")  # name of an array's element: `phi[1]`, `M[1,2]`

@@ -19,8 +19,9 @@ from typing import get_args
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import Element, FloatArray, Vector, cross, dot, subtract
-from urmpipe_models.errors import Finding, closest_name, format_count, format_unknown_name, format_value
+from urmpipe_models.errors import Finding, closest_name, format_unknown_name, format_value
 from urmpipe_models.networks.joint_motion import TURN
 from urmpipe_models.networks.mechanism import build_graph, build_mechanism
 from urmpipe_models.networks.parts import (
