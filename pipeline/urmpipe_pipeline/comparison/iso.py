@@ -74,7 +74,7 @@ NO_RESTS = "no-rests"
 MAX_RY = np.radians(85.0)  # rad; beyond it rz and rx are known twelve times worse than the orientation
 STANDARD_CYCLES = {"poses": 30, "paths": 10}  # of ISO 9283
 MAX_PLANES = 10_000  # more are closer together than the rows of any cycle, and each is sought in every cycle
-CLOCKS = "auto, start or an offset with iso: each cycle is put beside one reference"  # plain: ok
+CLOCKS = "auto, start or an offset: each cycle has the same reference"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -180,7 +180,7 @@ class IsoTest:
             yield asdict(Criterion(cycle.name, rows, cycle.distance, "m", 1, verdict=verdict))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the object `iso` of `urmpipe compare --json`."""
+        """Return the object `iso` of `urmpipe iso --json`."""
         return {
             "cycles": [asdict(cycle) for cycle in self.cycles],
             "failed_cycles": [asdict(cycle) for cycle in self.failed_cycles],
