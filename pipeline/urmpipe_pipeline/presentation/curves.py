@@ -9,8 +9,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +29,7 @@ MAX_STEP_RATIO = 8.0  # longest over shortest time between rows; beyond it a buc
 M4_SAMPLES = 4  # of a bucket: the first, the least, the largest and the last
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
+class Span(NamedTuple):
     """Start and end of a horizontal axis, in [s] or in rows."""
 
     start: float
@@ -42,8 +41,7 @@ class Span:
         return self.end - self.start
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Curve:
+class Curve(NamedTuple):
     """A column of a line.
 
     Attributes:
