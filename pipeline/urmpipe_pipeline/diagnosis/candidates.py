@@ -31,8 +31,8 @@ ONSET_SHOWN = (
     36.0  # medians of the squares by which the rows before an onset have to be worse with the change
 )
 
-SETUP = ("base_shift", "base_rotation", "tool_shift", "tool_rotation", "time_lag", "joint_offset")
 # what a discrete cause may need in addition to leave little; lengths and tilts are small
+SETUP = ("base_shift", "base_rotation", "tool_shift", "tool_rotation", "time_lag", "joint_offset")
 FITTED_CAUSES = 8  # discrete causes that are fitted with these, those that leave the least alone
 PLAUSIBLE = 4.0  # a discrete cause is plausible if it leaves up to this times the least square
 MAX_PLAUSIBLE = 5
@@ -41,8 +41,8 @@ NO_EFFECT = 1e-3  # fraction of the noise floor below which a discrete cause cha
 HALF = 0.5  # a further discrete cause has to leave less than this fraction of the square
 RIDGE = 1e-10  # keeps the equations of equal columns solvable; columns have unit length
 
-ANGLES = (0.3, -0.3, 0.8, -0.8, 1.57, -1.57, 2.4, -2.4, np.pi)
 # [rad]: starts of fits of a single angle, with its linear estimate: a cosine has few minima
+ANGLES = (0.3, -0.3, 0.8, -0.8, 1.57, -1.57, 2.4, -2.4, np.pi)
 ROW_STEP = 3  # of the rows every third shows the residual of a single angle
 LINEAR = 0.02  # [rad]: below it the linear search needs no other start, its error is theta^2 / 2
 MAX_SINGLE_STARTS = 4

@@ -485,4 +485,3 @@ KIND_TEXTS: Mapping[str, KindText] = {
         lambda cause: Remedy("leave out", format_rows(cause.rows)),
     ),
 }  # fmt: skip
-"""The texts of every kind of cause."""

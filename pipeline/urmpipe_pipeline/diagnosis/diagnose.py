@@ -72,14 +72,14 @@ from urmpipe_pipeline.trajectories import Matched, Side
 FLOOR = 0.01  # fraction of the tolerance below which nothing is named
 ARM_LENGTH = 1.0  # [m], by which a floor in [m] becomes one in [rad]
 
+# Usual differences of an arm from its data sheet, by kind and unit: if a device measured it, less is its own
+# geometry. Those of a UR10, fitted to 300 measured poses, were within twice this; its joints yield by 1e-5 to
+# 3e-5 rad/(N m).
 USUAL = {
     ("link_length", "m"): 5e-4, ("link_shift", "m"): 5e-4, ("tilt", "rad"): 1e-3,
     ("joint_offset", "rad"): 1e-3, ("joint_offset", "m"): 1e-3, ("joint_scale", ""): 5e-4,
     ("sag", "rad/(N m)"): 3e-5, ("sag", "rad/kg"): 3e-4,
 }  # fmt: skip
-"""Usual differences of an arm from its data sheet, by kind and unit: if a device measured it, less is its own
-geometry. Those of a UR10, fitted to 300 measured poses, were within twice this; its joints yield by 1e-5 to
-3e-5 rad/(N m)."""
 
 MAX_CAUSES = 5  # of structure and zeros; as many at once are an arm's own geometry
 UNRELATED_RATIO = 0.5  # residual over the reference's motion, both rms, above which the motions are different
@@ -96,10 +96,10 @@ SAME_TCP = "the joint values differ, but their tool centre points do not"
 SAME = "both sides agree"
 ELSEWHERE = "no change of joints or clock makes the tool centre points agree"
 
+# causes that a side may have although its joints lead to its recorded tool centre point
 NOT_SHOWN = (
     "time_lag", "clock_drift", "servo_lag", "joint_lag", "compliance", "backlash", "sag", "turns",
 )  # fmt: skip
-"""Causes that a side may have although its joints lead to its recorded tool centre point."""
 
 
 class Limit(NamedTuple):

@@ -50,6 +50,7 @@ STEPS = 6  # of a fit from a start; a final explanation has more
 ROUNDS = 6  # selections after each other: from a good start three are enough
 NONLINEAR = 0.05  # parameter of a linear fit from which on it is a second start
 
+# added to a score by kind (twice the log of odds): setup before structure, e^(1.2 / 2) = 1.8 to 1
 ORDER: Mapping[str, float] = {
     "tool_shift": 0.0, "tool_rotation": 0.0, "base_shift": 0.3, "base_rotation": 0.3, "base_mirrored": 0.3,
     "time_lag": 0.6, "servo_lag": 1.0, "clock_drift": 1.0, "path_unit": 0.6, "other_robot": 1.5,
@@ -57,7 +58,6 @@ ORDER: Mapping[str, float] = {
     "mirrored": 2.0, "turns": 1.0, "joint_offset": 1.2, "joint_scale": 2.0, "joint_lag": 2.0,
     "link_length": 1.8, "backlash": 2.5, "compliance": 2.5, "sag": 2.5, "tilt": 2.5, "link_shift": 3.5,
 }  # fmt: skip
-# added to a score by kind (twice the log of odds): setup before structure, e^(1.2 / 2) = 1.8 to 1
 
 MAX_SIZE: Mapping[str, float] = {
     "joint_scale": 0.5,  # a joint that is read in other steps is off by less

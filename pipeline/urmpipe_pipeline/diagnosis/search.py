@@ -260,9 +260,11 @@ class Search(Explanations):
 
         What is not among the hypotheses would otherwise be explained by parts of many of them.
         """
-        idle = [edit for edit in fit.state.edits if self._does_nothing(fit, edit)]
-        for edit in idle:
-            fit = fit._replace(state=fit.state._replace(edits=remove_edit(fit.state.edits, edit)))
+        edits, before = fit.state.edits, cost(self.model, fit.state, fit.rows)
+        for edit in edits:  # those that change the square by less than the floor
+            without = fit.state._replace(edits=remove_edit(edits, edit))
+            if cost(self.model, without, fit.rows) - before < fit.selection.floor:
+                fit = fit._replace(state=fit.state._replace(edits=remove_edit(fit.state.edits, edit)))
         while (now := cost(self.model, fit.state, fit.rows)) > NOISE:
             state, subset = fit.state, fit.subset
             starts = [(state._replace(edits=remove_edit(state.edits, edit)), subset) for edit in state.edits]
@@ -307,12 +309,6 @@ class Search(Explanations):
         selection = self._selection(state, result.rows, result.tau)
         best = Explanation(state, kept, float(selection.scores([kept])[0]))
         return result._replace(best=best, normal=selection.normal)
-
-    def _does_nothing(self, fit: SelfConsistentFit, edit: Edit) -> bool:
-        """Return whether a discrete cause changes the square by less than the floor."""
-        without = fit.state._replace(edits=remove_edit(fit.state.edits, edit))
-        gain = cost(self.model, without, fit.rows) - cost(self.model, fit.state, fit.rows)
-        return gain < fit.selection.floor
 
     def _rescore(self, near: Sequence[Explanation], fit: SelfConsistentFit) -> Iterator[Explanation]:
         """Yield the rivals that are still near, with parameters and scores on the rows that decided."""
