@@ -9,12 +9,15 @@ from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 import pandas as pd
 import pytest
 
 import urmpipe
 from urmpipe.arm_placing import parse_frame
+from urmpipe.main import cli
+from urmpipe_models.errors import Finding
 from urmpipe_models.math3d import Transform, from_offset
 
 COMMANDS = ("ingest", "compare", "ik", "report", "export", "simulate", "build_fmu", "view")
@@ -232,6 +235,30 @@ def test_shared_keywords_have_one_name_and_one_order() -> None:
         if "robot" in parameters:
             assert list(parameters).index("robot") == (2 if name == "compare" else 1)
             assert parameters["robot"].kind == Parameter.POSITIONAL_OR_KEYWORD
+
+
+def options_of(command: click.Command) -> set[str]:
+    """Return the options of a command and those below it."""
+    own = {name for param in command.params if isinstance(param, click.Option) for name in param.opts}
+    if not isinstance(command, click.Group):
+        return own
+    context = click.Context(command)
+    below = (command.get_command(context, name) for name in command.list_commands(context))
+    return own.union(*(options_of(one) for one in below if one))
+
+
+def test_a_message_names_only_options_that_there_are() -> None:
+    functions = [getattr(urmpipe, name) for name in urmpipe.__all__]
+    keywords = {
+        keyword
+        for function in functions
+        if callable(function) and not isinstance(function, type)
+        for keyword in signature(function).parameters
+    }
+    subjects = (str(Finding("x", parameter=keyword)) for keyword in keywords)
+    named = {subject.partition("(")[2].partition(")")[0] for subject in subjects} - {""}
+    assert "--unit" in named
+    assert named <= options_of(cli)
 
 
 def test_the_robot_of_a_run_may_be_exchanged(folder: Path, run: urmpipe.Run) -> None:
