@@ -71,11 +71,6 @@ BASES = {edits[0].kind: edits for edits in AXES}
 THIRD = 100.0
 """The most that a third derivative is by a number: 6 m by an angle, 50 m/s3 by the lag."""
 STRUCTURE = ("link_length", "tilt", "link_shift")
-ORDER = (
-    "tool_shift", "tool_rotation", "base_shift", "base_rotation", "time_lag", "clock_drift", "servo_lag",
-    "joint_offset", "joint_scale", "joint_lag", "compliance", "backlash", "sag",
-    "link_length", "tilt", "link_length", "link_shift", "tilt",
-)  # fmt: skip
 
 
 def sizes(model: ArmModel, by: float) -> Numbers:
@@ -276,18 +271,6 @@ def test_groups_are_the_parameters_that_an_arm_is_known_by(chain: Chain) -> None
         np.testing.assert_allclose(left, (model.position - expected)[:, ROWS], atol=1e-13)
 
 
-def groups_of(chain: Chain) -> list[Group]:
-    return [*cause_groups(chain, chain.coordinates, has_rotation=True, timed=True)]
-
-
-def test_an_arm_without_such_parameters_has_a_length_a_segment_and_two_tilts_a_joint() -> None:
-    kinds = ("link_length", "tilt", "joint_offset")
-    lengths, tilts, offsets = ([g.name for g in groups_of(RAIL) if g.kind == kind] for kind in kinds)
-    assert len(lengths) == 7
-    assert [name for name in tilts if name.startswith("lift")] == ["lift about x", "lift about y"]
-    assert offsets == [*RAIL.coordinates]
-
-
 def screw(frame: Transform, axis: tuple[float, float, float], *, about: bool) -> FloatArray:
     """Return the shift of the origin, then the turn, of a motion along or about an axis of a frame."""
     direction = np.array(frame.rotate(axis), dtype=float)
@@ -298,7 +281,7 @@ def screw(frame: Transform, axis: tuple[float, float, float], *, about: bool) ->
 @pytest.mark.parametrize("name", robot_names())
 def test_every_segment_of_an_arm_has_six_numbers_with_the_zeros_at_its_ends(name: str) -> None:
     chain = load_robot(name)
-    groups = groups_of(chain)
+    groups = [*cause_groups(chain, chain.coordinates, has_rotation=True, timed=True)]
     assert len({called(group) for group in groups}) == len(groups)
     for place, frame in list(enumerate(chain.frames))[1:-1]:
         twists = [twist for g in groups if g.kind in STRUCTURE for twist in g.twists if twist.place == place]
@@ -310,16 +293,6 @@ def test_every_segment_of_an_arm_has_six_numbers_with_the_zeros_at_its_ends(name
             for joint, at in ends if joint.kind != "fixed" and joint.mimic is None
         ]  # fmt: skip
         assert not twists or np.linalg.matrix_rank(np.array(screws)) == 6, chain.frame_names[place]
-
-
-@pytest.mark.parametrize("name", ["ur5e", "panda"])
-def test_setup_comes_before_joints_and_structure(name: str) -> None:
-    groups = groups_of(load_robot(name))
-    kinds = [group.kind for group in groups]
-    assert tuple(kind for kind, before in zip(kinds, [None, *kinds], strict=False) if kind != before) == ORDER
-    frames = [group for group in groups if group.name in ("base", "tool")]
-    assert [len(group.columns) for group in frames] == [1, 1, 1, 3] * 4
-    assert all((group.axis is None) == (len(group.columns) == 3) for group in frames)
 
 
 @pytest.mark.parametrize(
@@ -351,8 +324,6 @@ def test_sag_is_the_slope_of_the_energy_in_gravity(chain: Chain) -> None:
 
     slopes = [(energy(q + step) - energy(q - step)) / 2e-6 for step in 1e-6 * np.eye(q.shape[1])]
     np.testing.assert_allclose(gravity_torques(chain, q.T), slopes, atol=1e-6)
-    unit = next(group.unit for group in groups_of(chain) if group.kind == "sag")
-    assert unit == ("rad/(N m)" if chain.inertials else "rad/kg" if chain.name == "ur5e" else unit)
 
 
 def test_play_changes_sides_where_a_joint_turns_back_and_not_by_noise_at_rest() -> None:
