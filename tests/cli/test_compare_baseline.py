@@ -11,7 +11,7 @@ import pytest
 
 from four_logs import NOISE, Captured, compare, lay_logs, names, read_lines, recorded, said
 from urmpipe.main import run
-from urmpipe_pipeline.comparison.tables import since_words
+from urmpipe_pipeline.comparison.tables import format_worse_count
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +91,7 @@ def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) ->
     assert ", by the joints on both sides, but worse than the baseline good-against-wanted" in page
     assert "Against the baseline good-against-wanted" in page
     held = recorded("now.rrd").baseline
-    assert held is not None and since_words(held) in page
+    assert held is not None and format_worse_count(held) in page
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.parts import format_velocity, select_shown_motion
 from urmpipe_pipeline.accuracy.result import AccuracyResult
-from urmpipe_pipeline.comparison.figures import drawn_larger
+from urmpipe_pipeline.comparison.figures import display_factor
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import ends, spot_at
@@ -88,7 +88,7 @@ def _paths(result: AccuracyResult, motion: DrivenMotion) -> tuple[Path, ...]:
 
 def _larger(motion: DrivenMotion) -> Path | None:
     """Return planned + factor (position - planned); None where it shows nothing."""
-    factor = drawn_larger(float(motion.delta[:, 3].max()), extent(motion.planned) / 2.0)
+    factor = display_factor(float(motion.delta[:, 3].max()), extent(motion.planned) / 2.0)
     if factor is None:
         return None
     position: FloatArray = motion.planned + factor * (motion.position - motion.planned)

@@ -198,11 +198,11 @@ def prepare_sides(runs: Sequence[Run], options: CompareOptions) -> tuple[list[Si
         LogError: If a run has no positions to compare, or nothing joins frames that differ.
     """
     options = _join_frames([(run, _is_recorded(run, options.tcp)) for run in runs], options)
-    alone = _compares_joints_alone(runs, options)
+    joints_alone = _compares_joints_alone(runs, options)
     sides = []
     for name, run in zip(text.make_unique([run.name for run in runs]), runs, strict=True):
         named = run if run.name == name else replace(run, name=name)
-        trajectory = tcp_trajectory(named, options.tcp, joints_alone=alone)
+        trajectory = tcp_trajectory(named, options.tcp, joints_alone=joints_alone)
         sides.append(Side(named, trajectory, not _is_recorded(run, options.tcp)))
     return sides, options
 

@@ -17,7 +17,13 @@ from urmpipe_pipeline.comparison.align import apply_alignment, frame_to_option
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics
 from urmpipe_pipeline.comparison.warnings import is_stationary
-from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
+from urmpipe_pipeline.comparison.wording import (
+    absolute_symbol,
+    format_decisive,
+    format_interval,
+    format_out_of_tolerance,
+    format_utilisation,
+)
 from urmpipe_pipeline.diagnosis.causes import Cause
 from urmpipe_pipeline.diagnosis.diagnose import MIN_SAMPLES
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
@@ -45,12 +51,14 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     """Yield what decided the verdict: how much, when and where."""
     held, furthest = one.decisive, one.worst_statistics
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
-    yield Fact("Decided by", decided_words(held), page=False)
-    yield Fact("Decided by", ", ".join(filter(None, (size_of(held), used_words(held)))), brief=False)
+    yield Fact("Decided by", format_decisive(held), page=False)
+    yield Fact(
+        "Decided by", ", ".join(filter(None, (absolute_symbol(held), format_utilisation(held)))), brief=False
+    )
     if held is furthest:
         if not furthest.missing and one.run.timed:
             yield Fact("Data row", Value(one.row(furthest)), page=False)
-        yield Fact("Position", place_of(one, furthest), page=False)
+        yield Fact("Position", max_place(one, furthest), page=False)
     yield from _furthest_joint(one)
     yield from (replace(fact, page=False) for fact in _undiagnosed(one))
 
@@ -61,13 +69,13 @@ def _leading(result: Comparison) -> list[Deviation]:
     return [one for one in known if one.verdict == "fail" and one.decisive is one.worst_statistics][:LEADING]
 
 
-def place_of(one: Deviation, held: Statistics) -> Place | None:
+def max_place(one: Deviation, held: Statistics) -> Place | None:
     """Return where a log was when a quantity of it was largest; None where joints alone are compared."""
     place = one.place(held)
     return None if place is None else Place(place)
 
 
-def largest(one: Statistics | None, *, most: bool = False) -> Value | None:
+def max_value(one: Statistics | None, *, most: bool = False) -> Value | None:
     """Return the largest absolute value of a quantity, with what is allowed of it; None without one."""
     if one is None:
         return None
@@ -88,11 +96,11 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     if isinstance(held, Share):
         yield Fact(held.quantity, share_value(held), brief=False, page=False)
     else:
-        yield Fact(size_of(held), largest(held), used_words(held), brief=False, page=False)
+        yield Fact(absolute_symbol(held), max_value(held), format_utilisation(held), brief=False, page=False)
         if timed:
             yield Fact("Time", Value(held.t_max, "s"), brief=False, page=False)
         yield Fact("Data row", Value(one.row(held)), brief=False)
-        yield Fact("Position", place_of(one, held), brief=False)
+        yield Fact("Position", max_place(one, held), brief=False)
     ranked = len(result.runs) > 1  # a table at the top of the page has the log's verdict
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{format_count(len(one.sample), 'sample')} over {text.format_seconds(one.duration)} s"
@@ -104,7 +112,7 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     yield _left_out(one, len(result.reference.t_ns))
     yield from _out_of_tolerance(one, ranked=ranked)
     if timed:
-        yield Fact("Clocks", *sync_words(one.sync))
+        yield Fact("Clocks", *format_sync(one.sync))
     yield Fact("Turns removed", _turns(one), "whole turns counted differently at the start")
     yield from _alignment(one)
     yield Fact("Joint tolerance", _sliding(one))
@@ -137,7 +145,7 @@ def _undiagnosed(one: Deviation) -> Iterator[Fact]:
         yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))
 
 
-def sync_words(sync: Sync) -> tuple[str, str]:
+def format_sync(sync: Sync) -> tuple[str, str]:
     """Return how two clocks were put together, and how that was found."""
     if sync.mode == "start":
         return "aligned at the first sample", ""
@@ -150,7 +158,7 @@ def sync_words(sync: Sync) -> tuple[str, str]:
     return said, f"estimated from {sync.by or 'the motion'}{alike}"
 
 
-def alignment_words(one: Deviation) -> tuple[str, str]:
+def format_alignment(one: Deviation) -> tuple[str, str]:
     """Return how a log was moved in space, and by which rule."""
     alignment = one.alignment
     match alignment.mode:
@@ -208,9 +216,11 @@ def _left_out(one: Deviation, reference_samples: int) -> Fact:
 
 def _out_of_tolerance(one: Deviation, *, ranked: bool) -> Iterator[Fact]:
     out = int(np.count_nonzero(one.out_of_tolerance))
-    yield Fact("Out of tolerance", out_words(out, len(one.sample)), brief=out > 0, page=not ranked)
+    yield Fact(
+        "Out of tolerance", format_out_of_tolerance(out, len(one.sample)), brief=out > 0, page=not ranked
+    )
     if longest := one.longest_out_interval:
-        yield Fact("Longest stretch out", stretch_words(longest))
+        yield Fact("Longest stretch out", format_interval(longest))
 
 
 def _turns(one: Deviation) -> str:
@@ -221,7 +231,7 @@ def _turns(one: Deviation) -> str:
 def _alignment(one: Deviation) -> Iterator[Fact]:
     """Yield how a log was moved in space, and the option that does so permanently."""
     mode = one.alignment.mode
-    yield Fact("Alignment", *alignment_words(one), brief=mode != "none")
+    yield Fact("Alignment", *format_alignment(one), brief=mode != "none")
     if mode in ("tool", "base+tool") and one.run.robot is not None:
         arm = apply_alignment(one.run.robot, one.alignment)
         hints = [Hint("tool", _given(arm.tool))]

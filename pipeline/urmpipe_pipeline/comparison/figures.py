@@ -1,6 +1,6 @@
 """Figures and scene of a comparison: each log's deviation over time, over its speed and in space.
 
-1. `overview_figure`, `deviation_figures`, `path_figure`, `speed_cloud`: the plots of all logs and of one.
+1. `overview_figure`, `deviation_figures`, `path_figure`, `speed_scatter`: the plots of all logs and of one.
 2. `residual_figure`: the deviation without the causes that a diagnosis names.
 3. `comparison_scene`: the arm of the worst log, all paths, the decisive sample, and the causes at the arm.
 """
@@ -19,7 +19,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import apply_alignment
 from urmpipe_pipeline.comparison.comparison import Comparison, tolerance_sort_key
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
-from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, peak_words, symbol, when
+from urmpipe_pipeline.comparison.wording import SYMBOLS, format_peak, format_time_of_max, format_value, symbol
 from urmpipe_pipeline.diagnosis.cause_texts import format_cause, joint_names
 from urmpipe_pipeline.diagnosis.result import Diagnosis, format_residual
 from urmpipe_pipeline.presentation.digits import written
@@ -95,7 +95,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
     place = one.place(one.worst_statistics)
     if place is None:
         return
-    spots = (*ends(one.actual), Spot(place, peak_words(one), DEVIATION_COLOUR))
+    spots = (*ends(one.actual), Spot(place, format_peak(one), DEVIATION_COLOUR))
     decided = "The verdict was decided" if isinstance(one.decisive, Statistics) else "It deviates most"
     if not one.run.timed:
         arrows = deviation_arrows(one, extent(one.actual) / 2)
@@ -104,7 +104,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
             f"Equal scale on all axes. A dot is where a pose was asked for, the arrow from it"
             f" the {arrows.name}, in the colour of its size.",
             f"Poses of {one.name} in three dimensions, each with its deviation as an arrow."
-            f" {decided} at x, y, z = {text.format_point(place)} m: {amount_words(one.worst_statistics)}.",
+            f" {decided} at x, y, z = {text.format_point(place)} m: {format_value(one.worst_statistics)}.",
             (),
             spots[2:],
             arrows,
@@ -112,30 +112,30 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
         return
     supposed = tuple(corrected_path(one))
     said = "The colour is the distance from the reference at the same time"
-    said += ": blue within the tolerance, orange to crimson beyond it." if allowed_norm(one) else "."
+    said += ": blue within the tolerance, orange to crimson beyond it." if norm_tolerance(one) else "."
     said += " Green, dashed: where the log would be without the causes named above." if supposed else ""
     yield SpaceFigure(
         "Path in space",
         said,
         f"Paths of the reference and of {one.name} in three dimensions. {decided} at"
-        f" x, y, z = {text.format_point(place)} m: {amount_words(one.worst_statistics)}.",
+        f" x, y, z = {text.format_point(place)} m: {format_value(one.worst_statistics)}.",
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             *supposed,
             Path(
                 "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
-                limit=allowed_norm(one), sample=one.sample, kept=(one.worst_statistics_index,),
+                limit=norm_tolerance(one), sample=one.sample, kept=(one.worst_statistics_index,),
             ),
         ),
         spots,
     )  # fmt: skip
 
 
-def speed_cloud(one: Deviation) -> Iterator[Figure]:
+def speed_scatter(one: Deviation) -> Iterator[Figure]:
     """Yield the norm over the speed of the tool centre point; nothing where the speed is not known."""
     if not np.isfinite(one.speed).any():
         return
-    said = correlation_words(one.speed_correlation)
+    said = format_correlation(one.speed_correlation)
     line = Line(column(one.delta, 3), ("‖Δ‖",), (AXIS_COLOURS["norm"],), points=True)
     over = Over(one.speed, "‖v‖", "m/s")
     panel = Panel("‖Δ‖", "m", (line,), one.t_ns, signed=False, peaks=(one.worst,), over=over, small=True)
@@ -148,7 +148,7 @@ def speed_cloud(one: Deviation) -> Iterator[Figure]:
     )
 
 
-def correlation_words(r: float | None) -> str:
+def format_correlation(r: float | None) -> str:
     """Say what the correlation of norm and speed means."""
     if r is None:
         return "The norm or the speed does not change, so there is no correlation."
@@ -182,7 +182,7 @@ def _deviation(one: Deviation) -> Figure:
         line = _line(one, one.angle, ("angle",), (AXIS_COLOURS["norm"],))
         views.append(View("Angle between the orientations", (_panel(one, one.statistics["angle"], line),)))
     largest = ", ".join(
-        f"{symbol(held)} {text.format_quantity(held.max, held.unit)} {when(held)}"
+        f"{symbol(held)} {text.format_quantity(held.max, held.unit)} {format_time_of_max(held)}"
         for held in one.statistics.values()
     )
     said = "Δ is reference minus actual at the same time; path is the distance from the reference's path,"
@@ -259,11 +259,13 @@ def _line(
 def _instant(one: Deviation) -> dict[int, str]:
     """Return when the verdict was decided, or the log deviates most."""
     if not one.run.timed:
-        return {one.worst_statistics.sample_max: f"{peak_words(one)} {when(one.worst_statistics)}"}
+        return {
+            one.worst_statistics.sample_max: f"{format_peak(one)} {format_time_of_max(one.worst_statistics)}"
+        }
     return {
         int(
             one.t_ns[one.worst_statistics_index]
-        ): f"{peak_words(one)} at {text.format_seconds(one.worst_statistics.t_max)} s"
+        ): f"{format_peak(one)} at {text.format_seconds(one.worst_statistics.t_max)} s"
     }
 
 
@@ -277,10 +279,10 @@ def _out_words(one: Deviation) -> str:
 FACTORS = (50, 20, 10, 5, 2)
 """How many times a deviation may be drawn, the usual one first."""
 
-LEAST_SEEN = 0.005
+MIN_VISIBLE = 0.005
 """An enlarged deviation below this share of the scene's radius lies within the width of the lines."""
 
-MOST_ARROWS = 20_000
+MAX_ARROWS = 20_000
 """Poses whose deviation is drawn as an arrow."""
 
 POSES = 1000
@@ -289,7 +291,7 @@ POSES = 1000
 
 def comparison_scene(result: Comparison) -> Scene:
     """Return the arm of the worst log, the reference, all logs, and the worst log's deviation enlarged."""
-    shown = shown_log(result)
+    shown = select_shown_log(result)
     index, several = result.runs.index(shown), len(result.runs) > 1
     arms = tuple(_arm(shown, run_colour(index)))
     paths = [
@@ -314,23 +316,23 @@ def deviation_arrows(one: Deviation, radius: float) -> Arrows:
 
     Of very many poses those that deviate most are drawn.
     """
-    factor = drawn_larger(one.statistics["norm"].max, radius) or 1
+    factor = display_factor(one.statistics["norm"].max, radius) or 1
     size = np.asarray(one.delta[:, 3])
-    drawn = np.sort(np.argsort(-size, kind="stable")[:MOST_ARROWS])
+    drawn = np.sort(np.argsort(-size, kind="stable")[:MAX_ARROWS])
     start = np.asarray(one.reference)[drawn]
     end = start + factor * (np.asarray(one.actual)[drawn] - start)
     sample = np.asarray(one.sample)[drawn]
-    return Arrows(f"deviation drawn x{factor}", start, end, size[drawn], sample, limit=allowed_norm(one))
+    return Arrows(f"deviation drawn x{factor}", start, end, size[drawn], sample, limit=norm_tolerance(one))
 
 
-def allowed_norm(one: Deviation) -> float | None:
+def norm_tolerance(one: Deviation) -> float | None:
     """Return what is allowed of the norm in [m]: its tolerance, else the least of an axis; None without."""
     norm = one.statistics["norm"].tolerance
     axes = [found for axis in AXES[:3] if (found := one.statistics[axis].tolerance) is not None]
     return min(axes, default=None) if norm is None else norm
 
 
-def shown_log(result: Comparison) -> Deviation:
+def select_shown_log(result: Comparison) -> Deviation:
     """Return the compared log whose arm is drawn: the worst that has kinematics, else the worst."""
     worst_first = sorted(result.runs, key=tolerance_sort_key)[::-1]
     return next((one for one in worst_first if one.run.tcp is not None), worst_first[0])
@@ -368,7 +370,7 @@ def _log(one: Deviation, colour: str) -> Path:
 def _decided(one: Deviation, *, several: bool) -> Spot:
     """Return where the verdict on a log was decided: by what, how much and when."""
     whose = f", {one.name}" if several else ""
-    said = f"{amount_words(one.worst_statistics)} {when(one.worst_statistics)}{whose}"
+    said = f"{format_value(one.worst_statistics)} {format_time_of_max(one.worst_statistics)}{whose}"
     return Spot(spot_at(one.actual[one.worst_statistics_index]), said, DEVIATION_COLOUR)
 
 
@@ -377,7 +379,7 @@ def _enlarged(one: Deviation, radius: float) -> Path | None:
 
     Only that of the log whose arm is drawn: a line a log would hide all of them.
     """
-    factor = drawn_larger(one.statistics["norm"].max, radius)
+    factor = display_factor(one.statistics["norm"].max, radius)
     if factor is None:
         return None
     position = one.reference + factor * (np.asarray(one.actual) - one.reference)
@@ -385,10 +387,10 @@ def _enlarged(one: Deviation, radius: float) -> Path | None:
     return Path(f"deviation x{factor}", position, one.t_ns, DEVIATION_COLOUR, sample=one.sample, kept=kept)
 
 
-def drawn_larger(largest: float, radius: float) -> int | None:
+def display_factor(largest: float, radius: float) -> int | None:
     """Return the largest factor that keeps a deviation inside the scene; None where none makes it seen."""
     factor = next((factor for factor in FACTORS if factor * largest <= radius), None)
-    return None if factor is None or factor * largest < LEAST_SEEN * radius else factor
+    return None if factor is None or factor * largest < MIN_VISIBLE * radius else factor
 
 
 def _radius(arms: Sequence[Arm], paths: Sequence[Path]) -> float:

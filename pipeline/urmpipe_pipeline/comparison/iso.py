@@ -37,7 +37,7 @@ from urmpipe_pipeline.comparison.path_distance import distance_from_path
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync
 from urmpipe_pipeline.comparison.verdict import MIN_SHARES, check_tolerance, deviation_tolerances
 from urmpipe_pipeline.comparison.warnings import large_tolerances, same_data
-from urmpipe_pipeline.comparison.wording import share_words
+from urmpipe_pipeline.comparison.wording import format_share
 from urmpipe_pipeline.iso9283.command_path import Planes, RoundedCorner, Stop
 from urmpipe_pipeline.iso9283.criteria import euler_angles, min_cycles
 from urmpipe_pipeline.iso9283.cycles import (
@@ -354,7 +354,7 @@ def _match_cycles(
         shares: dict[str, Share] = {}
         if not isinstance(matched, str):
             shares = _shares(reference, candidate, matched, stations.planes, least_shares)
-            small = [share_words(share) for share in shares.values() if share.verdict == "fail"]
+            small = [format_share(share) for share in shares.values() if share.verdict == "fail"]
             matched = "; ".join(small) or matched
         if isinstance(matched, str):
             distance = _max_distance(command, motion)

@@ -154,12 +154,11 @@ def measure(
         joints = [Quantity(name, "joint", unit, column) for name, unit, column in columns]
     t = ns_to_seconds(matched.t_ns) if run.timed else np.full(len(matched.sample), np.nan)
     statistics, joint_statistics = (
-        {one.name: compute_statistics(one, t, matched.sample, tolerance) for one in quantities}
+        {quantity.name: compute_statistics(quantity, t, matched.sample, tolerance) for quantity in quantities}
         for quantities in (in_space, joints)
     )
     shares = measure_shares(reference, log, matched, tolerance, timed=run.timed)
-    verdicts = [one.verdict for one in (*statistics.values(), *joint_statistics.values())]
-    verdicts += [share.verdict for share in shares.values()]
+    judged: list[Statistics | Share] = [*statistics.values(), *joint_statistics.values(), *shares.values()]
     x, y, z, norm = (float(value) for value in values[0])
     return Deviation(
         name=run.name,
@@ -174,7 +173,9 @@ def measure(
         angle=angle,
         joint_delta=joint_delta,
         joint_turns=turns,
-        out_of_tolerance=np.any([one.out_of_tolerance(tolerance) for one in (*in_space, *joints)], axis=0),
+        out_of_tolerance=np.any(
+            [quantity.out_of_tolerance(tolerance) for quantity in (*in_space, *joints)], axis=0
+        ),
         sync=matched.sync,
         alignment=matched.alignment,
         left_out=matched.left_out,
@@ -183,7 +184,7 @@ def measure(
         joint_statistics=joint_statistics,
         start=(x, y, z, norm),
         speed_correlation=correlation(values[:, 3], speed),
-        verdict=combine_verdicts(verdicts),
+        verdict=combine_verdicts(quantity.verdict for quantity in judged),
         shares=shares,
     )
 

@@ -11,19 +11,19 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.facts import (
-    alignment_words,
     cause_facts,
     decisive_facts,
     deviation_facts,
+    format_alignment,
+    format_sync,
     remedy_hints,
-    sync_words,
 )
 from urmpipe_pipeline.comparison.figures import (
     comparison_scene,
     deviation_figures,
     overview_figure,
     path_figure,
-    speed_cloud,
+    speed_scatter,
 )
 from urmpipe_pipeline.comparison.iso_presenter import present_test
 from urmpipe_pipeline.comparison.tables import (
@@ -37,13 +37,13 @@ from urmpipe_pipeline.comparison.tables import (
 )
 from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.comparison.wording import (
-    amount_words,
-    decided_words,
-    out_words,
+    format_decisive,
+    format_out_of_tolerance,
+    format_time_of_max,
+    format_tolerance,
+    format_value,
+    format_verdict,
     quantity_name,
-    tolerance_words,
-    verdict_words,
-    when,
 )
 from urmpipe_pipeline.diagnosis import presenter as diagnosis_presenter
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_tables
@@ -72,7 +72,7 @@ def present(result: Comparison) -> Presentation:
     colour = run_colour(result.runs.index(worst))
     return Presentation(
         name=result.name,
-        headline=verdict_words(result),
+        headline=format_verdict(result),
         verdict=result.verdict,
         facts=(*cause_facts(result), *decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
@@ -104,7 +104,7 @@ def _against(result: Comparison) -> tuple[Fact, ...]:
     return (
         *(worse_facts(since) if since is not None and since.verdict == "fail" else ()),
         Fact("Reference", result.reference.name, brief=False),
-        Fact("Tolerance", tolerance_words(result.tolerance, units or {"rad"}), brief=False),
+        Fact("Tolerance", format_tolerance(result.tolerance, units or {"rad"}), brief=False),
     )
 
 
@@ -163,12 +163,12 @@ def _checks(result: Comparison, one: Deviation) -> Iterator[Check]:
     for held in one.all_statistics:
         if held.verdict is not None:
             row = "" if held.missing or not one.run.timed else f" (row {one.row(held)})"
-            out = out_words(held.out_of_tolerance or 0, len(one.sample))
-            said = f"{decided_words(held)}{row}; out of tolerance: {out}"
+            out = format_out_of_tolerance(held.out_of_tolerance or 0, len(one.sample))
+            said = f"{format_decisive(held)}{row}; out of tolerance: {out}"
             yield Check(quantity_name(held), held.verdict, said if held.verdict == "fail" else "", one.name)
     for share in one.shares.values():
         if share.verdict is not None:
-            said = decided_words(share) if share.verdict == "fail" else ""
+            said = format_decisive(share) if share.verdict == "fail" else ""
             yield Check(share.quantity, share.verdict, said, one.name)
     if result.baseline:
         yield from baseline_checks(result.baseline, one.name)
@@ -201,7 +201,7 @@ def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
 def _page(one: Deviation) -> Iterator[Block]:
     """Yield what only a page shows of a compared log."""
     yield from path_figure(one)
-    yield from speed_cloud(one)
+    yield from speed_scatter(one)
     yield from (replace(figure, folded=True) for figure in playback_figures(one.run))
     yield from (replace(table, folded=True) for table in log_tables(one.run))
 
@@ -210,9 +210,9 @@ def _events(one: Deviation) -> Iterator[Event]:
     """Yield how a log was put beside the reference, what was found in it, and where it deviates most."""
     start = int(one.t_ns[0]) if one.run.timed else None
     if one.sync.mode != "start":
-        yield Event(start, f"clocks: {', '.join(sync_words(one.sync))}")
+        yield Event(start, f"clocks: {', '.join(format_sync(one.sync))}")
     if one.alignment.mode != "none":
-        yield Event(start, f"alignment: {'; '.join(alignment_words(one))}")
+        yield Event(start, f"alignment: {'; '.join(format_alignment(one))}")
     if one.left_out:
         whole = one.left_out + len(one.sample)
         yield Event(start, f"{one.left_out} of {whole} samples left out: no reference or no value", "warning")
@@ -227,10 +227,12 @@ def _events(one: Deviation) -> Iterator[Event]:
         yield Event(round(longest.t * 1e9), f"longest stretch out of tolerance begins: {lasts}", level)
     held, timed = one.worst_statistics, one.run.timed
     if isinstance(one.decisive, Share):
-        yield Event(start, f"decides: {decided_words(one.decisive)}", level)
+        yield Event(start, f"decides: {format_decisive(one.decisive)}", level)
     elif held.tolerance is not None:
         at = round(held.t_max * 1e9) if timed else None
-        yield Event(at, f"decides: {amount_words(held)}{'' if timed else f' {when(held)}'}", level)
+        yield Event(
+            at, f"decides: {format_value(held)}{'' if timed else f' {format_time_of_max(held)}'}", level
+        )
     if not one.statistics:
         return
     x, y, z, norm = (text.format_quantity(float(value), "m") for value in one.delta[one.worst])

@@ -367,17 +367,17 @@ def find_peaks(rates: Rates, turned: bool) -> list[tuple[int, float]]:
     """
     similarities = _similarity_by_lag(rates.reference, rates.log, turned)
     # Of peaks without a valley between, the highest is kept.
-    unlike = 1.0 - np.concatenate(([-1.0], similarities, [-1.0])) + FLOOR
+    distances = 1.0 - np.concatenate(([-1.0], similarities, [-1.0])) + FLOOR
     least = max(1.0 - 2.0 * (1.0 - similarities.max()) - NEAR, 0.0)
-    rising = (unlike[1:-1] < unlike[:-2]) & (unlike[1:-1] <= unlike[2:])
+    rising = (distances[1:-1] < distances[:-2]) & (distances[1:-1] <= distances[2:])
     tops = np.flatnonzero(rising & (similarities >= least))
-    valleys = np.maximum.reduceat(unlike[1:-1], tops) if len(tops) else unlike[:0]
+    valleys = np.maximum.reduceat(distances[1:-1], tops) if len(tops) else distances[:0]
     peaks: list[int] = []
     valley = np.inf
     for top, after in zip(tops.tolist(), valleys.tolist(), strict=True):
-        if not peaks or valley > SEPARATE * max(unlike[1 + top], unlike[1 + peaks[-1]]):
+        if not peaks or valley > SEPARATE * max(distances[1 + top], distances[1 + peaks[-1]]):
             peaks.append(top)
-        elif unlike[1 + top] < unlike[1 + peaks[-1]]:
+        elif distances[1 + top] < distances[1 + peaks[-1]]:
             peaks[-1] = top
         else:
             valley = max(valley, after)

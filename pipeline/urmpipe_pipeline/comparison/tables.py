@@ -19,9 +19,9 @@ from urmpipe_pipeline.comparison.comparison import (
     Worse,
 )
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, ShareKind, Statistics, Verdict
-from urmpipe_pipeline.comparison.facts import MEANING, alignment_words, largest, place_of, share_value
+from urmpipe_pipeline.comparison.facts import MEANING, format_alignment, max_place, max_value, share_value
 from urmpipe_pipeline.comparison.verdict import UNITS
-from urmpipe_pipeline.comparison.wording import quantity_name, size_of, symbol
+from urmpipe_pipeline.comparison.wording import absolute_symbol, quantity_name, symbol
 from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.palette import run_colour
 from urmpipe_pipeline.presentation.parts import (
@@ -57,7 +57,7 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
     far: Heads[Deviation] = {
         **names,
         "verdict": ("Verdict", lambda one: Judged(one.verdict)),
-        "decided_by": ("Decided by", lambda one: size_of(one.decisive)),
+        "decided_by": ("Decided by", lambda one: absolute_symbol(one.decisive)),
         **_sizes(result),
     }
     note = "The logs are ranked by the largest share of a tolerance that each uses."
@@ -103,14 +103,14 @@ def _sizes(result: Comparison) -> Heads[Deviation]:
         return lambda one: share_value(one.shares.get(quantity))
 
     return {
-        "max_x": ("max |Δx|", lambda one: largest(one.statistics.get("x"))),
-        "max_y": ("max |Δy|", lambda one: largest(one.statistics.get("y"))),
-        "max_z": ("max |Δz|", lambda one: largest(one.statistics.get("z"))),
-        "max_norm": ("max ‖Δ‖", lambda one: largest(one.statistics.get("norm"))),
-        "max_path": ("max path", lambda one: largest(one.statistics.get("path"))),
-        "max_angle": ("max angle", lambda one: largest(one.statistics.get("angle"))),
-        "max_joint": ("max joint", lambda one: largest(one.worst_joint("rad"))),
-        "max_slide": ("max slide", lambda one: largest(one.worst_joint("m"))),
+        "max_x": ("max |Δx|", lambda one: max_value(one.statistics.get("x"))),
+        "max_y": ("max |Δy|", lambda one: max_value(one.statistics.get("y"))),
+        "max_z": ("max |Δz|", lambda one: max_value(one.statistics.get("z"))),
+        "max_norm": ("max ‖Δ‖", lambda one: max_value(one.statistics.get("norm"))),
+        "max_path": ("max path", lambda one: max_value(one.statistics.get("path"))),
+        "max_angle": ("max angle", lambda one: max_value(one.statistics.get("angle"))),
+        "max_joint": ("max joint", lambda one: max_value(one.worst_joint("rad"))),
+        "max_slide": ("max slide", lambda one: max_value(one.worst_joint("m"))),
         "out_fraction": ("out", lambda one: Value(one.out_fraction, "%")),
         "coverage": ("coverage", seen("coverage")),
         "judged": ("judged", seen("judged")),
@@ -130,7 +130,7 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
         "speed_correlation": ("r(‖Δ‖, speed)", lambda one: Value(one.speed_correlation, "1", signed=True)),
         "left_out": ("left out", lambda one: Value(one.left_out)),
         "warnings": ("warnings", lambda one: Value(len(result.warnings_of(one)))),
-        "alignment": ("alignment", lambda one: alignment_words(one)[0]),
+        "alignment": ("alignment", lambda one: format_alignment(one)[0]),
     }
     if not all(one.run.timed for one in runs):
         row = ("decided in row", lambda one: Value(_decided_row(one)))
@@ -155,7 +155,7 @@ def _decided_t(one: Deviation) -> float | None:
 
 
 def _decided_place(one: Deviation) -> Place | None:
-    return place_of(one, one.worst_statistics) if one.decisive is one.worst_statistics else None
+    return max_place(one, one.worst_statistics) if one.decisive is one.worst_statistics else None
 
 
 def _decided_row(one: Deviation) -> int | None:
@@ -183,7 +183,7 @@ def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
             "Recording": result.recording.name if result.recording else "",
             "Robot": one.run.robot.name if one.run.robot else "",
             "Verdict": Judged(one.verdict),
-            "Worse than its baseline": f"in {quantities(worse)}" if worse else "",
+            "Worse than its baseline": f"in {count_quantities(worse)}" if worse else "",
             **{title: cell(one) for title, cell in _sizes(result).values()},
             "Reference": result.reference.name,
             "Assuming": "; ".join(result.assumptions),
@@ -255,7 +255,7 @@ def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, floa
         "quantity": ("Quantity", symbol),
         "verdict": ("Verdict", lambda held: Judged(held.verdict)),
         "tolerance": ("tolerance", lambda held: Value(held.tolerance, held.unit, given=True)),
-        "max": ("max", lambda held: largest(held, most=held is joint and held.max > 0.0)),
+        "max": ("max", lambda held: max_value(held, most=held is joint and held.max > 0.0)),
         "t_max": ("at t", lambda held: Value(held.t_max, "s"))
         if one.run.timed
         else ("in row", lambda held: Value(one.row(held))),
@@ -303,7 +303,7 @@ def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
     for one in found.changes:
         if one.run == run:
             noise = text.format_stated(one.noise, one.now.unit)
-            said = f"{size_of(one.now)}: {worse_words(one)} (noise {noise})" if one.worse else ""
+            said = f"{absolute_symbol(one.now)}: {format_worse(one)} (noise {noise})" if one.worse else ""
             yield _check(run, quantity_name(one.now), said)
     for lost in found.missing:
         if lost.run == run:
@@ -315,14 +315,14 @@ def criterion_checks(found: BaselineComparison) -> Iterator[Check]:
     """Yield a check for each criterion after ISO 9283 that was compared then."""
     for one in found.criteria:
         noise = f" (noise {written(Value(one.noise, _shown(one.now.unit), given=True), unit=True)})"
-        said = f"{one.now.name}: {criterion_words(one)}{noise}" if one.worse else ""
+        said = f"{one.now.name}: {format_criterion_change(one)}{noise}" if one.worse else ""
         yield _check("criteria", one.now.name, said)
     for lost in found.missing:
         said = f"{lost.quantity}: in the baseline, without a value now"
         yield _check("criteria", f"{lost.quantity} is there", said)
 
 
-def criterion_words(one: CriterionChange) -> str:
+def format_criterion_change(one: CriterionChange) -> str:
     """Return a criterion before and now: "0.1000 → 0.2000 mm"."""
     unit = _shown(one.now.unit)
     before, now = abs(one.before.value or 0.0), abs(one.now.value or 0.0)
@@ -340,21 +340,21 @@ def _check(run: str, name: str, said: str) -> Check:
     return Check(name, "fail" if said else "pass", said, about, kind="worse-than-baseline")
 
 
-def since_words(found: BaselineComparison) -> str:
+def format_worse_count(found: BaselineComparison) -> str:
     """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
-    said = [f"{quantities(len(found.worse))} worse"] if found.worse else []
+    said = [f"{count_quantities(len(found.worse))} worse"] if found.worse else []
     criteria = text.join_words([one.now.name for one in found.worse_criteria])
     said += [f"{criteria} worse"] if criteria else []
     said += [f"{len(found.missing)} gone"] if found.missing else []
     return ", ".join(said) or "nothing worse"
 
 
-def quantities(count: int) -> str:
+def count_quantities(count: int) -> str:
     """Return a count of quantities: "1 quantity", "5 quantities"."""
     return f"{count} {'quantity' if count == 1 else 'quantities'}"
 
 
-def worse_words(one: QuantityChange) -> str:
+def format_worse(one: QuantityChange) -> str:
     """Return what of a quantity is worse, before and now: "max 1.0000 → 2.0000 mm, out 1.0 % → 3.0 %"."""
     pairs = {name: _pair(one, name) for name in one.worse}
     return ", ".join(
@@ -373,7 +373,7 @@ def _pair(one: QuantityChange, name: Worse) -> tuple[Value, Value]:
 
 def worse_facts(found: BaselineComparison) -> Iterator[Fact]:
     """Yield what decides against a baseline: how much is worse, and what."""
-    yield Fact("Since the baseline", since_words(found))
+    yield Fact("Since the baseline", format_worse_count(found))
     worse = [f"{symbol(one.now)} of {one.run} ({_words(one.worse)})" for one in found.worse]
     yield Fact("Worse", _listed(worse))
     yield Fact("Gone", _listed(list(map(str, found.missing))))

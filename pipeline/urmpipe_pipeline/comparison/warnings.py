@@ -22,7 +22,7 @@ from urmpipe_pipeline.comparison.align import align
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.sync import BY_HAND, BY_MOTION, synchronise
 from urmpipe_pipeline.comparison.verdict import UNITS, tolerance_for
-from urmpipe_pipeline.comparison.wording import unseen_words
+from urmpipe_pipeline.comparison.wording import format_unseen
 from urmpipe_pipeline.diagnosis.problem import AT_REST
 from urmpipe_pipeline.joint_log import LogWarning, Role
 from urmpipe_pipeline.provenance import list_assumptions
@@ -134,7 +134,7 @@ def left_out_warnings(deviation: Deviation, reference: Trajectory) -> Iterator[L
     coverage = deviation.shares["coverage"]
     if coverage.verdict != "fail" and coverage in deviation.incomplete_shares:
         samples_of = f"{coverage.samples} of {format_count(coverage.total, 'sample')} of {reference.name}"
-        message = f"it shows {samples_of} ({text.format_percent(coverage.value)}){unseen_words(coverage)}"
+        message = f"it shows {samples_of} ({text.format_percent(coverage.value)}){format_unseen(coverage)}"
         yield LogWarning("not-covered", message, about=deviation.name)
 
 

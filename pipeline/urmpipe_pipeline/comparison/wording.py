@@ -21,7 +21,7 @@ NAMED = 3
 """Logs out of tolerance that a verdict names; more are only counted."""
 
 
-def verdict_words(one: Comparison) -> str:
+def format_verdict(one: Comparison) -> str:
     """Return which logs are out of tolerance against what, or that all are within, and what that rests on."""
     failed = [run for run in one.runs if run.verdict == "fail"]
     total = len(one.runs) + len(one.failed_logs)
@@ -64,7 +64,7 @@ def _part(one: Comparison) -> str:
         return f"; coverage or judged below 99 % in {len(partly)} logs"
     several = len(one.runs) > 1
     return "".join(
-        f"; {share_words(share, run.name if several else '')}"
+        f"; {format_share(share, run.name if several else '')}"
         for run in partly
         for share in run.incomplete_shares
     )
@@ -81,7 +81,7 @@ def _clocks(one: Comparison) -> str:
     return f"; clocks{some} by their stamps"
 
 
-def share_words(one: Share, whose: str = "") -> str:
+def format_share(one: Share, whose: str = "") -> str:
     """Return a share, of one of several logs with its name, and if it is too small what was not seen.
 
     As in "coverage 0.5 % of 90 % needed, longest unseen: 3.970 s from t = 0.010 s of the reference".
@@ -90,16 +90,16 @@ def share_words(one: Share, whose: str = "") -> str:
     if one.verdict != "fail":
         return f"{one.quantity}{of} {text.format_percent(one.value)}"
     said = f"{one.quantity}{of} {held(Value(one.value, '%', one.tolerance, least=True))}"
-    return said if whose else f"{said}{unseen_words(one)}"
+    return said if whose else f"{said}{format_unseen(one)}"
 
 
-def unseen_words(one: Share) -> str:
+def format_unseen(one: Share) -> str:
     """Return where most was unseen, as ", longest unseen: 3.970 s from t = 0.010 s of the reference"."""
     side = "reference" if one.quantity == "coverage" else "log"
     return (
         ""
         if one.longest_unseen is None
-        else f", longest unseen: {stretch_words(one.longest_unseen)} of the {side}"
+        else f", longest unseen: {format_interval(one.longest_unseen)} of the {side}"
     )
 
 
@@ -108,7 +108,7 @@ def symbol(one: Statistics | Share | DeltaMeterResult) -> str:
     return SYMBOLS[one.quantity] if one.kind in ("axis", "norm") else one.quantity
 
 
-def size_of(one: Statistics | Share | DeltaMeterResult) -> str:
+def absolute_symbol(one: Statistics | Share | DeltaMeterResult) -> str:
     """Return what the absolute value of a quantity is called: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
     if one.kind == "joint":
         return f"|Δ {one.quantity}|"
@@ -120,7 +120,7 @@ def quantity_name(one: Statistics | Share) -> str:
     return f"joint {one.quantity}" if one.kind == "joint" else one.quantity
 
 
-def used_words(one: Statistics | Share | DeltaMeterResult) -> str:
+def format_utilisation(one: Statistics | Share | DeltaMeterResult) -> str:
     """Return how much of its tolerance a deviation uses up: "71.0 % of the tolerance"; else nothing."""
     if one.utilisation is None or isinstance(one, Share):
         return ""
@@ -129,7 +129,7 @@ def used_words(one: Statistics | Share | DeltaMeterResult) -> str:
     return "" if math.isinf(one.utilisation) else f"{text.format_portion(one.utilisation)} the tolerance"
 
 
-def amount_words(one: Statistics | Share) -> str:
+def format_value(one: Statistics | Share) -> str:
     """Return how far a quantity goes, and of how much: "|Δx| = 4.2000 mm of 3.5 mm allowed".
 
     Where a quantity with a tolerance lacks values, that: "angle has no value at 3 of 40 samples".
@@ -137,53 +137,59 @@ def amount_words(one: Statistics | Share) -> str:
     if isinstance(one, Share):
         return f"{one.quantity} = {held(Value(one.value, '%', one.tolerance, least=True))}"
     if one.tolerance is not None and one.missing:
-        return f"{size_of(one)} has {used_words(one)}"
-    return f"{size_of(one)} = {held(Value(one.max, one.unit, one.tolerance))}"
+        return f"{absolute_symbol(one)} has {format_utilisation(one)}"
+    return f"{absolute_symbol(one)} = {held(Value(one.max, one.unit, one.tolerance))}"
 
 
-def decided_words(one: Statistics | Share) -> str:
+def format_decisive(one: Statistics | Share) -> str:
     """Return how much of how much a quantity is, and when; of a share what was not seen.
 
     As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
     """
     if isinstance(one, Share):
         return (
-            f"{amount_words(one)} ({one.samples} of {format_count(one.total, 'sample')}){unseen_words(one)}"
+            f"{format_value(one)} ({one.samples} of {format_count(one.total, 'sample')}){format_unseen(one)}"
         )
     lacks = one.tolerance is not None and one.missing
-    used = used_words(one)
-    return amount_words(one) if lacks else f"{amount_words(one)}{f' ({used})' if used else ''} {when(one)}"
+    used = format_utilisation(one)
+    return (
+        format_value(one)
+        if lacks
+        else f"{format_value(one)}{f' ({used})' if used else ''} {format_time_of_max(one)}"
+    )
 
 
-def peak_words(one: Deviation) -> str:
+def format_peak(one: Deviation) -> str:
     """Return what the furthest quantity of a log does where it is largest: it decides, if no share does."""
     return "decides" if isinstance(one.decisive, Statistics) else "deviates most"
 
 
-def when(one: Statistics) -> str:
+def format_time_of_max(one: Statistics) -> str:
     """Return when a quantity was largest: "at t = 1.250 s"; of still poses in which row: "in row 3"."""
     timed = not math.isnan(one.t_max)
     return f"at t = {text.format_seconds(one.t_max)} s" if timed else f"in row {one.sample_max + 1}"
 
 
-def meter_words(one: DeltaMeterResult) -> str:
+def format_delta_meter(one: DeltaMeterResult) -> str:
     """Return what a delta meter found: how much of how much, when, how often it was too much; its doubts."""
     amount = "has no value" if one.utilisation is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
-    used = used_words(one)
-    said = f"{size_of(one)} {amount}{f' ({used})' if used else ''} at t = {text.format_seconds(one.t)} s"
-    out = f"out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
+    used = format_utilisation(one)
+    said = (
+        f"{absolute_symbol(one)} {amount}{f' ({used})' if used else ''} at t = {text.format_seconds(one.t)} s"
+    )
+    out = f"out of tolerance: {format_out_of_tolerance(one.out_of_tolerance, one.samples)}"
     lacks = (
         f"coverage {text.format_percent(one.coverage)}: {one.missing} without a value" if one.missing else ""
     )
     return "; ".join(filter(None, (said, out, lacks, *one.caveats)))
 
 
-def out_words(out: int, of: int) -> str:
+def format_out_of_tolerance(out: int, of: int) -> str:
     """Return how many samples are out of tolerance: "13 of 100 samples (13.0 %)"."""
     return f"{out} of {format_count(of, 'sample')} ({text.format_percent(out / of)})"
 
 
-def stretch_words(found: SampleInterval) -> str:
+def format_interval(found: SampleInterval) -> str:
     """Return how long and from when a log was out of tolerance or unseen: "0.500 s from t = 1.250 s"."""
     if found.t is None or found.duration is None:
         return f"{format_count(found.samples, 'row')} from row {found.sample + 1}"
@@ -191,7 +197,7 @@ def stretch_words(found: SampleInterval) -> str:
     return f"{lasts} t = {text.format_seconds(found.t)} s"
 
 
-def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:
+def format_tolerance(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:
     """Return a comparison's tolerance as people read it: "±3.5 mm per axis, 0.5 deg of orientation".
 
     Args:

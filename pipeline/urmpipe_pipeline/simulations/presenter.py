@@ -11,7 +11,12 @@ from urmpipe_models.display import format_count
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
-from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
+from urmpipe_pipeline.comparison.wording import (
+    absolute_symbol,
+    format_delta_meter,
+    format_out_of_tolerance,
+    format_utilisation,
+)
 from urmpipe_pipeline.presentation.figure import Drawing, Text
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import (
@@ -94,8 +99,12 @@ def _decisive(simulation: Simulation) -> Iterator[Fact]:
         yield Fact("Recorded until", end)
     elif (worst := simulation.judged_worst) is not None:
         yield Fact("Furthest out" if worst.out_of_tolerance else "Closest to the limit", Ref(worst.block))
-        yield Fact("Decided by", meter_words(worst), page=False)
-        yield Fact("Decided by", ", ".join(filter(None, (size_of(worst), used_words(worst)))), brief=False)
+        yield Fact("Decided by", format_delta_meter(worst), page=False)
+        yield Fact(
+            "Decided by",
+            ", ".join(filter(None, (absolute_symbol(worst), format_utilisation(worst)))),
+            brief=False,
+        )
 
 
 def _opening_time(simulation: Simulation) -> int:
@@ -130,9 +139,9 @@ def _meter_facts(one: DeltaMeterResult) -> Iterator[Fact]:
     A page has the numbers in its table of the delta meters.
     """
     value = Value(one.worst, "m", one.allowed, one.verdict, one.utilisation)
-    yield Fact(size_of(one), value, used_words(one), page=False)
+    yield Fact(absolute_symbol(one), value, format_utilisation(one), page=False)
     yield Fact("Time", Value(one.t, "s"), page=False)
-    yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples), page=False)
+    yield Fact("Out of tolerance", format_out_of_tolerance(one.out_of_tolerance, one.samples), page=False)
     yield Fact("In doubt", "; ".join(one.caveats))
 
 
@@ -196,7 +205,7 @@ def _section(
     if meter is None:
         return Section(block, figures=figures, rank=1, opened=opened)
     fail = meter.verdict == "fail"
-    check = Check("within tolerance", meter.verdict, meter_words(meter) if fail else "", block)
+    check = Check("within tolerance", meter.verdict, format_delta_meter(meter) if fail else "", block)
     return Section(
         block, meter.verdict, tuple(_meter_facts(meter)), figures=figures, checks=(check,), opened=opened
     )
@@ -232,7 +241,9 @@ def _events(simulation: Simulation) -> Iterator[Event]:
     """Yield what decided each delta meter, what a person should know, and why it failed."""
     for one in simulation.verdicts:
         level: Level = "error" if one.verdict == "fail" else "info"
-        yield Event(int(simulation.t_ns[one.sample]), f"{one.block} decides: {meter_words(one)}", level)
+        yield Event(
+            int(simulation.t_ns[one.sample]), f"{one.block} decides: {format_delta_meter(one)}", level
+        )
     for warning in simulation.warnings:
         yield Event(None, warning, "warning")
     if simulation.failed is not None:

@@ -13,7 +13,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import (
     compare_with_baseline,
 )
-from urmpipe_pipeline.comparison.tables import worse_words
+from urmpipe_pipeline.comparison.tables import format_worse
 
 ROUNDING = 1e-15
 """Positions of 1 m round at 2e-16 m, and are taken apart twice."""
@@ -27,7 +27,7 @@ def test_shares_differ_by_a_digit_where_they_count_as_changed() -> None:
     more[24_750, 0] = 0.005
     x = compare_with_baseline(paths({"a": more}), paths({"a": out})).changes[0]
     assert x.worse == ("out_fraction",)
-    assert worse_words(x) == "out 99 % → 99.004 %"
+    assert format_worse(x) == "out 99 % → 99.004 %"
     one = out.copy()
     one[24_750, 0] = 0.0035000005  # out by less than the noise
     assert compare_with_baseline(paths({"a": one}), paths({"a": out})).changes[0].worse == ()

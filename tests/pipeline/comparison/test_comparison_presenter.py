@@ -16,7 +16,7 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES
-from urmpipe_pipeline.comparison.figures import LEAST_SEEN
+from urmpipe_pipeline.comparison.figures import MIN_VISIBLE
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.figure import Figure, SpaceFigure
 from urmpipe_pipeline.presentation.palette import run_colour
@@ -230,8 +230,8 @@ def test_the_arm_stands_where_its_aligned_path_is(align: str) -> None:
     ("largest", "factor"),
     [
         (0.0, None),
-        (0.9 * LEAST_SEEN / 50, None),
-        (1.1 * LEAST_SEEN / 50, 50),
+        (0.9 * MIN_VISIBLE / 50, None),
+        (1.1 * MIN_VISIBLE / 50, 50),
         (0.99 / 50, 50),
         (1.01 / 50, 20),
         (0.49, 2),
