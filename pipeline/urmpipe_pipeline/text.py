@@ -169,7 +169,7 @@ def format_rows(rows: Sequence[int] | IntArray) -> str:
     return f"row{'' if len(rows) == 1 else 's'} {listed}"
 
 
-def join_words(words: Sequence[str]) -> str:
+def join_list(words: Sequence[str]) -> str:
     """Return texts as a list in a sentence: "a", "a and b", "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 

@@ -102,7 +102,7 @@ def _velocity_caption(result: AccuracyResult, *, published: bool) -> str:
     said += " Dotted: the running speed, the largest within it." if result.running_speed is not None else ""
     said += ' Dark crosses: [Iso9283] Fig. 7; at the triangle only "more than" is known.' if published else ""
     gone = [format_velocity(one.velocity) for one in result.errors if one.diverged is not None]
-    return said + (f" No point at {text.join_words(gone)}: the arm diverged." if gone else "")
+    return said + (f" No point at {text.join_list(gone)}: the arm diverged." if gone else "")
 
 
 def _errors_told(result: AccuracyResult) -> str:

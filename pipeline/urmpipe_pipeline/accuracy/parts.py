@@ -68,7 +68,7 @@ def _format_errors(result: AccuracyResult) -> str:
         off = f"is up to {text.format_quantity(error, 'm')} off ({result.limited_error})"
         parts.append(f"{off} at {format_velocity(velocity)}")
     if diverged:
-        parts.append(f"diverges at {text.join_words(diverged)}")
+        parts.append(f"diverges at {text.join_list(diverged)}")
     return ", and ".join(parts)
 
 

@@ -475,6 +475,6 @@ def cause_marks(one: Deviation, chain: Chain) -> tuple[ArmMark, ...]:
         for place in places:
             words.setdefault(place, []).append(format_cause(cause))
     return tuple(
-        ArmMark(point, text.join_words(said), DEVIATION_COLOUR, segment)
+        ArmMark(point, text.join_list(said), DEVIATION_COLOUR, segment)
         for (point, segment), said in words.items()
     )

@@ -152,7 +152,7 @@ def _basic_facts(result: Comparison, test: IsoTest) -> Iterator[Fact]:
     parts = [test.cycle_count]
     parts += [format_count(len(test.poses.command), "pose")] if test.poses is not None else []
     parts += [format_count(len(test.path.s), "plane")] if test.path is not None else []
-    yield Fact("After ISO 9283", text.join_words(parts))
+    yield Fact("After ISO 9283", text.join_list(parts))
     yield Fact("Reference", result.reference.name, brief=False)
     yield Fact("Tolerance", format_tolerance(result.tolerance), brief=False)
 

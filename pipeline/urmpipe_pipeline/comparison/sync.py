@@ -166,7 +166,7 @@ def stamp_offset(reference: Run, log: Run) -> float | str:
         return offset_ns / 1e9
     zones = [(run.name, _time_zone(run.log)) for run in (reference, log)]
     if unknown := [name for name, zone in zones if zone is None]:
-        return f"neither Unix times nor dates in {text.join_words(unknown)}"
+        return f"neither Unix times nor dates in {text.join_list(unknown)}"
     if zones[0][1] != zones[1][1]:
         return " and ".join(f"times {zone} in {name}" for name, zone in zones)
     for run in (reference, log):

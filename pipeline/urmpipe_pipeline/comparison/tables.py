@@ -202,7 +202,7 @@ def statistics_tables(one: Deviation, *, ranked: bool = False) -> Iterator[Table
     for unit in text.SHOWN:
         own = [held for held in one.all_statistics if held.unit == unit]
         if own:
-            about = text.join_words(list(dict.fromkeys(ABOUT[held.kind] for held in own)))
+            about = text.join_list(list(dict.fromkeys(ABOUT[held.kind] for held in own)))
             start = (
                 f"t = {text.format_seconds(float(one.t_ns[0]) / 1e9)} s" if one.run.timed else "the first row"
             )
@@ -343,7 +343,7 @@ def _check(run: str, name: str, said: str) -> Check:
 def format_worse_count(found: BaselineComparison) -> str:
     """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
     said = [f"{count_quantities(len(found.worse))} worse"] if found.worse else []
-    criteria = text.join_words([one.now.name for one in found.worse_criteria])
+    criteria = text.join_list([one.now.name for one in found.worse_criteria])
     said += [f"{criteria} worse"] if criteria else []
     said += [f"{len(found.missing)} gone"] if found.missing else []
     return ", ".join(said) or "nothing worse"

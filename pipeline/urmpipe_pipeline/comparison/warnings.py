@@ -146,7 +146,7 @@ def weak_evidence(deviation: Deviation) -> Iterator[LogWarning]:
             partly.setdefault(statistics.samples or 0, []).append(statistics.quantity)
     for samples, quantities in partly.items():
         compared = f"{samples} of {len(deviation.sample)} compared samples"
-        message = f"{text.join_words(quantities)}: judged at {compared}"
+        message = f"{text.join_list(quantities)}: judged at {compared}"
         yield LogWarning(
             "partly-judged", f"{message}; a sample without a value is out of tolerance", about=deviation.name
         )
@@ -264,7 +264,7 @@ def recorded_tcp_mismatch(runs: Sequence[Run], allowed: float) -> Iterator[LogWa
             message = f"its kinematics are {far}, {cause}; this verdict does not include that; {remedy}"
             yield LogWarning(RECORDED_TCP_APART, message, about=run.name)
         else:
-            far = text.join_words(
+            far = text.join_list(
                 [f"{run.name} is up to {text.format_quantity(most, 'm')}" for run, most in group]
             )
             message = f"by forward kinematics {far} from the recorded tool centre points, {cause}"

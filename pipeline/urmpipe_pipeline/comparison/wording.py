@@ -29,9 +29,7 @@ def format_verdict(one: Comparison) -> str:
     said += f" against {one.reference.name}{_points(one)}{_part(one)}{_clocks(one)}"
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
-    lost = (
-        f"; not judged: {text.join_words([log.name for log in one.failed_logs])}" if one.failed_logs else ""
-    )
+    lost = f"; not judged: {text.join_list([log.name for log in one.failed_logs])}" if one.failed_logs else ""
     return said + format_assumptions(one.assumptions) + format_defaults(one.provenance) + lost
 
 

@@ -141,7 +141,7 @@ def format_joints(names: Sequence[str]) -> str:
     """Return "module 3 (phi3)" of a URM arm, "joints q1 and q2" or "elbow_joint"."""
     modules = [match for match in map(MODULE.fullmatch, names) if match]
     is_urm = len(modules) == len(names)
-    listed = text.join_words([f"{match[1]} ({match[0]})" for match in modules] if is_urm else list(names))
+    listed = text.join_list([f"{match[1]} ({match[0]})" for match in modules] if is_urm else list(names))
     if not is_urm and all("joint" in name.lower() for name in names):
         return listed  # a name says it already
     return f"{'module' if is_urm else 'joint'}{'s' if len(names) > 1 else ''} {listed}"
@@ -158,7 +158,7 @@ def format_rows(samples: Sequence[int]) -> str:
     ]
     more = len(parts) - text.MAX_NAMED_ROWS
     parts = [*parts[: text.MAX_NAMED_ROWS], f"{format_count(more, 'more range')}"] if more > 0 else parts
-    return f"row{'s' if len(rows) > 1 else ''} {text.join_words(parts)}"
+    return f"row{'s' if len(rows) > 1 else ''} {text.join_list(parts)}"
 
 
 class Remedy(NamedTuple):
@@ -269,7 +269,7 @@ def _format_motion(cause: Cause) -> str:
         for axis, half in zip("xyz", open_axes, strict=True)
         if half
     ]
-    return f"{prefix}{text.join_words(numbers)} ({'; '.join(notes)})"
+    return f"{prefix}{text.join_list(numbers)} ({'; '.join(notes)})"
 
 
 def _frame_kind(label: str, short: str, subject: str, verb: str) -> KindText:
@@ -308,7 +308,7 @@ def _mirrored_base(cause: Cause) -> str:
     if len(flipped) == 1 and not moved:
         return f"the base is mirrored: {flipped[0]} has the opposite sign"
     if len(moved) == 2 and "-" not in cause.name:
-        return f"the base is mirrored: {text.join_words(moved)} are exchanged"
+        return f"the base is mirrored: {text.join_list(moved)} are exchanged"
     return f"the base is mirrored: its x, y, z are {cause.name}"
 
 

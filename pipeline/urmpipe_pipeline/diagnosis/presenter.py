@@ -107,7 +107,7 @@ def _untested(diagnosis: Diagnosis, most: int | None = None) -> Iterator[str]:
     for untested in diagnosis.untested:
         if untested.reason != diagnosis.unexplained.interpretation:
             labels = [KIND_TEXTS[kind].label for kind in untested.kinds]
-            yield f"{text.join_words(_shorten(labels, most))} ({untested.reason})"
+            yield f"{text.join_list(_shorten(labels, most))} ({untested.reason})"
 
 
 def _shorten(names: Sequence[str], most: int | None) -> list[str]:

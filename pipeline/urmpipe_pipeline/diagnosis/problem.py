@@ -295,7 +295,7 @@ def _unknown_rates(run: Run, motion: Motion | None = None) -> Iterator[UntestedC
         moves = np.fmax.reduce(motion.value, axis=1) - np.fmin.reduce(motion.value, axis=1) > AT_REST
         unknown = np.flatnonzero(moves & ~motion.second.any(axis=1)).tolist()
         if unknown:
-            names = text.join_words([run.log.joints[j] for j in unknown])
+            names = text.join_list([run.log.joints[j] for j in unknown])
             yield UntestedCauses(
                 ("compliance",), f"the rows do not show how {names} accelerate{'s' * (len(unknown) == 1)}"
             )

@@ -153,7 +153,7 @@ def format_summary(diagnosis: Diagnosis) -> str:
         start = f"{rest}; " if rest else PASSES if diagnosis.verdict == "pass" else ""
         only_turns = all(cause.kind == "turns" for cause in unseen)
         effect = "does not move the TCP" if only_turns else "turns the TCP, but does not move it"
-        return f"{start}{text.join_words(list(map(format_cause, unseen)))} (this {effect})"
+        return f"{start}{text.join_list(list(map(format_cause, unseen)))} (this {effect})"
     if diagnosis.verdict == "pass":
         return f"{PASSES}{_format_avoidable(diagnosis)}"
     little = diagnosis.rms - residual.rms < MIN_EXPLAINED * diagnosis.rms
@@ -208,7 +208,7 @@ def _format_avoidable(diagnosis: Diagnosis) -> str:
     undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
     if not listed:
         return f"{amounts} is explained: {undecided}"
-    conditions = text.join_words([build_remedy(cause).conditional() for cause in listed])
+    conditions = text.join_list([build_remedy(cause).conditional() for cause in listed])
     return "; ".join(
         filter(None, (f"{amounts} would go if {conditions}", _format_more(diagnosis, listed), undecided))
     )
@@ -220,7 +220,7 @@ def _format_chain(diagnosis: Diagnosis) -> str:
     clocks = list(takewhile(lambda cause: cause.kind in CLOCKS, listed))
     parts = []
     if clocks:
-        clauses = text.join_words([format_cause(cause) for cause in clocks])
+        clauses = text.join_list([format_cause(cause) for cause in clocks])
         if len(clocks) < len(listed):
             parts.append(f"{clauses}; after that {format_amount(clocks[-1].rms_after, unit)} rms")
         else:
@@ -233,7 +233,7 @@ def _format_chain(diagnosis: Diagnosis) -> str:
             change = format_change(step[0].rms_before, step[-1].rms_after, unit)
             is_alone = len(step) == len(diagnosis.causes) and not diagnosis.undecided
             change = f": {change if is_alone else _in_chain(change, is_first=not parts)}"
-        clauses = text.join_words([format_cause(cause) for cause in step])
+        clauses = text.join_list([format_cause(cause) for cause in step])
         parts.append(f"{'then ' if parts else ''}{clauses}{change}")
     more = _format_more(diagnosis, listed)
     parts += [more] if more else []
@@ -293,14 +293,14 @@ def format_undecided(alternatives: Sequence[Alternative]) -> str:
     clauses += [f"{more} more" if more > 1 else "another"] if more > 0 else []
     joints = dict.fromkeys(filter(None, (each.discriminating_joint for each in alternatives)))
     decides = (
-        f"more motion of {text.join_words([*joints])} would decide" if joints else "this log cannot decide"
+        f"more motion of {text.join_list([*joints])} would decide" if joints else "this log cannot decide"
     )
     return f"either {' or '.join(clauses)} ({decides})"
 
 
 def format_explanation(explanation: Alternative | UnidentifiableCauses) -> str:
     """Return the causes of one explanation."""
-    return text.join_words([format_cause(cause) for cause in explanation.causes]) or "none of these"
+    return text.join_list([format_cause(cause) for cause in explanation.causes]) or "none of these"
 
 
 def format_refusal(refused: UnidentifiableCauses) -> str:

@@ -12,7 +12,7 @@ from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.presentation.parts import recording_fact, table_of
 from urmpipe_pipeline.presentation.section import Cell, Column, Fact, Table, Value
-from urmpipe_pipeline.text import format_rounded, join_words
+from urmpipe_pipeline.text import format_rounded, join_list
 
 MANY = 6
 """Gaps and redundant constraints that are named in a sentence; the others are counted."""
@@ -94,7 +94,7 @@ def structure_words(result: NetworkResult) -> str:
     """Return how it hangs together: "closed chain of 4 bodies by 4 joints, 1 loop"."""
     network = result.network
     counts = ((len(network.joints), "joint"), (len(network.elements), "element"))
-    ties = join_words([format_count(count, noun) for count, noun in counts if count])
+    ties = join_list([format_count(count, noun) for count, noun in counts if count])
     loops = format_count(len(result.loops), "loop") if result.loops else "no loop"
     held = f" by {ties}" if ties else ""
     return f"{result.structure} of {len(network.body_names)} bodies{held}, {loops}"

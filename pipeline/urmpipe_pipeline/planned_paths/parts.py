@@ -51,7 +51,7 @@ def law_words(plan: PlannedPath) -> str:
     given = ((plan.velocity, "m/s"), (plan.acceleration, "m/s²"), (plan.jerk, "m/s³"))
     values = [f"{value:.6g} {unit}" for value, unit in given if value is not None]
     held = " in total" if plan.arcs == "total" else " along the path"
-    within = f"up to {text.join_words(values)}{held}" if values else ""
+    within = f"up to {text.join_list(values)}{held}" if values else ""
     return ", ".join(filter(None, ("limits of the joints" if plan.law == "limits" else plan.law, within)))
 
 

@@ -132,7 +132,7 @@ class _Steps(NamedTuple):
         return int(np.argmax(np.abs(self.sizes)))
 
     def joint_names(self, log: JointLog) -> str:
-        return text.join_words([log.joints[j] for j in np.unique(self.joints).tolist()])
+        return text.join_list([log.joints[j] for j in np.unique(self.joints).tolist()])
 
 
 class _Unwrapped(NamedTuple):

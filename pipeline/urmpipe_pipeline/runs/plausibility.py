@@ -336,6 +336,6 @@ def _join_excesses(kind: str, excesses: list[_Excess], noun: str, advice: str) -
         for excess in excesses
         if excess is not worst
     ]
-    message = f"{worst.message}; also {text.join_words(joints)}" if joints else worst.message
+    message = f"{worst.message}; also {text.join_list(joints)}" if joints else worst.message
     row = min(int(excess.rows[0]) for excess in excesses) + 1
     return [LogWarning(kind, f"{message}: {advice}", row)]

@@ -136,7 +136,7 @@ def effort_warning(
         for summary in exceeding
         if summary is not worst
     ]
-    message += f"; also {text.join_words(joints)}" if joints else ""
+    message += f"; also {text.join_list(joints)}" if joints else ""
     return [LogWarning(EFFORT_LIMIT, f"{message}: {advice}", row, hints=hints)]
 
 
@@ -168,7 +168,7 @@ def noise_warnings(run: Run) -> list[LogWarning]:
     message = "joint values are noisy or coarse for torques: accelerations by differences give"
     message += f" {names[worst]} {before[worst]:.4g} {unit} rms, smoothed over {WINDOW} samples"
     message += f" {after[worst]:.4g} {unit}"
-    message += f"; also {text.join_words([names[j] for j in sorted(further)])}" if further else ""
+    message += f"; also {text.join_list([names[j] for j in sorted(further)])}" if further else ""
     return [LogWarning(TORQUE_NOISE, message, hints=(SMOOTHED,))]
 
 

@@ -180,11 +180,11 @@ def _limit_words(group: Group, limits: Mapping[str, float]) -> str:
         own = {f"{limits[name] * factor:.6g}": None for name in signal.names if name in limits}
         found.setdefault(signal.variable, {}).update(own)
     words = [
-        f"the limit of |{variable}|, {f'{text.join_words(list(values))} {unit}'.rstrip()}"
+        f"the limit of |{variable}|, {f'{text.join_list(list(values))} {unit}'.rstrip()}"
         for variable, values in found.items()
         if values
     ]
-    return f"Dashed: {text.join_words(words)}; tinted: beyond it." if words else ""
+    return f"Dashed: {text.join_list(words)}; tinted: beyond it." if words else ""
 
 
 def _described(one: Signal) -> str:

@@ -28,7 +28,7 @@ from urmpipe_pipeline.solved_targets.parts import (
 )
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import opening_row, scene
-from urmpipe_pipeline.text import join_words
+from urmpipe_pipeline.text import join_list
 
 
 def present(one: IkResult) -> Presentation:
@@ -88,7 +88,7 @@ def headline(one: IkResult) -> str:
     others = [format_count(jumps, "jump")] * bool(jumps) + [f"{format_count(fast, 'joint')} too fast"] * bool(
         fast
     )
-    return f"{said}, with {join_words(others)}" if others else said
+    return f"{said}, with {join_list(others)}" if others else said
 
 
 def _checks(one: IkResult) -> Iterator[Check]:
