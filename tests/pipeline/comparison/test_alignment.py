@@ -297,34 +297,6 @@ def test_a_doubtful_recorded_orientation_is_asked_for_where_the_alignment_goes_b
         assert compare_with_recorded_tcp(run, options).assumptions == ()
 
 
-@pytest.mark.parametrize(
-    ("turns", "said"),
-    [
-        (np.zeros((200, 3)), "do not determine the offset of the tool, so the smallest values are used"),
-        (
-            np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.0, 1.0]),
-            "do not determine the offset of the tool along z, so the smallest values are used",
-        ),
-        (
-            np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.6, 0.8])
-            + np.outer(np.cos(np.arange(200)), [0.0, -0.008, 0.006]),
-            "hardly determine the offset of the tool along (0.00, 0.60, 0.80), so a small error of the log"
-            " causes a large one",
-        ),
-    ],
-)
-def test_what_poses_do_not_tell_of_base_and_tool_is_said(turns: FloatArray, said: str) -> None:
-    position, _ = motion()
-    turn = Rotation.from_rotvec(turns)
-    measured = FRAME.apply(position + turn.apply(OFFSET)) + SHIFT
-    log = path_run(position, turn.as_quat(), name="log")
-    result = compare_runs(path_run(measured), [log], CompareOptions(align="base+tool"))
-    assert result.runs[0].statistics["norm"].max < ROUNDING
-    told = [(one.kind, str(one)) for one in result.warnings]
-    assert told == [("frames-open", f"log: align (--align): the compared poses {said}")]
-    assert (result.runs[0].alignment.unobservable[0].sensitivity < 1e-4) == ("do not" in said)
-
-
 def test_samples_without_an_orientation_carry_no_tool_between_base_and_probe() -> None:
     position, turn = motion()
     quat = turn.as_quat()
