@@ -17,7 +17,7 @@ from asserting import there
 from exported import export_result
 from made_plans import DOWN, SMALL, limited, planned
 from panda_log import URDF, motion, panda, panda_csv
-from presented import cells, figures, scene_of
+from presented import cells, figures
 from recorded import rows_of
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import energies_over_log, torques_over_log
@@ -154,31 +154,6 @@ def test_json_has_the_largest_torque_of_each_joint(run: Run) -> None:
     json.dumps(to_json_value(torques), allow_nan=False)
 
 
-def test_several_joints_beyond_their_efforts_are_one_warning(run: Run) -> None:
-    robot = there(run.robot)
-    weak = replace(robot, joints=tuple(replace(one, effort=40.0) for one in robot.joints))
-    (warning,) = (one for one in with_robot(run, weak).warnings if one.kind == "effort-limit")
-    counts = np.count_nonzero(np.abs(there(run.tau)) > 40.0, axis=0).tolist()
-    assert warning.row == np.flatnonzero((np.abs(there(run.tau)) > 40.0).any(axis=1))[0] + 1
-    others = [f"panda_joint{j + 1} ({counts[j]} samples)" for j in (0, 2, 3) if counts[j]]
-    assert warning.message.startswith("panda_joint2 needs more than its effort of 40 N.m in ")
-    assert f"; also {' and '.join([', '.join(others[:-1]), others[-1]])}: check masses" in warning.message
-
-
-def test_a_robot_without_masses_gives_what_it_gave(run: Run) -> None:
-    bare = with_robot(run, replace(there(run.robot), inertials=(), left_out=()))
-    assert bare.tau is None
-    assert [name for name in bare.to_frame().columns if name.startswith("tau_")] == []
-    assert bare.to_dict()["torques"] == []
-    assert [one for one in bare.warnings if one.kind in ("effort-limit", "mass-left-out")] == []
-    shown = present(bare)
-    assert [one.title for one in figures(shown.body)] == [
-        "Joints", "Speed of the tool centre point", "Motion",
-    ]  # fmt: skip
-    assert scene_of(shown).title == "Arm and paths [m]"
-    assert [one for one in shown.body.blocks() if isinstance(one, Drawing)] == []
-
-
 def test_a_plan_has_the_torques_of_its_exact_rates() -> None:
     plan = planned(load_robot("ur10"), SMALL)
     joints, run = there(plan.joints), plan.as_run()
@@ -289,12 +264,6 @@ def test_the_table_has_each_joint_with_its_limit(run: Run) -> None:
     for key in ("t_max", "effort", "effort_share", "out_fraction"):
         assert found[key] == [one[key] for one in told]
     assert found["max"] == [float(f"{one['max']:.4g}") for one in told]
-
-
-def test_the_scene_has_the_mass_centres(run: Run) -> None:
-    scene = scene_of(present(run))
-    assert scene.title == "Arm, its mass centres (yellow) and paths [m]"
-    assert [one.masses for one in scene.arms] == [True]
 
 
 def test_a_page_draws_the_arm_with_its_mass_centres(run: Run) -> None:
