@@ -25,33 +25,29 @@ def test_the_command_that_opens_a_recording_works_without_an_activated_environme
     command = tmp_path / "bin" / "urmpipe"
     command.parent.mkdir()
     command.touch(mode=0o755)
+
+    def opened(name: str, is_replaced: bool = False) -> str:
+        line = recording_line(Path(name), is_replaced)
+        return line.removeprefix(f"Recording: {name}  (open it: ").removesuffix(")")
+
     monkeypatch.setenv("PATH", str(command.parent))
-    line = recording_line(Path("run.rrd"))
-    assert line == "Recording: run.rrd  (open it: urmpipe view run.rrd)"
-    line = recording_line(Path("run.rrd"), is_replaced=True)
-    said = "Recording: run.rrd  (open it: urmpipe view run.rrd; it replaced an earlier one)"
-    assert line == said
-
-    line = recording_line(Path("joint 3.rrd"))
-    quoted = shell_quote("joint 3.rrd")
-    assert line == f"Recording: joint 3.rrd  (open it: urmpipe view {quoted})"
-
+    assert opened("run.rrd") == "urmpipe view run.rrd"
+    assert opened("run.rrd", is_replaced=True) == "urmpipe view run.rrd; it replaced an earlier one"
+    assert opened("joint 3.rrd") == f"urmpipe view {shell_quote('joint 3.rrd')}"
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(command.with_name("python")))
-    line = recording_line(Path("run.rrd"))
-    assert line == f"Recording: run.rrd  (open it: {command} view run.rrd)"
-
+    assert opened("run.rrd") == f"{command} view run.rrd"
     monkeypatch.chdir(tmp_path)
-    line = recording_line(Path("run.rrd"))
-    within = Path("bin") / "urmpipe"
-    assert line == f"Recording: run.rrd  (open it: {within} view run.rrd)"
+    assert opened("run.rrd") == f"{Path('bin', 'urmpipe')} view run.rrd"
+
+
+PATH_ROWS = "t,x [m],y [m],z [m]\n" + "".join(f"{0.005 * k:.3f},{0.001 * k:.3f},0,0\n" for k in range(40))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows allows no such names")
 def test_nothing_in_a_name_acts_on_the_terminal(urmpipe: Callable[..., Any], tmp_path: Path) -> None:
-    rows = "".join(f"{0.005 * k:.3f},{0.001 * k:.3f},0,0\n" for k in range(40))
-    (tmp_path / "wanted\x1b[31m.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
-    (tmp_path / "done\r\n.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+    for name in ("wanted\x1b[31m.csv", "done\r\n.csv"):
+        (tmp_path / name).write_text(PATH_ROWS, encoding="utf-8")
     (tmp_path / "wrong\x1b.csv").write_text("t,q1\n0,x\n1,2\n", encoding="utf-8")
     for words, code in (
         (["ingest", "wanted\x1b[31m.csv"], 0),
@@ -81,9 +77,8 @@ def test_what_is_to_be_typed_holds_names_with_spaces_together(
     urmpipe: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", "")
-    rows = "".join(f"{0.005 * k:.3f},{0.001 * k:.3f},0,0\n" for k in range(40))
     for name in ("wanted path.csv", "run 01.csv"):
-        (tmp_path / name).write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+        (tmp_path / name).write_text(PATH_ROWS, encoding="utf-8")
     ran = urmpipe("compare", "wanted path.csv", "run 01.csv")
     assert ran.code == 0
     typed = ran.out.rpartition("(open it: ")[2].strip().removesuffix(")")
@@ -93,8 +88,7 @@ def test_what_is_to_be_typed_holds_names_with_spaces_together(
 
 
 def test_a_report_says_that_it_replaced_an_earlier_one(urmpipe: Callable[..., Any], tmp_path: Path) -> None:
-    rows = "".join(f"{0.005 * k:.3f},{0.001 * k:.3f},0,0\n" for k in range(40))
-    (tmp_path / "path.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+    (tmp_path / "path.csv").write_text(PATH_ROWS, encoding="utf-8")
     assert urmpipe("compare", "path.csv", "path.csv", "-o", "verdict.rrd").code == 0
     assert urmpipe("report", "verdict.rrd").out == "Report: verdict.html  (open it in any browser)\n"
     said = "Report: verdict.html  (open it in any browser; it replaced an earlier one)\n"
