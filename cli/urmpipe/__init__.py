@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.tables import Exported as Exported
 
 __version__ = "0.1.0"
+is_command_process = False  # set by `urmpipe.main.main`: no other code uses this Python afterwards
 
 _HOME = {
     "AccuracyResult": "urmpipe_pipeline.accuracy.result",

@@ -23,6 +23,7 @@ from typing import Any
 
 import click
 
+import urmpipe
 from urmpipe import __version__, commands
 from urmpipe.answers import (
     ERROR,
@@ -171,6 +172,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        urmpipe.is_command_process = True
         gc.set_threshold(GARBAGE_THRESHOLD)
         open_streams()
         for number in (signal.SIGINT, signal.SIGTERM):  # a request to end stops as Ctrl-C does

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
+import urmpipe
 from urmpipe import __version__
 from urmpipe.public_functions import PathLike
 from urmpipe_models.errors import Finding, OptionError, format_value, map_collecting_errors
@@ -85,7 +86,7 @@ def guarded_outputs(named: Mapping[OutputKind, PathLike | None], inputs: Sequenc
             raise OptionError(f"found {path} as {other} and as {kind}; allowed: a name for each")
     map_collecting_errors(lambda target: check_output(target[1], inputs, target[0]), targets.items())
     if "recording" in targets:
-        preload_writer()
+        preload_writer(pandas=not urmpipe.is_command_process)
     with atomic_group():
         yield Outputs(targets, inputs)
 

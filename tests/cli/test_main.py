@@ -369,3 +369,18 @@ def test_an_error_that_a_stop_caused_is_a_stop(
     monkeypatch.setattr(cli, "main", fail)
     assert run(["ingest", "log.csv"]) == 2
     assert capsys.readouterr().err == "error: stopped; no file is left incomplete\n"
+
+
+def test_a_command_records_without_pandas_and_leaves_it_usable(tmp_path: Path) -> None:
+    code = """
+import atexit, sys
+import pyarrow
+from urmpipe.main import main
+def check():
+    print("pandas" in sys.modules, pyarrow.table({"a": [1]}).to_pandas()["a"].tolist())
+atexit.register(check)
+main()
+"""
+    line = ["ingest", str(LOGS / "matlab.csv"), "--robot", "urm6", "-q", "-o", str(tmp_path / "run.rrd")]
+    done = subprocess.run([sys.executable, "-c", code, *line], capture_output=True, text=True, check=True)
+    assert done.stdout == "False [1]\n"

@@ -8,6 +8,7 @@ that this process did not write is first read in a separate process (`find_crash
 from __future__ import annotations
 
 import re
+import sys
 import warnings
 from importlib import import_module
 from pathlib import Path
@@ -99,11 +100,36 @@ def read_through(path: str) -> None:
         pass
 
 
-def preload_writer() -> None:
+def preload_writer(*, pandas: bool = True) -> None:
     """Import what writes recordings in another thread: most of a second, while a log is read.
 
     pyarrow imports pandas with the first array that it is given. Nothing waits for the thread: Ctrl-C may
     leave a lock of an import, for which it would wait forever.
+
+    Args:
+        pandas: Whether pyarrow can convert to pandas afterwards. Without that, recordings are written as they
+            are with it, and 300 modules are not imported.
     """
-    names = ("rerun.blueprint", "pandas")
+    if not pandas and "pandas" not in sys.modules:
+        _hide_pandas()
+    names = ("rerun.blueprint", "pandas") if pandas else ("rerun.blueprint",)
     Thread(target=lambda: [import_module(name) for name in names], daemon=True).start()
+
+
+def _hide_pandas() -> None:
+    """Let pyarrow look for pandas while it cannot be found: once for arrays and once for other values."""
+    import numpy as np
+    import pyarrow as pa
+
+    class Finder:
+        @staticmethod
+        def find_spec(name: str, path: object = None, target: object = None) -> None:
+            if name == "pandas":
+                raise ModuleNotFoundError(name)
+
+    sys.meta_path.insert(0, Finder)
+    try:
+        pa.array(np.zeros(1))
+        pa.scalar(0)
+    finally:
+        sys.meta_path.remove(Finder)
