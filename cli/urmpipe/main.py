@@ -256,14 +256,14 @@ def run(arguments: Sequence[str]) -> int:
     except click.exceptions.NoArgsIsHelpError as error:  # a group alone, which is answered by its help
         error.show()
     except (Exception, KeyboardInterrupt) as raised:
-        error = KeyboardInterrupt() if _stopped else raised  # an import may have made another error of it
+        reason = KeyboardInterrupt() if _stopped else raised  # an import may have made another error of it
         if options.get("debug"):
             import traceback
 
             traceback.print_exception(raised)
-        findings = error_to_findings(error)
+        findings = error_to_findings(reason)
         print_errors(findings, as_json=bool(options.get("json")))
-        if not isinstance(error, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
+        if not isinstance(reason, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
             write_junit_errors(options, operands, findings)
     return ERROR
 

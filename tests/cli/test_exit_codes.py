@@ -125,9 +125,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert run(["ingest", "log.csv", "--robot", "urm6", "-q", "-o", "run.rrd"]) == 0
         assert run(["fmu", "build", "dc_drive", "--backend", "python", "-q"]) == 0
     built, broken = (folder / f"{name}.fmu" for name in ("dc_drive", "broken"))
-    with zipfile.ZipFile(built) as source, zipfile.ZipFile(broken, "w") as target:
-        for name in source.namelist():
-            text = source.read(name)
+    with zipfile.ZipFile(built) as good, zipfile.ZipFile(broken, "w") as target:
+        for name in good.namelist():
+            text = good.read(name)
             is_description = name == "modelDescription.xml"
             target.writestr(name, text.replace(b'unit="V"', b'unit="ell"', 1) if is_description else text)
     return folder

@@ -7,7 +7,7 @@ statistics and its verdict stay.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack, overload
@@ -43,7 +43,7 @@ def diagnose(
 @overload
 def diagnose(
     reference: Operand,
-    logs: Sequence[Operand],
+    logs: list[Any] | tuple[Any, ...],
     robot: Robot | None = None,
     **options: Unpack[Diagnose],
 ) -> Comparison: ...
@@ -61,7 +61,7 @@ def diagnose(
 @public_function(Diagnose, robot=kinds.ROBOT)
 def diagnose(
     reference: Operand | Comparison,
-    logs: Operand | Sequence[Operand] | None = None,
+    logs: Operand | list[Any] | tuple[Any, ...] | None = None,
     robot: Robot | None = None,
     **options: Unpack[Diagnose],
 ) -> Diagnosis | Comparison:

@@ -12,9 +12,9 @@ import urmpipe
 from urmpipe.answers import Answer, Call, command, default_output
 from urmpipe.command_line import operand
 from urmpipe.parameters import kinds
-from urmpipe.parameters.comparing import Baseline, Compare, Strict
+from urmpipe.parameters.comparing import Baseline, Compare
 from urmpipe.parameters.param import params_of
-from urmpipe.parameters.shared import ROBOT, Debugging, Printing
+from urmpipe.parameters.shared import ROBOT, Debugging, Printing, Strict
 
 OF_RESULTS = {*params_of(Baseline, Strict, Printing, Debugging), "junit", "csv"}  # of finished comparisons
 

@@ -54,7 +54,7 @@ def diagnose(
             finished or reference, operands or None, output=output, defaults=defaults,
             progress=progress, **options,
         )  # fmt: skip
-    comparison = getattr(result, "comparison", None) or result
+    comparison: Any = getattr(result, "comparison", None) or result
     return Answer(
         result,
         _iter_lines(result, is_replaced, options),
