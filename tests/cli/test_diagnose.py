@@ -179,7 +179,10 @@ def test_a_finished_comparison_is_diagnosed_as_its_logs_are(capsys: Captured) ->
         assert [one.diagnosis.to_dict() for one in made.runs if one.diagnosis] == wanted
         assert made.verdict == compared.verdict
     two = [urmpipe.ingest(name, "urm6") for name in logs]  # the reference has joints
-    (one,), (other,) = urmpipe.diagnose(two[0], [two[1]]).runs, urmpipe.diagnose(urmpipe.compare(*two)).runs
+    (one,), (other,) = (
+        urmpipe.diagnose(two[0], [two[1]]).runs,
+        urmpipe.diagnose(urmpipe.compare(two[0], two[1])).runs,
+    )
     assert there(one.diagnosis).to_dict() == there(other.diagnosis).to_dict()
     capsys.readouterr()
     assert run(["diagnose", "made.rrd", "-q", "-o", "why.rrd", "--junit", "why.xml"]) == 1

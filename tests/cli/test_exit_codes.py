@@ -127,9 +127,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     built, broken = (folder / f"{name}.fmu" for name in ("dc_drive", "broken"))
     with zipfile.ZipFile(built) as good, zipfile.ZipFile(broken, "w") as target:
         for name in good.namelist():
-            text = good.read(name)
+            content = good.read(name)
             is_description = name == "modelDescription.xml"
-            target.writestr(name, text.replace(b'unit="V"', b'unit="ell"', 1) if is_description else text)
+            target.writestr(
+                name, content.replace(b'unit="V"', b'unit="ell"', 1) if is_description else content
+            )
     return folder
 
 

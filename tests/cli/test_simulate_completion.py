@@ -6,6 +6,7 @@ import click
 import pytest
 from click.shell_completion import ShellComplete
 
+from asserting import there
 from urmpipe.commands.simulate import simulate as command
 from urmpipe.main import cli
 from urmpipe.parameters.kinds import UNIT_MODEL
@@ -14,7 +15,7 @@ from urmpipe.parameters.kinds import UNIT_MODEL
 def test_names_complete_in_the_shell() -> None:
     context, argument = click.Context(command), command.params[0]
     assert argument.shell_complete(context, "six")[1].value == "six-drives"
-    units = UNIT_MODEL.complete(context, argument, "dc")
+    units = there(UNIT_MODEL.complete)(context, argument, "dc")
     assert [(one.value, one.type) for one in units] == [("dc", "file"), ("dc_drive", "plain")]
 
 

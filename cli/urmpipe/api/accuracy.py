@@ -117,15 +117,15 @@ def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Re
     parts: tuple[Callable[[], Any], ...] = (
         lambda: start_of(arm, start),
         lambda: refuse_unlimited(timing, arm),
-        lambda: _refuse_undriven(arm),
+        lambda: _check_drives(arm),
     )
     begin, _, _ = map_collecting_errors(lambda make: make(), parts)
     return Request(arm, begin, timing)
 
 
-def _refuse_undriven(arm: Chain) -> None:
+def _check_drives(arm: Chain) -> None:
     """Raise a `RobotError` with every key that a driven arm lacks."""
-    driven = {one.joint for one in arm.drives}
+    driven = {drive.joint for drive in arm.drives}
     faults = [] if arm.inertials else [f"robot {arm.name}: key inertials: not found, allowed: its masses"]
     faults += [
         f"robot {arm.name}: key drives.{name}: not found, allowed: the drive of the joint, or {{ k, l }} of a"
@@ -133,7 +133,7 @@ def _refuse_undriven(arm: Chain) -> None:
         for name in arm.coordinates
         if name not in driven
     ]
-    if not faults and not any(isinstance(one, DrivenJoint) for one in arm.drives):
+    if not faults and not any(isinstance(drive, DrivenJoint) for drive in arm.drives):
         faults.append(f"robot {arm.name}: key drives: found no joint with a drive, allowed: at least one")
     if faults:
         raise RobotError(*faults)
@@ -146,8 +146,8 @@ def _read_rows(path: PathLike | PathRows, options: Mapping[str, Any]) -> GivenPa
         with Path(path).open("rb") as file:
             header = file.readline(HEAD)
         if PATH_ROW.encode() in header:
-            found, allowed = "the log of a plan", "the rows that it was made of"
-            raise LogError(Finding(file=str(path), found=found, allowed=allowed))
+            allowed = "the rows that it was made of"
+            raise LogError(Finding(file=str(path), found="the log of a plan", allowed=allowed))
     return given_path(path, to_read_options(options))
 
 
@@ -160,107 +160,113 @@ def _check_velocities(velocities: Sequence[float]) -> list[float]:
 
 
 def _runs(
-    given: GivenPath,
+    rows: GivenPath,
     request: Request,
     force: tuple[float, float, float],
     backend: Backend | None,
-    told: Callable[[str], None],
+    on_message: Callable[[str], None],
     progress: Callable[[float], None],
-    first: float,
+    first_velocity: float,
 ) -> tuple[ArmRuns, list[LogWarning]]:
-    """Return the runs of the arm, and what a person should know of how they are made."""
+    """Return the runs of the arm, and the warnings about how they are computed."""
     arm = request.arm
     assert arm is not None
-    period = (
-        np.gcd.reduce([round(one.period * 1e9) for one in arm.drives if isinstance(one, DrivenJoint)]) / 1e9
-    )
-    along = joints_of(given, request)
+    periods = [round(drive.period * 1e9) for drive in arm.drives if isinstance(drive, DrivenJoint)]
+    period = float(np.gcd.reduce(periods)) / 1e9
+    joint_path = joints_of(rows, request)
 
     def plan(velocity: float) -> PlannedPath:
         """Return the path at a velocity; raise a `PathError` if the arm cannot move so."""
-        timing = replace(request.timing, velocity=velocity, tsp=float(period))
-        found = plan_path(given, replace(request, timing=timing), joints=along)
-        if found.infeasibilities:
-            one = found.infeasibilities[0]
-            raise PathError(given.finding(one.row, one.message, "a path that the arm can follow"))
-        return found
+        timing = replace(request.timing, velocity=velocity, tsp=period)
+        planned = plan_path(rows, replace(request, timing=timing), joints=joint_path)
+        if planned.infeasibilities:
+            first = planned.infeasibilities[0]
+            raise PathError(rows.finding(first.row, first.message, "a path that the arm can follow"))
+        return planned
 
-    joints = plan(first).joints
+    joints = plan(first_velocity).joints
     assert joints is not None
-    chosen, slow = select_backend(backend)
-    notes = []
+    chosen, reason = select_backend(backend)
+    warnings = []
     if chosen == "python":
-        said = f"the arm runs in NumPy, {SLOWER} times slower than machine code{f': {slow}' if slow else ''}"
-        told(said)
-        notes += [LogWarning(ON_PYTHON, said)] if slow else []
+        message = f"the arm runs in NumPy, {SLOWER} times slower than machine code"
+        message += f": {reason}" if reason else ""
+        on_message(message)
+        warnings += [LogWarning(ON_PYTHON, message)] if reason else []
     unit = ArmUnit(replace(arm, start=tuple(joints.q[0].tolist())), force)
-    return ArmRuns(unit, plan, chosen == "native", told, progress), notes
+    return ArmRuns(unit, plan, chosen == "native", on_message, progress), warnings
 
 
 def _judge(runs: ArmRuns, limit: float, error: str) -> Callable[[Sequence[float]], list[bool]]:
-    """Return what runs velocities, and tells of each whether the arm reaches it within a limit."""
+    """Return a function that runs velocities, and returns whether the arm reaches each within a limit."""
 
-    def within(velocities: Sequence[float]) -> list[bool]:
-        """Tell of each velocity whether it is within the limit."""
-        found = [one.errors for one in runs.run(velocities)]
-        judged = [one.error if error == "time" else one.path_error for one in found]
-        reached = [one.reached >= REACHED * one.velocity for one in found]
-        return [one is not None and one <= limit and ran for one, ran in zip(judged, reached, strict=True)]
+    def is_within(velocities: Sequence[float]) -> list[bool]:
+        """Return for each velocity whether it is within the limit."""
+        results = [motion.errors for motion in runs.run(velocities)]
+        judged = [result.error if error == "time" else result.path_error for result in results]
+        reached = [result.reached >= REACHED * result.velocity for result in results]
+        return [
+            value is not None and value <= limit and is_reached
+            for value, is_reached in zip(judged, reached, strict=True)
+        ]
 
-    return within
+    return is_within
 
 
 def _accuracy(
-    given: GivenPath,
+    rows: GivenPath,
     request: Request,
     runs: ArmRuns,
     motions: Sequence[DrivenMotion],
     speed: float | None,
     limit: float | None,
     error: Decides,
-    notes: Sequence[LogWarning],
+    warnings: Sequence[LogWarning],
 ) -> AccuracyResult:
     """Return the result of runs."""
     arm, timing = runs.arm.robot, request.timing
     longest = max(motions, key=len)
     poses = np.unique(np.linspace(0, len(longest.set_q) - 1, POSES).astype(int))
     radius = max(spectral_radius(arm, longest.set_q[k]) for k in poses)
-    every = {one.velocity: one.errors for one in runs.motions.values()}
+    errors = {motion.velocity: motion.errors for motion in runs.motions.values()}
     options: dict[str, Any] = {**timing.options, "robot": arm.name, "force": list(runs.arm.force)}
-    options |= {"velocities": [one.velocity for one in motions], "limit": limit, "error": error}
+    options |= {"velocities": [motion.velocity for motion in motions], "limit": limit, "error": error}
     return AccuracyResult(
-        name=given.name,
+        name=rows.name,
         robot=arm,
-        rows=given.rows,
+        rows=rows.rows,
         law=timing.law,
         acceleration=timing.acceleration_limit,
         jerk=timing.jerk,
         period=float(np.diff(longest.t_ns[:2])[0]) / 1e9,
         force=runs.arm.force,
         motions=tuple(motions),
-        probed=() if limit is None else tuple(one for _, one in sorted(every.items())),
+        probed=() if limit is None else tuple(errors[velocity] for velocity in sorted(errors)),
         running=None if speed is None else runs.motions[speed],
         limit=limit,
         limited_error=error,
         loop_radius=radius,
         compiled=runs.compiled,
-        warnings=(*given.warnings, *notes, *_warnings(motions, radius, speed)),
-        provenance=build_provenance("accuracy", options, [given.file] if given.file else []),
+        warnings=(*rows.warnings, *warnings, *_iter_warnings(motions, radius, speed)),
+        provenance=build_provenance("accuracy", options, [rows.file] if rows.file else []),
     )
 
 
-def _warnings(motions: Sequence[DrivenMotion], radius: float, speed: float | None) -> Iterator[LogWarning]:
-    """Yield what a person should know: loops that are not stable, velocities that are not reached."""
+def _iter_warnings(
+    motions: Sequence[DrivenMotion], radius: float, speed: float | None
+) -> Iterator[LogWarning]:
+    """Yield warnings about unstable loops, velocities that are not reached, and runs that diverged."""
     if radius >= 1.0:
-        said = f"the sampled controllers are not stable about the path: spectral radius {radius:.6g}"
-        yield LogWarning("unstable-loop", f"{said}, allowed: below 1")
-    slow = [one.errors for one in motions if one.errors.reached < REACHED * one.velocity]
+        message = f"the sampled controllers are not stable about the path: spectral radius {radius:.6g}"
+        yield LogWarning("unstable-loop", f"{message}, allowed: below 1")
+    slow = [motion.errors for motion in motions if motion.errors.reached < REACHED * motion.velocity]
     if slow:
-        told = ", ".join(f"{one.velocity:g} m/s ({one.reached:.4g})" for one in slow)
-        yield LogWarning("not-reached", f"the path or the joint limits keep the speed below {told}")
+        speeds = ", ".join(f"{errors.velocity:g} m/s ({errors.reached:.4g})" for errors in slow)
+        yield LogWarning("not-reached", f"the path or the joint limits keep the speed below {speeds}")
     if speed == FASTEST:
         yield LogWarning("fastest", f"all velocities up to {FASTEST:g} m/s are within the limit")
-    for one in motions:
-        if one.diverged is not None:
-            said = f"at {one.velocity:g} m/s {one.diverged.joint} deviates from its set points by more than"
-            yield LogWarning("diverged", f"{said} a turn at t = {one.diverged.t:.4g} s: the run ends there")
+    for motion in motions:
+        if (end := motion.diverged) is not None:
+            message = f"at {motion.velocity:g} m/s {end.joint} deviates from its set points by more"
+            " than a turn"
+            yield LogWarning("diverged", f"{message} at t = {end.t:.4g} s: the run ends there")

@@ -141,7 +141,7 @@ def run_comparison(
         def checked(comparison: Comparison) -> Comparison:
             """Return a comparison with the warnings about the noise, if no warning is an error."""
             if earlier is not None:
-                others = [one for one in comparison.warnings if one.kind != LARGE_NOISE]
+                others = [warning for warning in comparison.warnings if warning.kind != LARGE_NOISE]
                 warnings = (*others, *large_noises(noise, comparison.tolerance))
                 comparison = replace(comparison, warnings=warnings)
             _raise_warnings(values["strict"], comparison)
@@ -149,7 +149,7 @@ def run_comparison(
 
         ready = finished
         if ready is None and earlier is not None and not operands[1:]:
-            ready = _load_made(reference, values["output"])
+            ready = _load_comparison(reference, values["output"])
         failed: list[FailedLog] | None = [] if values.get("keep_going") else None
         result = checked(ready) if ready else _compare(operands, load, options, checked, failed)
         if earlier is not None:
@@ -179,8 +179,9 @@ def normalise_operands(operands: Mapping[str, Sequence[Any]], *further: type) ->
 
 def _with_tables(name: str, operands: Sequence[Any]) -> Iterator[Any]:
     """Yield operands, the tables among them as logs with this name, and a number if there are several."""
-    for k, one in enumerate(operands, start=1):
-        yield held_of(one, f"{name} {k}" if len(operands) > 1 else name) if is_table(one) else one
+    for k, operand in enumerate(operands, start=1):
+        label = f"{name} {k}" if len(operands) > 1 else name
+        yield held_of(operand, label) if is_table(operand) else operand
 
 
 def _check_log_parameters(operands: Sequence[Any], values: Mapping[str, Any]) -> None:
@@ -195,29 +196,29 @@ def _compare(
     load: Callable[..., list[Run]],
     options: CompareOptions | IsoOptions,
     checked: Callable[[Comparison], Comparison],
-    unjudged: list[FailedLog] | None,
+    failed: list[FailedLog] | None,
 ) -> Comparison:
-    """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
-    if any(isinstance(one, Comparison) for one in operands):
+    """Return the comparison of logs with a reference, or of a log with the TCP that it recorded."""
+    if any(isinstance(operand, Comparison) for operand in operands):
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
-    given = (Path(one) if isinstance(one, (str, Path)) else one for one in operands)
-    first, *others = load([one for one in given if not isinstance(one, Comparison)], failed=unjudged)
+    files = (Path(operand) if isinstance(operand, (str, Path)) else operand for operand in operands)
+    reference, *logs = load([file for file in files if not isinstance(file, Comparison)], failed=failed)
     if isinstance(options, IsoOptions):
-        if not others:
+        if not logs:
             raise OptionError(Finding(about="logs", found="none", allowed="a reference and its cycles"))
-        return checked(measure_iso(first, others, options))
-    if not others:
-        return checked(compare_with_recorded_tcp(first, options))
+        return checked(measure_iso(reference, logs, options))
+    if not logs:
+        return checked(compare_with_recorded_tcp(reference, options))
 
     def judge(runs: Sequence[Run]) -> Comparison:
-        return checked(compare_runs(first, runs, options))
+        return checked(compare_runs(reference, runs, options))
 
-    if unjudged is None:
-        return judge(others)
-    return replace(skip_failed_logs(judge, others, unjudged), failed_logs=tuple(unjudged))
+    if failed is None:
+        return judge(logs)
+    return replace(skip_failed_logs(judge, logs, failed), failed_logs=tuple(failed))
 
 
-def _load_made(reference: Operand | Comparison, output: PathLike | None) -> Comparison | None:
+def _load_comparison(reference: Operand | Comparison, output: PathLike | None) -> Comparison | None:
     """Return the comparison that the reference is; None if it is a log, a path or a run.
 
     Raises:
@@ -225,11 +226,11 @@ def _load_made(reference: Operand | Comparison, output: PathLike | None) -> Comp
     """
     if not isinstance(reference, (str, Path, Comparison)):
         return None
-    made = reference if isinstance(reference, Comparison) else load_comparison(Path(reference))
-    if made is not None and output is not None:
-        found = f"{output} with an existing comparison"
-        raise OptionError(Finding(parameter="output", found=found, allowed="without"))
-    return made
+    comparison = reference if isinstance(reference, Comparison) else load_comparison(Path(reference))
+    if comparison is not None and output is not None:
+        value = f"{output} with an existing comparison"
+        raise OptionError(Finding(parameter="output", found=value, allowed="without"))
+    return comparison
 
 
 def _read_baseline(baseline: PathLike | Comparison) -> Comparison:
@@ -238,15 +239,13 @@ def _read_baseline(baseline: PathLike | Comparison) -> Comparison:
         return baseline
     path = Path(baseline)
     if not path.exists():
-        said = "found no such file, allowed: the recording of an earlier comparison"
-        raise RecordingError(Finding(said, str(path), parameter="baseline"))
+        message = "found no such file, allowed: the recording of an earlier comparison"
+        raise RecordingError(Finding(message, str(path), parameter="baseline"))
     require_recordings([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):
-        found = f"found a recording ({result_kind(result).name})"
-        raise RecordingError(
-            Finding(f"{found}, allowed: that of a comparison", str(path), parameter="baseline")
-        )
+        message = f"found a recording ({result_kind(result).name}), allowed: that of a comparison"
+        raise RecordingError(Finding(message, str(path), parameter="baseline"))
     return result
 
 
@@ -254,11 +253,14 @@ def _raise_warnings(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are errors."""
     of_logs = [warning.of(run.name) for run in result.runs for warning in run.run.warnings]
     explaining = (MISSING_TOOL, SWAPPED, CLOCKS_DIFFER)  # they explain a result
-    own = [warning for warning in result.warnings if warning.kind not in explaining]
-    raise_warnings(strict, (*of_logs, *own))
+    others = [warning for warning in result.warnings if warning.kind not in explaining]
+    raise_warnings(strict, (*of_logs, *others))
 
 
 def _files(operands: Sequence[Operand | Comparison | None]) -> list[Path]:
     """Return the files that no output may replace: operands, and the recordings of those that are results."""
-    found = [one if isinstance(one, (str, Path)) else getattr(one, "recording", None) for one in operands]
-    return [Path(one) for one in found if one is not None]
+    files = [
+        operand if isinstance(operand, (str, Path)) else getattr(operand, "recording", None)
+        for operand in operands
+    ]
+    return [Path(file) for file in files if file is not None]

@@ -115,8 +115,8 @@ def equations(robot: Robot, **options: Unpack[EquationsParameters]) -> Equations
         raise OptionError(Finding(parameter="form", found=f"text for {output}", allowed="c, or another name"))
     placing = {name: values[name] for name in params_of(Placing)}
     chain = cast("Chain", place_robot(robot, **placing))
-    found = open_form(chain, TERMS if term == "all" else (term,))
-    text = c_code(found) if form == "c" else equations_text(found)
+    formulas = open_form(chain, TERMS if term == "all" else (term,))
+    text = c_code(formulas) if form == "c" else equations_text(formulas)
     if output is not None:
         write_export(output, text, Path(chain.name if isinstance(robot, Chain) else robot))
-    return Equations(chain, text, found.costs, output)
+    return Equations(chain, text, formulas.costs, output)

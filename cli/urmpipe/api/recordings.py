@@ -24,8 +24,8 @@ def read_recording(path: PathLike, *, lazy: bool = False) -> Result:
     Raises:
         RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.
     """
-    found: Result = results.read_recording(Path(path), lazy=lazy)
-    return found
+    result: Result = results.read_recording(Path(path), lazy=lazy)
+    return result
 
 
 @public_function(output=kinds.RECORDING, inputs=kinds.PATHS, progress=kinds.PROGRESS)

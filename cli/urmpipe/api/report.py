@@ -29,7 +29,7 @@ class Report(Displayable):
     Attributes:
         path: The HTML file.
         results: What it shows.
-        figures: The files of its figures; none unless they were asked for.
+        figures: The files of its figures, if they were written.
     """
 
     path: Path
@@ -42,13 +42,14 @@ class Report(Displayable):
         return format_headline(str(self.path), format_count(len(self.results), "result"), figures)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
+        """Return one row per compared log and quantity, as `Comparison.to_frame`, of all comparisons."""
         import pandas as pd
 
-        shown = (present(one) for one in self.results)
-        tables = [one.rows() for one in shown if one.verdict is not None and one.rows is not None]
+        shown = (present(result) for result in self.results)
+        tables = [view.rows() for view in shown if view.verdict is not None and view.rows is not None]
         frames = [
-            pd.DataFrame({one.key: [*map(_plain, one.cells)] for one in table.columns}) for table in tables
+            pd.DataFrame({column.key: [*map(_plain, column.cells)] for column in table.columns})
+            for table in tables
         ]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
 
@@ -57,7 +58,9 @@ class Report(Displayable):
         return {
             "schema": 1,
             "report": str(self.path),
-            "recordings": [{"name": one.name, "verdict": present(one).verdict} for one in self.results],
+            "recordings": [
+                {"name": result.name, "verdict": present(result).verdict} for result in self.results
+            ],
             "figures": [figure.to_dict() for figure in self.figures],
         }
 

@@ -75,7 +75,9 @@ def simulate(system: PathLike, **options: Unpack[Simulate]) -> Simulation:
         )
         result = simulation_of(plan, record, blocks, svg)
         if result.failed is None:  # else the samples until then are recorded
-            raise_warnings(values["strict"], [one for one in result.warnings if one.kind != ON_PYTHON])
+            raise_warnings(
+                values["strict"], [warning for warning in result.warnings if warning.kind != ON_PYTHON]
+            )
         return written.recorded(result, lambda share: progress(0.8 + 0.2 * share))
 
 
@@ -87,21 +89,21 @@ def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
     """
     if system_name(str(system)) not in system_names():
         return set()
-    own = shipped_logs(str(system))
-    given = {name: value for name, value in arguments.items() if name in own}
-    if not given:
-        return set(own.values())
-    others = " and ".join(f"{name} is {value}" for name, value in given.items())
+    shipped = shipped_logs(str(system))
+    replaced = {name: value for name, value in arguments.items() if name in shipped}
+    if not replaced:
+        return set(shipped.values())
+    settings = " and ".join(f"{name} is {value}" for name, value in replaced.items())
     missing = [
-        f"argument {name}: not set, but {others}; allowed: a file of the same motion"
+        f"argument {name}: not set, but {settings}; allowed: a file of the same motion"
         f" ({system}'s own {value} has another motion)"
-        for name, value in own.items()
-        if name not in given
+        for name, value in shipped.items()
+        if name not in replaced
     ]
     if missing:
         raise OptionError(*missing)
-    named = given == own and not any(Path(value).exists() for value in own.values())
-    return set(own.values()) if named else set()
+    is_named = replaced == shipped and not any(Path(value).exists() for value in shipped.values())
+    return set(shipped.values()) if is_named else set()
 
 
 def shipped_logs(system: str) -> dict[str, str]:
@@ -113,29 +115,20 @@ def shipped_logs(system: str) -> dict[str, str]:
     }
 
 
-def _check_times(**given: float | None) -> None:
-    """Refuse times in [s] that are given and not positive, or that integers of 64 bits do not hold in [ns].
-
-    Raises:
-        OptionError: With each of them.
-    """
-    wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < MAX_TIME}
-    if wrong:
-        faults = (
-            Finding(
-                parameter=name,
-                found=f"{value:g} s",
-                allowed=f"below {MAX_TIME:g} s" if value > 0 else "above 0",
-            )
-            for name, value in wrong.items()
-        )
+def _check_times(**times: float | None) -> None:
+    """Raise an `OptionError` with all times in [s] that integers of 64 bits do not hold in [ns]."""
+    faults = [
+        Finding(parameter=name, found=f"{time:g} s", allowed=f"below {MAX_TIME:g} s")
+        for name, time in times.items()
+        if time is not None and time >= MAX_TIME
+    ]
+    if faults:
         raise OptionError(*faults)
 
 
 def _files(system: System) -> list[Path]:
     """Return the files that a system names: none of them is replaced."""
     texts = [value for block in system.blocks for value in block.options.values() if isinstance(value, str)]
-    named = [*texts, *(one.log for one in system.inputs), *map(str, system.arguments.values())]
-    return [path for block in system.blocks for path in (block.file, block.fmu) if path] + [
-        Path(one) for one in named if "\0" not in one
-    ]
+    names = [*texts, *(source.log for source in system.inputs), *map(str, system.arguments.values())]
+    files = [path for block in system.blocks for path in (block.file, block.fmu) if path]
+    return [*files, *(Path(name) for name in names if "\0" not in name)]

@@ -174,7 +174,7 @@ class NetworkCheck(Search, Strict, Progress, total=False):
         ),
     ]
     start: Annotated[
-        Mapping[str, Quantity] | Sequence[str] | None,
+        Mapping[str, Any] | Sequence[str] | None,
         _solving(
             JOINT_START,
             "Assemble nearest to these joint values, such as theta4=85deg [default: where a motion from the"
@@ -217,7 +217,7 @@ class NetworkDrive(Reading, Processing, Search, Strict, Progress, total=False):
         _running(kinds.COUNT, "Begin at this assembly of `network solve --all`, with the drives at FROM."),
     ]
     start: Annotated[
-        Mapping[str, Quantity] | Sequence[str] | None,
+        Mapping[str, Any] | Sequence[str] | None,
         _running(
             JOINT_START,
             "Begin at the assembly nearest to these joint values, such as theta4=85deg, with the drives at"
