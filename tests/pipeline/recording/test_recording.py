@@ -86,7 +86,7 @@ def times_alone(run: Run) -> Run:
 
 def without_any_value(run: Run) -> Run:
     tcp = there(run.tcp)
-    none = {
+    none: dict[str, Any] = {
         field.name: np.full_like(run.q[:, :3], np.nan) for field in fields(tcp) if field.name != "singular"
     }
     return replace(run, q=np.full_like(run.q, np.nan), tcp=replace(tcp, **none))
