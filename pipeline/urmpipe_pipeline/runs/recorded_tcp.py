@@ -351,8 +351,8 @@ def _frame_hints(
     """Yield the tool and the base that fit best, each if it explains the distance."""
     bare = replace(robot, tool=Transform())
     tool = _round_frame((*poses.fit(bare).tool, *poses.tool_rotation(bare)))
-    angles = (poses.difference(bare, any_tool=any_tool).angle for any_tool in (False, True))
-    if next(angles) <= CLEARLY * next(angles):
+    without_tool, with_tool = (poses.difference(bare, any_tool=fitted).angle for fitted in (False, True))
+    if without_tool <= CLEARLY * with_tool:
         tool = tool[:3]  # its rotation is not more than the residual of a calibration
     base = poses.base(robot)
     for name, frame, arm in (
