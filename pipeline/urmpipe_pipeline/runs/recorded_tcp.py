@@ -420,15 +420,13 @@ def _find_clearly_nearer(
     count = len(log.joints)
     errors = (*sign_edits(count, most=1), *swap_edits(count))
     readings = [_with_error(error, robot, log, poses) for (error,) in errors]
-    distances = map(_fit_distance, [poses.fit(arm.robot) for arm in arms])
-    near = [arm for arm, distance in zip(arms, distances, strict=True) if distance <= max_distance]
-    fits = poses.fit_each(robot, [reading.q for reading in readings])
-    near += [
-        reading for reading, fit in zip(readings, fits, strict=True) if _fit_distance(fit) <= max_distance
-    ]
-    near = [
-        other._replace(difference=poses.difference(other.robot, other.q, any_tool=True)) for other in near
-    ]
+    fits = [poses.fit(arm.robot) for arm in arms]
+    fits += poses.fit_each(robot, [reading.q for reading in readings])
+    near = (
+        other._replace(difference=poses.difference(other.robot, other.q, any_tool=True))
+        for other, fit in zip(arms + readings, fits, strict=True)
+        if _fit_distance(fit) <= max_distance
+    )
     nearer = sorted(
         (other for other in near if other.difference.is_clearly_smaller(difference)),
         key=lambda other: other.difference.distance,
