@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -35,11 +34,11 @@ def motion(rows: int, joints: int) -> FloatArray:
     return np.asarray(0.3 * np.sin(t * (1.0 + 0.1 * np.arange(joints)) + np.arange(joints)) / 1.1)
 
 
-def write(path: Path, robot: Chain, q: FloatArray, t_ns: IntArray | None, inputs: Sequence[Path] = ()) -> int:
+def write(path: Path, robot: Chain, q: FloatArray, t_ns: IntArray | None) -> int:
     """Write a joint log of a robot, its targets being the rows from 1."""
     units = ["m" if joint.kind == "prismatic" else "rad" for joint in robot.moving]
     rows = np.arange(1, len(q) + 1)
-    with safe_output(path, inputs, "joints") as part:
+    with safe_output(path, (), "joints") as part:
         return write_joint_log(part, path, joints=robot.coordinates, units=units, q=q, row=rows, t_ns=t_ns)
 
 
@@ -87,23 +86,19 @@ def test_without_a_robot_the_names_and_units_of_the_header_are_enough(tmp_path: 
 
 def test_the_file_is_a_plain_table_for_pandas(tmp_path: Path) -> None:
     robot = chain_of(("q1", "revolute"), ("q2", "prismatic"))
-    q = np.array([[0.1, -1 / 3], [np.nan, np.nan], [np.pi, 1e-17]])
+    q = np.array(
+        [[-9.5, -1 / 3], [np.nan, np.nan], [np.pi, 1e-17]]
+    )  # joints are neither wrapped nor unwrapped
     assert write(tmp_path / "solved.csv", robot, q, times(3)) == 2
     text = (tmp_path / "solved.csv").read_text(encoding="utf-8")
     assert text.splitlines() == [
         "t (s),q1 (rad),q2 (m),urmpipe_target_row",
-        "0.00,0.1,-0.3333333333333333,1",
+        "0.00,-9.5,-0.3333333333333333,1",
         "0.01,3.141592653589793,1e-17,3",
     ]
     frame = pd.read_csv(tmp_path / "solved.csv")
     assert frame["q2 (m)"].tolist() == [-1 / 3, 1e-17]
     assert frame["urmpipe_target_row"].tolist() == [1, 3]
-
-
-def test_values_are_neither_wrapped_nor_unwrapped(tmp_path: Path) -> None:
-    q = np.array([[7.0], [-9.5], [3.2]])
-    write(tmp_path / "solved.csv", chain_of(("q1", "revolute")), q, times(3))
-    assert pd.read_csv(tmp_path / "solved.csv")["q1 (rad)"].tolist() == [7.0, -9.5, 3.2]
 
 
 def test_without_times_there_is_no_time(tmp_path: Path) -> None:
@@ -142,23 +137,6 @@ def test_ingest_bridges_a_row_that_is_left_out_and_leaves_a_longer_gap_open(tmp_
     ]
     assert np.isnan(open_.q[20:30]).all()
     assert open_.q[30:].tolist() == q[30:].tolist()
-
-
-def test_only_a_joint_log_of_ours_is_replaced_and_never_an_input(tmp_path: Path) -> None:
-    robot, path = load_robot("urm6"), tmp_path / "log.csv"
-    path.write_text("t (s),phi1 (rad)\n0,0.1\n", encoding="utf-8")
-    with pytest.raises(OutputError) as caught:
-        write(path, robot, motion(5, 6), times(5))
-    said = (
-        "found a file that is not a joint log of urmpipe, allowed: a new name, or such a joint log to replace"
-    )
-    assert [finding.message for finding in caught.value.findings] == [said]
-    assert path.read_text(encoding="utf-8") == "t (s),phi1 (rad)\n0,0.1\n"
-    ours = tmp_path / "ours.csv"
-    write(ours, robot, motion(5, 6), times(5))
-    assert write(ours, robot, motion(7, 6), times(7)) == 7
-    with pytest.raises(OutputError, match="found an input of this command"):
-        write(ours, robot, motion(5, 6), times(5), inputs=[ours])
 
 
 def test_a_log_without_any_row_is_refused(tmp_path: Path) -> None:

@@ -10,13 +10,11 @@ import pytest
 
 import urmpipe
 from asserting import there
-from plan_logs import PATHS, planned, planned_alone, written_plan
-from urmpipe_models.errors import OutputError
+from plan_logs import PATHS, planned, planned_alone
 from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.outputs import PATH_ROW, TARGET_ROW, safe_output
+from urmpipe_pipeline.outputs import PATH_ROW
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 INFERRED = {"ur5e", "urm6"}
 """Arms of the catalogue among the plans."""
@@ -79,25 +77,6 @@ def test_the_last_column_holds_the_row_of_the_path(tmp_path: Path) -> None:
     assert frame[PATH_ROW].tolist() == plan.row.tolist()
     assert {*plan.row.tolist()} == {1, 2}
     assert frame["qw"].tolist() == there(plan.quat_xyzw)[:, 3].tolist()
-
-
-def test_only_a_plan_is_replaced_by_a_plan_and_a_joint_log_by_a_joint_log(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    written_plan("sliding", path)
-    alone = written_plan("sliding", path, alone=True)
-    assert header(path) == f"t (s),x (m),y (m),z (m),{PATH_ROW}"
-    assert len(pd.read_csv(path)) == len(alone)
-    other = tmp_path / "solved.csv"
-    with safe_output(other, [], "joints") as part:
-        write_joint_log(part, other, joints=["q1"], units=["rad"], q=np.zeros((2, 1)), row=np.array([1, 2]))
-    assert other.read_text(encoding="utf-8").startswith(f"q1 (rad),{TARGET_ROW}\n")
-    with pytest.raises(OutputError, match="found a file that is not a plan of urmpipe, allowed: a new name"):
-        written_plan("sliding", other)
-    with (
-        pytest.raises(OutputError, match="found a file that is not a joint log of urmpipe"),
-        safe_output(path, [], "joints"),
-    ):
-        pass
 
 
 # The end of a plan whose duration is no multiple of the period
