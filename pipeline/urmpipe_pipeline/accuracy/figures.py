@@ -17,26 +17,27 @@ from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Over, Panel
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, INK_COLOUR, REFERENCE_COLOUR, joint_colour
 from urmpipe_pipeline.runs.figures import joint_panels
 
-MARKED = 6
-"""Corners marked in the plots, at most: the words of more would overlap."""
+MAX_MARKED = 6  # corners in the plots: the labels of more would overlap
 
 ERRORS = {"time": ("error", AXIS_COLOURS["norm"]), "path": ("path error", AXIS_COLOURS["z"])}
 """Name and colour of each error."""
 
 
 def velocity_figure(result: AccuracyResult) -> Figure:
-    """Return both errors over the velocity, what is published beside them, the limit and the running speed.
+    """Return both errors over the velocity, with published ones, the limit and the running speed.
 
     Source: [Iso9283]_ Fig. 7.
     """
-    every = {one.velocity: one for one in (*result.probed, *result.errors)}
-    points = {one.velocity: one for one in published_points(result.robot.name, result.rows)}
-    at = sorted({*every, *points})
+    by_velocity = {errors.velocity: errors for errors in (*result.probed, *result.errors)}
+    points = {point.velocity: point for point in published_points(result.robot.name, result.rows)}
+    at = sorted({*by_velocity, *points})
     order = sorted(DECIDES, key=lambda which: which == result.limited_error)  # what decides is in front
     lines = []
     for which in order:
         values = [
-            getattr(every[v], "error" if which == "time" else "path_error") if v in every else None
+            getattr(by_velocity[v], "error" if which == "time" else "path_error")
+            if v in by_velocity
+            else None
             for v in at
         ]
         name, colour = ERRORS[which]
@@ -48,26 +49,26 @@ def velocity_figure(result: AccuracyResult) -> Figure:
         marks += [
             Mark(
                 at.index(v),
-                one.error,
-                "up" if one.least else "cross",
+                point.error,
+                "up" if point.least else "cross",
                 INK_COLOUR,
-                f"published: {'more than ' if one.least else ''}{1e3 * one.error:g} mm",
+                f"published: {'more than ' if point.least else ''}{1e3 * point.error:g} mm",
                 "published",
             )
-            for v, one in points.items()
+            for v, point in points.items()
         ]
     name, colour = ERRORS[result.limited_error]
     marks += [
         Mark(
-            at.index(one.velocity),
-            found,
+            at.index(errors.velocity),
+            error,
             "diamond",
             colour,
-            f"{format_velocity(one.velocity)}: {text.format_quantity(found, 'm')}",
+            f"{format_velocity(errors.velocity)}: {text.format_quantity(error, 'm')}",
             name,
         )
-        for one in result.errors
-        if (found := result.judged_error(one)) is not None
+        for errors in result.errors
+        if (error := result.judged_error(errors)) is not None
     ]
     over = Over(np.array(at), "velocity", "m/s", joined=True)
     panel = Panel(
@@ -77,7 +78,8 @@ def velocity_figure(result: AccuracyResult) -> Figure:
     return Figure(
         "Error over velocity",
         _velocity_caption(result, published=bool(points)),
-        f"Largest errors of {result.robot.name} on {result.name} over the velocity: {_errors_told(result)}.",
+        f"Largest errors of {result.robot.name} on {result.name} over the velocity:"
+        f" {_format_errors(result)}.",
         (View("error over velocity", (panel,)),),
         {}
         if result.running_speed is None
@@ -86,7 +88,7 @@ def velocity_figure(result: AccuracyResult) -> Figure:
 
 
 def motion_figures(result: AccuracyResult, motion: DrivenMotion) -> Iterator[Figure]:
-    """Yield the plots of a motion: how it deviates, its joints, and what its drives did.
+    """Yield the plots of a motion: its deviation, its joints, voltages and currents.
 
     Source: [Iso9283]_ Fig. 5 and 6.
     """
@@ -96,22 +98,25 @@ def motion_figures(result: AccuracyResult, motion: DrivenMotion) -> Iterator[Fig
 
 
 def _velocity_caption(result: AccuracyResult, *, published: bool) -> str:
-    said = "The axis is logarithmic. Strong: the error that decides,"
-    said += f" {ERROR_DEFINITIONS[result.limited_error]}. Diamonds: velocities asked for."
-    said += " Dashed: the limit." if result.limit is not None else ""
-    said += " Dotted: the running speed, the largest within it." if result.running_speed is not None else ""
-    said += ' Dark crosses: [Iso9283] Fig. 7; at the triangle only "more than" is known.' if published else ""
-    gone = [format_velocity(one.velocity) for one in result.errors if one.diverged is not None]
-    return said + (f" No point at {text.join_list(gone)}: the arm diverged." if gone else "")
+    caption = "The axis is logarithmic. Strong: the error that decides,"
+    caption += f" {ERROR_DEFINITIONS[result.limited_error]}. Diamonds: velocities asked for."  # plain: ok
+    caption += " Dashed: the limit." if result.limit is not None else ""
+    if result.running_speed is not None:
+        caption += " Dotted: the running speed, the largest within it."
+    if published:
+        caption += ' Dark crosses: [Iso9283] Fig. 7; at the triangle only "more than" is known.'
+    diverged = [format_velocity(errors.velocity) for errors in result.errors if errors.diverged is not None]
+    return caption + (f" No point at {text.join_list(diverged)}: the arm diverged." if diverged else "")
 
 
-def _errors_told(result: AccuracyResult) -> str:
+def _format_errors(result: AccuracyResult) -> str:
     """Return the error that decides at each velocity."""
-    said = ((one, result.judged_error(one)) for one in result.errors)
-    return "; ".join(
-        f"{format_velocity(one.velocity)} {'diverged' if found is None else text.format_quantity(found, 'm')}"
-        for one, found in said
-    )
+    parts = []
+    for errors in result.errors:
+        error = result.judged_error(errors)
+        value = "diverged" if error is None else text.format_quantity(error, "m")
+        parts.append(f"{format_velocity(errors.velocity)} {value}")
+    return "; ".join(parts)
 
 
 def _deviation(result: AccuracyResult, motion: DrivenMotion) -> Figure:
@@ -155,11 +160,13 @@ def _size(title: str, values: FloatArray, colour: str, motion: DrivenMotion, lim
 
 
 def _joints(result: AccuracyResult, motion: DrivenMotion) -> Figure:
-    """Return values and rates of the joints, each with what was set."""
+    """Return values and rates of the joints, each with its set point."""
     names = result.robot.coordinates
     views = tuple(
-        View(title, tuple(_with_set(names, result.joint_units, symbol, values, wanted, motion, per)))
-        for title, symbol, values, wanted, per in (
+        View(
+            title, tuple(_with_set_points(names, result.joint_units, symbol, values, set_points, motion, per))
+        )
+        for title, symbol, values, set_points, per in (
             ("Joints", "q", motion.q, motion.set_q, ""),
             ("Rates", "q′", motion.qd, motion.set_qd, "/s"),
         )
@@ -174,33 +181,36 @@ def _joints(result: AccuracyResult, motion: DrivenMotion) -> Figure:
     )
 
 
-def _with_set(
-    names: Sequence[str], units: Sequence[str], symbol: str, values: FloatArray, wanted: FloatArray,
+def _with_set_points(
+    names: Sequence[str], units: Sequence[str], symbol: str, values: FloatArray, set_points: FloatArray,
     motion: DrivenMotion, per: str,
 ) -> Iterator[Panel]:  # fmt: skip
-    """Yield joints over time, shape (n, joints), in front of their set values of the same shape."""
-    # as arrays of their own: the viewer draws stored ones in the order of their names, what was set in front
-    real, asked = (
-        joint_panels(names, units, symbol, one[:], motion.t_ns, per=per) for one in (values, wanted)
+    """Yield joints over time, shape (n, joints), in front of their set points of the same shape."""
+    # as separate arrays: the viewer draws stored ones in the order of their names, set points in front
+    real, commanded = (
+        joint_panels(names, units, symbol, each[:], motion.t_ns, per=per) for each in (values, set_points)
     )
-    for panel, before in zip(real, asked, strict=True):
-        (line,) = before.lines
+    for panel, set_panel in zip(real, commanded, strict=True):
+        (line,) = set_panel.lines
         grey = (REFERENCE_COLOUR,) * len(line.names)
-        behind = replace(line, names=tuple(f"{name} set" for name in line.names), colours=grey, dashed=True)
-        yield replace(panel, lines=(behind, *panel.lines))
+        set_line = replace(line, names=tuple(f"{name} set" for name in line.names), colours=grey, dashed=True)
+        yield replace(panel, lines=(set_line, *panel.lines))
 
 
 def _drives(result: AccuracyResult, motion: DrivenMotion) -> Figure:
     """Return voltages with their limits, and currents."""
     names, colours = (
         result.driven,
-        [joint_colour(result.robot.coordinates.index(one)) for one in result.driven],
+        [joint_colour(result.robot.coordinates.index(name)) for name in result.driven],
     )
     panels = []
     for limit in dict.fromkeys(motion.limits.tolist()):
-        own = np.flatnonzero(motion.limits == limit)
+        drives = np.flatnonzero(motion.limits == limit)
         line = Line(
-            motion.voltage[:, own], tuple(names[j] for j in own), tuple(colours[j] for j in own), steps=True
+            motion.voltage[:, drives],
+            tuple(names[j] for j in drives),
+            tuple(colours[j] for j in drives),
+            steps=True,
         )
         panels.append(Panel("u", "V", (line,), motion.t_ns, limit, share=1.5, limit_name="largest voltage"))
     current = Panel("i", "A", (Line(motion.current, names, tuple(colours)),), motion.t_ns, share=1.5)
@@ -215,12 +225,14 @@ def _drives(result: AccuracyResult, motion: DrivenMotion) -> Figure:
 
 
 def _instants(motion: DrivenMotion) -> dict[int, str]:
-    """Return when corners are passed, unless they are many, and when it diverged, in [ns]."""
+    """Return the times of corners, unless there are many, and of the divergence, in [ns]."""
     passed = motion.corner_times_ns[motion.corner_times_ns <= motion.t_ns[-1]].tolist()
-    found = {at: f"corner {k}" for k, at in enumerate(passed, start=1)} if len(passed) <= MARKED else {}
-    return found if motion.diverged is None else found | {int(motion.t_ns[-1]): "diverged"}
+    instants = (
+        {at: f"corner {k}" for k, at in enumerate(passed, start=1)} if len(passed) <= MAX_MARKED else {}
+    )
+    return instants if motion.diverged is None else instants | {int(motion.t_ns[-1]): "diverged"}
 
 
 def _known(values: Sequence[float | None]) -> FloatArray:
-    """Return errors in [m], NaN where there is none, shape (velocities,)."""
-    return np.array([np.nan if one is None else one for one in values])
+    """Return errors in [m], NaN for None, shape (velocities,)."""
+    return np.array([np.nan if value is None else value for value in values])

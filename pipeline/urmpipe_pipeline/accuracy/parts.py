@@ -10,7 +10,7 @@ from urmpipe_pipeline.accuracy.result import AccuracyResult
 from urmpipe_pipeline.presentation.parts import columns_of
 from urmpipe_pipeline.presentation.section import Cell, Event, Fact, Judged, Ref, Table, Value
 
-SHOWN_VELOCITY = 0.5  # m/s: the motion at the velocity nearest to it is shown first
+FIRST_VELOCITY = 0.5  # m/s: the motion at the velocity nearest to it is shown first
 
 NAMES = {"time": "Largest error", "path": "Distance from the path"}
 """The names of both errors, by which decides."""
@@ -27,7 +27,7 @@ def select_shown_motion(result: AccuracyResult) -> DrivenMotion:
     """Return the motion that is shown first: nearest to 0.5 m/s, of those that did not diverge if any."""
     return min(
         result.motions,
-        key=lambda motion: (motion.diverged is not None, abs(motion.velocity - SHOWN_VELOCITY)),
+        key=lambda motion: (motion.diverged is not None, abs(motion.velocity - FIRST_VELOCITY)),
     )
 
 

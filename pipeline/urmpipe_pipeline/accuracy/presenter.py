@@ -1,4 +1,4 @@
-"""How an accuracy shows itself: the running speed, errors over velocity, then a section a velocity."""
+"""The presentation of an accuracy: the running speed, errors over velocity, then a section per velocity."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from urmpipe_pipeline.presentation.section import (
 
 
 def present(result: AccuracyResult) -> Presentation:
-    """Return what an accuracy shows."""
-    every, motion = tuple(facts(result)), select_shown_motion(result)
+    """Return the presentation of an accuracy."""
+    all_facts, motion = tuple(facts(result)), select_shown_motion(result)
     return Presentation(
         name=result.name,
         headline=headline(result),
         verdict=result.verdict,
-        facts=every,
-        body=_body(result, every),
+        facts=all_facts,
+        body=_body(result, all_facts),
         word="simulated",
         opens_at_ns=int(motion.t_ns[motion.worst]),
         scene=partial(accuracy_scene, result),
@@ -51,10 +51,10 @@ def present(result: AccuracyResult) -> Presentation:
 
 
 def line(result: AccuracyResult) -> Mapping[str, Cell]:
-    """Return an arm among others: how fast it may run, its errors at the slowest and the fastest velocity."""
-    slow, fast = (end(result.errors, key=lambda one: one.velocity) for end in (min, max))
+    """Return the row of an arm among others: running speed, errors at the least and largest velocity."""
+    slow, fast = (end(result.errors, key=lambda errors: errors.velocity) for end in (min, max))
     speed = result.running_speed
-    found: dict[str, Cell] = {
+    cells: dict[str, Cell] = {
         "Robot": result.robot.name,
         "Path": result.name,
         "Verdict": Judged(result.verdict),
@@ -62,13 +62,14 @@ def line(result: AccuracyResult) -> Mapping[str, Cell]:
         "Limit": Value(result.limit, "m", given=True),
         "Decides": result.limited_error,
     }
-    for one in dict.fromkeys((slow, fast)):
-        found[f"Error at {format_velocity(one.velocity)}"] = error_cell(result, one, result.limited_error)
-        found[f"At voltage limit at {format_velocity(one.velocity)}"] = Value(one.saturated_share, "%")
-    return found
+    for errors in dict.fromkeys((slow, fast)):
+        velocity = format_velocity(errors.velocity)
+        cells[f"Error at {velocity}"] = error_cell(result, errors, result.limited_error)
+        cells[f"At voltage limit at {velocity}"] = Value(errors.saturated_share, "%")
+    return cells
 
 
-def _body(result: AccuracyResult, every: tuple[Fact, ...]) -> Section:
+def _body(result: AccuracyResult, all_facts: tuple[Fact, ...]) -> Section:
     title = f"Accuracy of {result.robot.name}, {result.name}"
     tables = [velocities_table(result, "Errors by velocity", result.errors, linked=True)]
     if result.probed:
@@ -77,7 +78,7 @@ def _body(result: AccuracyResult, every: tuple[Fact, ...]) -> Section:
     return Section(
         title,
         result.verdict,
-        (*every, recording_fact(result.recording)),
+        (*all_facts, recording_fact(result.recording)),
         tuple(tables),
         blocks=partial(_page, result),
         checks=tuple(_checks(result)),
@@ -89,19 +90,19 @@ def _body(result: AccuracyResult, every: tuple[Fact, ...]) -> Section:
             "compiled": result.compiled,
         },
         warnings=result.warnings,
-        sections=tuple(_motion(result, one) for one in result.motions),
+        sections=tuple(_motion(result, motion) for motion in result.motions),
     )
 
 
 def _checks(result: AccuracyResult) -> Iterator[Check]:
-    """Yield a check a velocity; nothing without a limit."""
-    for one in result.errors:
-        verdict = result.judge(one)
+    """Yield one check per velocity; none without a limit."""
+    for errors in result.errors:
+        verdict = result.judge(errors)
         if verdict is not None:
-            found = error_cell(result, one, result.limited_error)
+            error = written(error_cell(result, errors, result.limited_error), unit=True)
             allowed = written(Value(result.limit, "m", given=True), unit=True)
-            said = f"{written(found, unit=True)} ({result.limited_error}), allowed: {allowed}"
-            yield Check(format_velocity(one.velocity), verdict, said if verdict == "fail" else "")
+            message = f"{error} ({result.limited_error}), allowed: {allowed}"
+            yield Check(format_velocity(errors.velocity), verdict, message if verdict == "fail" else "")
 
 
 def _page(result: AccuracyResult) -> Iterator[Block]:

@@ -41,7 +41,7 @@ def fig7_rows() -> PathRows:
 
 
 def published_points(robot: str, rows: PathRows) -> tuple[Point, ...]:
-    """Return the published errors of a robot on a path; none of any other."""
+    """Return the published errors of a robot on a path; empty for any other."""
     contour = fig7_rows()
     same = rows.position.shape == contour.position.shape and np.allclose(rows.position, contour.position)
     same = same and np.allclose(rows.radius, contour.radius)

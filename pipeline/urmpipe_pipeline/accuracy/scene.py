@@ -1,4 +1,4 @@
-"""What stands in space of an accuracy: the arm, planned and real path, the deviation enlarged."""
+"""The scene of an accuracy: the arm, planned and real path, the deviation enlarged."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ from urmpipe_pipeline.presentation.projections import ABOVE, FRONT, SIDEWAYS, Sk
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Spot
 from urmpipe_pipeline.trajectories import extent
 
-ARMS = 8
-"""Poses of the arm in a drawing, at most."""
+MAX_ARMS = 8  # poses of the arm in a drawing
 
 
 def accuracy_scene(result: AccuracyResult) -> Scene:
-    """Return the arm along the contour, what was planned, and where it was, coloured by its deviation."""
+    """Return the arm along the contour, the planned path, and the real path coloured by its deviation."""
     motion = select_shown_motion(result)
     at = motion.worst
     arm = Arm(result.robot, motion.q, motion.t_ns, run_colour(0), kept=(at,))
     now = Path("planned", motion.planned, motion.t_ns, REFERENCE_COLOUR, asked=True, kept=(at,), line=False)
     larger = _larger(motion)
     by = "‖Δ‖" if result.limited_error == "time" else "its distance from the planned one"
-    said = f"real path coloured by {by}{f', in crimson the {larger.name}' if larger else ''}"
-    title = f"Arm and paths at {format_velocity(motion.velocity)} [m], {said}"
+    legend = f"real path coloured by {by}{f', in crimson the {larger.name}' if larger else ''}"
+    title = f"Arm and paths at {format_velocity(motion.velocity)} [m], {legend}"
     return Scene(title, (arm,), (*_paths(result, motion), now), (_worst(motion),))
 
 
@@ -56,9 +55,9 @@ def arm_drawing(result: AccuracyResult) -> Drawing:
     Source: [Iso9283]_ Fig. 4.
     """
     motion = select_shown_motion(result)
-    larger, asked = _larger(motion), np.clip(motion.corner_times_ns, 0, motion.t_ns[-1])
-    at = np.unique(np.searchsorted(motion.t_ns, [motion.t_ns[0], *asked, motion.t_ns[-1]]))
-    at = at[np.unique(np.linspace(0, len(at) - 1, ARMS).astype(np.intp))]
+    larger, corners = _larger(motion), np.clip(motion.corner_times_ns, 0, motion.t_ns[-1])
+    at = np.unique(np.searchsorted(motion.t_ns, [motion.t_ns[0], *corners, motion.t_ns[-1]]))
+    at = at[np.unique(np.linspace(0, len(at) - 1, MAX_ARMS).astype(np.intp))]
     run = motion.position if larger is None else larger.position
     spot = Spot(spot_at(run[motion.worst]), "largest error", DEVIATION_COLOUR)
     arms = points_over_log(result.robot, motion.q[at])
@@ -87,7 +86,7 @@ def _paths(result: AccuracyResult, motion: DrivenMotion) -> tuple[Path, ...]:
 
 
 def _larger(motion: DrivenMotion) -> Path | None:
-    """Return planned + factor (position - planned); None where it shows nothing."""
+    """Return planned + factor (position - planned); None if no factor makes it visible."""
     factor = display_factor(float(motion.delta[:, 3].max()), extent(motion.planned) / 2.0)
     if factor is None:
         return None
@@ -96,7 +95,7 @@ def _larger(motion: DrivenMotion) -> Path | None:
 
 
 def _worst(motion: DrivenMotion) -> Spot:
-    """Return where a motion is furthest from its set point."""
-    said = text.format_quantity(float(motion.delta[motion.worst, 3]), "m")
+    """Return the point of a motion with the largest distance from its set point."""
+    distance = text.format_quantity(float(motion.delta[motion.worst, 3]), "m")
     when = text.format_seconds(float(motion.t[motion.worst]))
-    return Spot(spot_at(motion.position[motion.worst]), f"‖Δ‖ {said} at {when} s", DEVIATION_COLOUR)
+    return Spot(spot_at(motion.position[motion.worst]), f"‖Δ‖ {distance} at {when} s", DEVIATION_COLOUR)
