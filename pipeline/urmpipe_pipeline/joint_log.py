@@ -204,7 +204,8 @@ class JointLog(Displayable):
         inferences: Properties that the reader inferred.
         warnings: Warnings of the reader.
         timed: Whether the rows have times; else they are static poses.
-        measured: Whether an external device measured the tool centre point, in a frame at an unknown pose.
+        externally_measured: Whether an external device measured the tool centre point, in a frame at an
+            unknown pose.
     """
 
     name: str
@@ -225,7 +226,7 @@ class JointLog(Displayable):
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
     timed: bool = True
-    measured: bool = False
+    externally_measured: bool = False
 
     @property
     def t(self) -> FloatArray:

@@ -32,7 +32,7 @@ OutputKind = Literal[
     "joints", "plan", "motion", "system",
 ]  # fmt: skip
 
-AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")  # header of an audit
+AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "turns_before", "turns_after")  # header of an audit
 MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --log-map THIS"  # first line of a map
 STATISTICS_HEADER = "run,sync_offset,quantity,kind,unit,max,"  # a later version may have more columns
 CRITERIA_HEADER = "name,at,value,unit,cycles,tolerance,verdict"  # of a test after ISO 9283, likewise

@@ -14,7 +14,7 @@ import pytest
 import urmpipe as package
 
 RunCommand = Callable[..., Any]
-HEADER = ["joint", "row", "t", "kind", "step", "from", "to"]
+HEADER = ["joint", "row", "t", "kind", "step", "turns_before", "turns_after"]
 
 
 @pytest.fixture

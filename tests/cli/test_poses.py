@@ -35,7 +35,7 @@ def test_poses_and_measured_reach_the_log(urmpipe: RunCommand, tmp_path: Path) -
     lab = (tmp_path / "lab.toml").read_text()
     assert "poses = true" in lab and 'position = ["A", "B", "C"]\nmeasured = true' in lab
     run = package.ingest(log, map=tmp_path / "lab.toml")
-    assert not run.timed and run.log.measured
+    assert not run.timed and run.log.externally_measured
     assert package.ingest(log, map=tmp_path / "lab.toml", poses=False).timed
 
 

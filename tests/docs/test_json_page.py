@@ -56,7 +56,7 @@ def printed() -> list[dict[str, Any]]:
 
 def test_each_key_is_named(printed: list[dict[str, Any]]) -> None:
     assert keys(printed) - NAMED == set()
-    assert {"from", "half_period", "out_fraction", "sample_max"} <= keys(printed)
+    assert {"turns_before", "time_uncertainty", "out_fraction", "sample_max"} <= keys(printed)
 
 
 def test_each_key_of_inverse_kinematics_is_named() -> None:

@@ -290,7 +290,7 @@ def _join_frames(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> 
     """
     if options.diagnose and options.align != "none":
         raise OptionError(Finding(parameter="align", found=options.align, allowed=NO_ALIGNMENT))
-    measured = [run for run, recorded in sides if recorded and run.log.measured]
+    measured = [run for run, recorded in sides if recorded and run.log.externally_measured]
     if not measured or len(measured) == len(sides) or options.align not in ("none", "tool"):
         return options
     if options.diagnose:

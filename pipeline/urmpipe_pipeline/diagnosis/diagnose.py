@@ -463,7 +463,7 @@ def _shown_size(diagnosis: Diagnosis) -> float:
 def _record_distance(matched: Matched, run: Run, *, is_log: bool) -> float:
     """Return the rms distance of a run's record from the other side in [m]; inf without a record."""
     recorded, other = run.log.tcp_position, matched.reference if is_log else matched.actual
-    if recorded is None or run.log.measured:
+    if recorded is None or run.log.externally_measured:
         return np.inf
     at_ns = matched.t_ns + round(matched.sync.offset * 1e9)
     positions = recorded[matched.sample] if is_log else interpolate(at_ns, run.on_rows.t_ns, recorded)

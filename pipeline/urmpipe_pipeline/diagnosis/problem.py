@@ -180,7 +180,7 @@ def _arm_problem(matched: Matched, reference: Side, log: Side) -> Problem:
     )
     rotation = _orientations(quat)
     names, timed = run.log.joints, log.run.timed
-    frames_open = other.run.log.measured
+    frames_open = other.run.log.externally_measured
     groups = assign_columns(cause_groups(robot, names, has_rotation=rotation is not None, timed=timed))
     clock = _clock(matched, log.run, of_log=log.by_joints)
     motion, lines = _joint_motion(run), matched.reference

@@ -59,21 +59,21 @@ class AuditEntry:
         joint: Name of the joint.
         row: Data row of the file, from 1: the first row after the step, or the sample itself.
         t: Time in [s]: of a step the middle between its two samples; of a sample its time.
-        half_period: t is known to +- this, in [s].
+        time_uncertainty: t is known to +- this, in [s].
         step: The step as in the file in [rad]; of a sample the distance from the line through its repolarized
             neighbours.
-        before: Turns k added before it.
-        after: Turns k added from it on.
+        turns_before: Turns k added before it.
+        turns_after: Turns k added from it on.
         kind: The kind.
     """
 
     joint: str
     row: int
     t: float
-    half_period: float
+    time_uncertainty: float
     step: float
-    before: int
-    after: int
+    turns_before: int
+    turns_after: int
     kind: AuditKind = "wrap"
 
     @property
@@ -85,8 +85,8 @@ class AuditEntry:
         """Return the JSON object of the audit."""
         return {
             "kind": self.kind, "joint": self.joint, "row": self.row, "sample": self.sample,
-            "t": self.t, "half_period": self.half_period, "step": self.step,
-            "from": self.before, "to": self.after,
+            "t": self.t, "time_uncertainty": self.time_uncertainty, "step": self.step,
+            "turns_before": self.turns_before, "turns_after": self.turns_after,
         }  # fmt: skip
 
 

@@ -268,9 +268,9 @@ def _neighbours(times_ns: IntArray, column: FloatArray, t_ns: IntArray) -> IntAr
 
 def _mark(run: Run, entry: AuditEntry, value: float) -> Mark:
     is_wrap = entry.kind == "wrap"
-    shape: Shape = "cross" if not is_wrap else "up" if entry.after > entry.before else "down"
+    shape: Shape = "cross" if not is_wrap else "up" if entry.turns_after > entry.turns_before else "down"
     label = f"{'repolarization' if is_wrap else entry.kind} of {entry.joint}, row {entry.row}"
-    label += f": step {entry.step:+.4f} rad, k {entry.before} → {entry.after}"
+    label += f": step {entry.step:+.4f} rad, k {entry.turns_before} → {entry.turns_after}"
     colour = joint_colour(run.log.joints.index(entry.joint))
     return Mark(round(entry.t * 1e9), value, shape, colour, label, entry.joint)
 

@@ -74,10 +74,10 @@ def audit_table(run: Run, *, brief: bool = False) -> Table:
         "joint": ("Joint", lambda entry: entry.joint),
         "row": ("Row", lambda entry: Value(entry.row)),
         "t": ("Instant t_r", lambda entry: Value(entry.t, "s")),
-        "half_period": ("±", lambda entry: Value(entry.half_period, "s")),
+        "time_uncertainty": ("±", lambda entry: Value(entry.time_uncertainty, "s")),
         "step": ("Step", lambda entry: Value(entry.step, "rad", signed=True)),
-        "from": ("Turns k before", lambda entry: Value(entry.before, signed=True)),
-        "to": ("Turns k after", lambda entry: Value(entry.after, signed=True)),
+        "turns_before": ("Turns k before", lambda entry: Value(entry.turns_before, signed=True)),
+        "turns_after": ("Turns k after", lambda entry: Value(entry.turns_after, signed=True)),
     }
     kinds = {entry.kind for entry in run.audit}
     note = " ".join(note for kind, note in AUDIT_NOTES.items() if kind in kinds)
@@ -152,10 +152,10 @@ def log_events(run: Run) -> Iterator[Event]:
 def _format_entry(entry: AuditEntry) -> str:
     where, step = f"in row {entry.row}", f"{entry.step:+.4f} rad"
     if entry.kind == "wrap":
-        turns = f"{entry.before:+d} to {entry.after:+d} turns"
-        return f"repolarized {where}: step {step}, {turns}, ± {1e3 * entry.half_period:.3g} ms"
+        turns = f"{entry.turns_before:+d} to {entry.turns_after:+d} turns"
+        return f"repolarized {where}: step {step}, {turns}, ± {1e3 * entry.time_uncertainty:.3g} ms"
     if entry.kind in ("in-between", "repaired"):
         done = "repaired" if entry.kind == "repaired" else "left on a wrap"
         return f"{done} {where}: {step} off the line of its neighbours"
-    gap = f"a gap of {2e3 * entry.half_period:.6g} ms: the number of turns is unknown"
+    gap = f"a gap of {2e3 * entry.time_uncertainty:.6g} ms: the number of turns is unknown"
     return f"{entry.kind} {where}: step {step}, {'no wrap' if entry.kind == 'unexplained' else gap}"

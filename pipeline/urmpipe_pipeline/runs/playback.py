@@ -99,7 +99,7 @@ def _jumps(run: Run) -> tuple[IntArray, IntArray]:
     """Return the row before and the row after each jump, from 0, each pair once, in order."""
     entries = run.repolarizations[:MAX_JUMPS]
     last = np.array([entry.sample for entry in entries])
-    before = np.array([(entry.t - entry.half_period) * 1e9 for entry in entries])
+    before = np.array([(entry.t - entry.time_uncertainty) * 1e9 for entry in entries])
     first = _nearest(run.log.t_ns, np.rint(before).astype(np.int64))
     pairs = np.unique(np.column_stack((np.minimum(first, last - 1), last)), axis=0)
     return pairs[:, 0], pairs[:, 1]

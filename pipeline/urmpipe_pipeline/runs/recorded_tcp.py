@@ -71,7 +71,7 @@ def count_initial_outliers(robot: Chain | None, log: JointLog) -> tuple[int, flo
     explains. The distance is the median over these rows; inf for points 0, 0, 0, which are no poses except
     in a plan.
     """
-    if log.tcp_position is None or log.measured or log.rows < MIN_ROWS:
+    if log.tcp_position is None or log.externally_measured or log.rows < MIN_ROWS:
         return 0, 0.0
     is_zero = not log.tcp_position[0].any() and log.source != URMPIPE_SOURCE
     zeros = int(np.argmax(log.tcp_position.any(axis=1))) if is_zero else 0
@@ -171,7 +171,12 @@ class RecordedPoses(NamedTuple):
     @classmethod
     def of(cls, robot: Chain | None, log: JointLog) -> RecordedPoses | None:
         """Return rows spread over a log, without initial outliers; None if there are none to compare."""
-        if robot is None or log.tcp_position is None or log.measured or log.q.shape[1] != len(robot.moving):
+        if (
+            robot is None
+            or log.tcp_position is None
+            or log.externally_measured
+            or log.q.shape[1] != len(robot.moving)
+        ):
             return None
         start, _ = count_initial_outliers(robot, log)
         rows = np.arange(start, log.rows)[spread(log.rows - start)]
@@ -266,7 +271,7 @@ def distances_from_recorded(run: Run, computed: FloatArray | None = None) -> Flo
         computed: Its tool centre point by forward kinematics on the rows of the file in [m], shape (rows, 3),
             if it is known already.
     """
-    if run.robot is None or run.tcp is None or run.log.tcp_position is None or run.log.measured:
+    if run.robot is None or run.tcp is None or run.log.tcp_position is None or run.log.externally_measured:
         return np.empty(0)
     position = positions_over_log(run.robot, run.on_rows.q) if computed is None else computed
     start, _ = count_initial_outliers(run.robot, run.log)

@@ -46,7 +46,7 @@ class TorqueSummary:
         sample_max: Sample of the largest value, from 0.
         rms: Root mean square.
         effort: Limit in both directions; None without one, and where the period of the rows is assumed.
-        beyond: Samples beyond the limit, from 0, shape (k,).
+        samples_beyond: Samples beyond the limit, from 0, shape (k,).
         samples: Number of samples with a value.
     """
 
@@ -57,7 +57,7 @@ class TorqueSummary:
     sample_max: int
     rms: float
     effort: float | None
-    beyond: IntArray
+    samples_beyond: IntArray
     samples: int
 
     @property
@@ -68,7 +68,7 @@ class TorqueSummary:
     @property
     def out_fraction(self) -> float | None:
         """Share of the samples beyond the limit, 0 to 1; None without limit or samples."""
-        return None if self.effort is None or not self.samples else len(self.beyond) / self.samples
+        return None if self.effort is None or not self.samples else len(self.samples_beyond) / self.samples
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe ingest --json` prints."""
@@ -109,7 +109,7 @@ def summarise_torques(
             sample_max=largest,
             rms=float(np.sqrt(np.mean(finite**2))) if len(finite) else math.nan,
             effort=effort if math.isfinite(effort) else None,
-            beyond=np.flatnonzero(size > effort),
+            samples_beyond=np.flatnonzero(size > effort),
             samples=len(finite),
         )
         summaries.append(summary)

@@ -37,7 +37,7 @@ def run_scene(run: Run) -> Scene | None:
 def path_figure(run: Run) -> Iterator[SpaceFigure]:
     """Yield the path of the tool centre point in space, by kinematics and as recorded."""
     paths, timed, t_ns = [], run.timed, times_of(run)
-    if run.tcp_recorded is not None and not (run.tcp is not None and run.log.measured):
+    if run.tcp_recorded is not None and not (run.tcp is not None and run.log.externally_measured):
         recorded = Path(
             "recorded by the log", run.tcp_recorded, t_ns, REFERENCE_COLOUR, asked=True, line=timed
         )
@@ -75,7 +75,9 @@ def mass_drawing(run: Run) -> Iterator[Drawing]:
 
 def _paths(run: Run) -> Iterator[Path]:
     by_joints, timed, t_ns = run.tcp is not None, run.timed, times_of(run)
-    if run.tcp_recorded is not None and not (by_joints and run.log.measured):  # no frame joins both
+    if run.tcp_recorded is not None and not (
+        by_joints and run.log.externally_measured
+    ):  # no frame joins both
         colour = REFERENCE_COLOUR if by_joints else run_colour(0)
         yield Path("recorded by the log", run.tcp_recorded, t_ns, colour, asked=by_joints, line=timed)
     if run.tcp is not None:

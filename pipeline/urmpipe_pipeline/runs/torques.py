@@ -115,24 +115,23 @@ def effort_warning(
             named; None if the samples are not rows of a file: their times are named.
         hints: Options that help.
     """
-    exceeding = [summary for summary in summaries if len(summary.beyond)]
+    exceeding = [summary for summary in summaries if len(summary.samples_beyond)]
     if not exceeding:
         return []
     worst = max(exceeding, key=lambda summary: summary.effort_share or 0.0)
     row, place = None, f"at t = {text.format_seconds(worst.t_max)} s"
     if rows_ns is not None:
-        first = min(int(summary.beyond[0]) for summary in exceeding)
+        first = min(int(summary.samples_beyond[0]) for summary in exceeding)
         at_ns = t_ns[[first, worst.sample_max]]
         nearest = np.interp(at_ns, rows_ns, np.arange(len(rows_ns))).tolist()
         row, worst_row = (round(index) + 1 for index in nearest)
         place = f"in row {worst_row}"
     message = f"{worst.joint} needs more than its effort of {worst.effort:.6g} {worst.unit} in"
-    message += (
-        f" {len(worst.beyond)} of {worst.samples} samples ({text.format_percent(worst.out_fraction or 0.0)}),"
-    )
+    fraction = text.format_percent(worst.out_fraction or 0.0)
+    message += f" {len(worst.samples_beyond)} of {worst.samples} samples ({fraction}),"
     message += f" at worst {worst.max:.4g} {worst.unit} {place}"
     joints = [
-        f"{summary.joint} ({format_count(len(summary.beyond), 'sample')})"
+        f"{summary.joint} ({format_count(len(summary.samples_beyond), 'sample')})"
         for summary in exceeding
         if summary is not worst
     ]

@@ -137,7 +137,7 @@ def assemble(
             *gaps(t_ns),
         ),
         timed=not content.still,
-        measured=roles.measured,
+        externally_measured=roles.measured,
     )
 
 

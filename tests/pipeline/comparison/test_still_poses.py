@@ -228,7 +228,7 @@ def test_a_recording_and_a_report_of_poses(run: Run, found: Comparison, tmp_path
 def test_a_tool_measured_from_outside_says_nothing_of_the_base(tmp_path: Path) -> None:
     log = write(tmp_path / "poses.csv", names=("tracker_x", "tracker_y", "tracker_z"))
     run = urmpipe.ingest(log)
-    assert run.log.measured and run.robot is None and not run.warnings
+    assert run.log.externally_measured and run.robot is None and not run.warnings
     run = urmpipe.ingest(log, "ur10")  # of another arm: no kinematics contradict it
     assert not run.warnings
     assert [path.name for path in scene_of(present(run)).paths] == ["poses"]

@@ -80,7 +80,7 @@ def test_half_way_down_each_jump_stands_the_mean_of_its_two_rows(run: Run, playe
         np.testing.assert_allclose(played.q[at], mean, rtol=0, atol=1e-14)  # of values up to pi
         j = run.log.joints.index(entry.joint)
         assert abs(played.q[at, j]) < 0.01  # near 0, half a turn from where the joint is
-        between = np.abs(played.t - entry.t) < entry.half_period + 1e-9
+        between = np.abs(played.t - entry.t) < entry.time_uncertainty + 1e-9
         assert played.jumping[between].all()
         assert np.count_nonzero(between) == PARTS + 1
         np.testing.assert_allclose(np.diff(played.q[between, j]), entry.step / PARTS, rtol=1e-12)
@@ -95,7 +95,7 @@ def test_the_tool_is_as_far_off_as_an_own_computation_finds(run: Run, played: Pl
             right = run.q[row - 1] + (run.q[row] - run.q[row - 1]) * part / PARTS
             off = float(np.linalg.norm(p7(raw) - p7(right)))
             (at,) = np.flatnonzero(
-                np.abs(played.t - (entry.t + entry.half_period * (2 * part / PARTS - 1))) < 1e-9
+                np.abs(played.t - (entry.t + entry.time_uncertainty * (2 * part / PARTS - 1))) < 1e-9
             )
             # Sums of seven segments of 0.2 m: 1e-15 m each.
             assert played.deviation[at] == pytest.approx(off, abs=1e-12)

@@ -47,10 +47,10 @@ def test_a_log_is_not_judged(run: Run, shown: Presentation) -> None:
 def test_the_audit_is_a_table_and_what_audit_writes(run: Run, shown: Presentation) -> None:
     table = cells(shown.body.tables[1])
     written = cells(there(shown.rows)())
-    for key in ("kind", "joint", "row", "t", "step", "from", "to"):
+    for key in ("kind", "joint", "row", "t", "step", "turns_before", "turns_after"):
         assert table[key] == [one.to_dict()[key] for one in run.audit]
         assert written[key] == table[key]
-    assert table["half_period"] == [one.half_period for one in run.audit]
+    assert table["time_uncertainty"] == [one.time_uncertainty for one in run.audit]
 
 
 def test_what_was_inferred_is_a_table(run: Run, shown: Presentation) -> None:
@@ -82,7 +82,7 @@ def test_each_finding_is_marked_on_the_line_of_its_joint(run: Run, shown: Presen
         low, high = sorted(run.q[row - 1 : row + 1, j])
         assert low <= mark.value <= high
         assert raw.value == run.log.q[one.sample, j] - one.step / 2
-        assert mark.shape == raw.shape == ("up" if one.after > one.before else "down")
+        assert mark.shape == raw.shape == ("up" if one.turns_after > one.turns_before else "down")
 
 
 def test_what_is_doubtful_is_a_cross(run: Run) -> None:
