@@ -244,7 +244,8 @@ def code() -> str:
     """Return a hash of what gives the answers: results of other code do not count."""
     package = Path(urmpipe_pipeline.__file__).parent
     files = [
-        package / "log_edits.py",
+        package / "runs" / "reading_errors.py",
+        package / "trajectories.py",
         *(package / "diagnosis").glob("*.py"),
         *(package / "comparison").glob("*.py"),
     ]
