@@ -395,7 +395,7 @@ def joint_mismatch(reference: Trajectory, joints: tuple[str, ...], units: tuple[
 
 def kinematics_missing(run: Run, *hints: Hint) -> Finding:
     """Return the error of a run without kinematics; a recorded tool centre point is a way out."""
-    recorded = run.log.tcp_position is not None and not run.log.measured
+    recorded = run.log.tcp_position is not None and not run.log.externally_measured
     return run_finding(run, *NO_ROBOT, *((AS_RECORDED,) if recorded else ()), *hints)
 
 

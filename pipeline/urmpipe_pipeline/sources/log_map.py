@@ -150,7 +150,7 @@ def map_of(
         said = {"position": [_called(log, column) for column in position]}
         turned = {"orientation": [_called(log, column) for column in orientation], "form": log.rotation_form}
         said |= turned if orientation else {}
-        lines += ["", "[tcp]", *format_toml(said | ({"measured": True} if log.measured else {}))]
+        lines += ["", "[tcp]", *format_toml(said | ({"measured": True} if log.externally_measured else {}))]
     measured = [column for column in (*position, *orientation) if column.unit != PURE.name]
     units = {_called(log, column): column.unit for column in measured if not column.uncertainty}
     timed = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}

@@ -247,7 +247,7 @@ def test_units_and_form_of_a_measured_tool_are_told_by_the_joints(
     in_rad = tuple(f"{name} [rad]" for name in JOINTS)
     text = table(q, names=in_rad, **dict(zip(heads, pose.T, strict=True)))
     log = read(text, load_robot("ur10"))
-    assert log.measured and not log.timed and not log.warnings
+    assert log.externally_measured and not log.timed and not log.warnings
     assert log.tcp_position is not None and log.tcp_rotation is not None
     np.testing.assert_allclose(log.tcp_position, pose[:, :3] * unit, rtol=1e-12)
     assert log.rotation_form == form
@@ -266,7 +266,7 @@ def test_units_and_form_of_a_measured_tool_are_told_by_the_joints(
 def test_names_of_a_tool_measured_from_outside(read: Read, names: tuple[str, ...]) -> None:
     q, pose = measured()
     log = read(table(q, **dict(zip(names, pose.T, strict=False))), load_robot("ur10"), unit="rad")
-    assert log.measured
+    assert log.externally_measured
     assert [column.name for column in log.columns if column.role == "position"] == list(names)
 
 
@@ -275,7 +275,7 @@ def test_an_orientation_stands_beside_the_position_of_its_device(read: Read, pla
     q, pose = measured("vector")
     names = [f"tracker_{place}{axis}" for axis in "xyz"] + [f"tracker_r{axis}" for axis in "xyz"]
     log = read(table(q, **dict(zip(names, pose.T, strict=True))), load_robot("ur10"), unit="rad")
-    assert log.measured and log.rotation_form == "vector"
+    assert log.externally_measured and log.rotation_form == "vector"
 
 
 def test_the_arms_own_tcp_comes_first_and_others_are_named_by_who_knows(read: Read, write: Write) -> None:
@@ -283,9 +283,9 @@ def test_the_arms_own_tcp_comes_first_and_others_are_named_by_who_knows(read: Re
     own = dict(zip(("x", "y", "z"), poses_over_log(load_robot("ur10"), q)[0].T, strict=True))
     other = dict(zip(("A", "B", "C", "measurement_x", "measurement_y", "measurement_z"), pose.T, strict=True))
     text = table(q, **own, **other)
-    assert not read(text, load_robot("ur10"), unit="rad").measured
+    assert not read(text, load_robot("ur10"), unit="rad").externally_measured
     given_by_name = read(text, load_robot("ur10"), unit="rad", measured=("A", "B", "C"))
-    assert given_by_name.measured and given_by_name.tcp_position is not None
+    assert given_by_name.externally_measured and given_by_name.tcp_position is not None
     np.testing.assert_allclose(given_by_name.tcp_position, pose[:, :3])
     lab = write(map_of(given_by_name), name="lab.toml")
     assert read_map(lab).read.measured == ("A", "B", "C")

@@ -197,7 +197,7 @@ def test_a_grid_that_a_laser_tracker_measured() -> None:
     """Its clock is a label: dates of digits alone, which run backwards in nine places."""
     path = LOGS / "ur10-laser-tracker" / "measurements_grid.csv"
     log = read_log([path])
-    assert (log.rows, log.timed, log.measured) == (11_911, False, True)
+    assert (log.rows, log.timed, log.externally_measured) == (11_911, False, True)
     assert not [column for column in log.columns if column.role == "time"]
     known = read_log([path], robot=load_robot("ur10"))
     assert known.rotation_form == "xyz"
