@@ -25,14 +25,6 @@ import click
 
 import urmpipe
 from urmpipe import __version__, commands
-from urmpipe.answers import (
-    ERROR,
-    discard_output,
-    discard_stream,
-    error_to_findings,
-    print_errors,
-    write_junit_errors,
-)
 from urmpipe.command_line import Group, long_name
 from urmpipe.defaults import Defaults, deciding_defaults, find_defaults, shared_files
 
@@ -182,8 +174,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: there is nothing left to stop
     except KeyboardInterrupt as stop:  # just before or after `run`
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        from urmpipe.answers import error_to_findings, print_errors
+
         print_errors(error_to_findings(stop), as_json=False)
-        code = ERROR
+        code = 2
     close_streams()
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)
@@ -205,6 +199,8 @@ def close_streams() -> None:
         try:
             stream.flush()
         except OSError:
+            from urmpipe.answers import discard_stream
+
             discard_stream(stream)
 
 
@@ -251,6 +247,8 @@ def run(arguments: Sequence[str]) -> int:
                 warnings.simplefilter("ignore", RuntimeWarning, append=True)
             return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
     except BrokenPipeError:  # the reader of a help text left, as head does; results are printed to the end
+        from urmpipe.answers import discard_output
+
         discard_output()
         return 0
     except click.exceptions.NoArgsIsHelpError as error:  # a group alone, which is answered by its help
@@ -261,11 +259,13 @@ def run(arguments: Sequence[str]) -> int:
             import traceback
 
             traceback.print_exception(raised)
+        from urmpipe.answers import error_to_findings, print_errors, write_junit_errors
+
         findings = error_to_findings(reason)
         print_errors(findings, as_json=bool(options.get("json")))
         if not isinstance(reason, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
             write_junit_errors(options, operands, findings)
-    return ERROR
+    return 2  # bad input or usage, as `answers.ERROR`; `urmpipe --help` need not import that module
 
 
 def _parse_leniently(arguments: Sequence[str]) -> tuple[Mapping[str, Any], Sequence[str]]:

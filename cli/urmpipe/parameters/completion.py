@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import shlex
 from collections.abc import Callable, Iterable, Sequence
@@ -127,6 +126,8 @@ def operands(ctx: click.Context) -> list[str]:
 
 def columns_of(log: Path) -> Sequence[str]:
     """Return the columns that the first row of a text names; none of a file that is no such table."""
+    import csv
+
     try:
         if not log.is_file():  # a named pipe would be waited for
             return ()
