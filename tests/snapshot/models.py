@@ -210,7 +210,7 @@ for _name in robot_names():
             "q": _found.q,
             "reasons": list(_found.reasons.ravel()),
             "branches": list(_found.branches),
-            "shortfall": _found.shortfall,
+            "shortfall": _found.position_residual,
         }
     _line = np.array(_chain.start) + np.linspace(0, 1, 30)[:, None] * (_q[0] - np.array(_chain.start))
     _path = forward_targets(_chain, _line)
