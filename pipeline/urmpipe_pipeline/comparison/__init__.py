@@ -1,1 +1,1 @@
-"""Runs held against a reference: offset in time and space, deviations, verdicts, changes since a baseline."""
+"""Runs compared with a reference: offset in time and space, deviations, verdicts, and changes of these."""
