@@ -161,10 +161,11 @@ def _read_frame(value: Any) -> Any:
     return from_offset(offset)
 
 
-def _read_named(value: Any) -> dict[str, Any]:
+def _read_named(value: Any, *, flags: bool = False) -> dict[str, Any]:
     """Read values by name: a mapping, or texts NAME=VALUE."""
     if isinstance(value, Mapping):
-        if not all(isinstance(name, str) and name for name in value) or True in map(_is_flag, value.values()):
+        has_names = all(isinstance(name, str) and name for name in value)
+        if not has_names or (not flags and any(map(_is_flag, value.values()))):
             raise TypeError
         return dict(value)
     result: dict[str, str] = {}
@@ -434,9 +435,9 @@ def numbers(metavar: str, si: str, allowed: str, length: int = 0) -> Kind:
     return Kind(metavar, allowed, partial(_read_numbers, si=si, length=length))
 
 
-def named(metavar: str, allowed: str, complete: Complete | None = None) -> Kind:
-    """Return the kind of values by name: a mapping, or an option NAME=VALUE for each."""
-    return Kind(metavar, allowed, _read_named, complete, repeats=True)
+def named(metavar: str, allowed: str, complete: Complete | None = None, *, flags: bool = False) -> Kind:
+    """Return the kind of values by name, True and False if `flags`: a mapping, or NAME=VALUE for each."""
+    return Kind(metavar, allowed, partial(_read_named, flags=flags), complete, repeats=True)
 
 
 def texts(

@@ -104,7 +104,9 @@ class BuildFmu(OnMessage, total=False):
     options: Annotated[
         Mapping[str, Any] | Sequence[str] | None,
         Param(
-            kinds.named("NAME=VALUE", 'a mapping, such as {"joints": 6}', complete_values(option_names)),
+            kinds.named(
+                "NAME=VALUE", 'a mapping, such as {"joints": 6}', complete_values(option_names), flags=True
+            ),
             "Another option of the unit, such as joints=6 or rates=true; see `urmpipe fmu list`.",
             names=("-s", "--option"),
         ),
