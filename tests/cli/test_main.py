@@ -198,7 +198,7 @@ def test_numpy_warns_of_no_huge_value(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("python", "words", "shown"), [((), (), 0), ((), ("--debug",), 1), (("-W", "error"), (), 1)]
+    ("python", "words", "shown"), [((), (), 0), ((), ("ingest", "--debug"), 1), (("-W", "error"), (), 1)]
 )
 def test_a_warning_of_numpy_reaches_who_debugs_alone(
     python: tuple[str, ...], words: tuple[str, ...], shown: int
