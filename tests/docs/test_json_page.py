@@ -111,7 +111,7 @@ def test_each_key_of_a_simulation_is_named() -> None:
 CALLS = {
     "accuracy accuracy": "accuracy --path short.csv --robot arm.toml --velocities 0.05 --backend python",
     "compare compare": "compare path.csv log.csv --robot urm6",
-    "iso iso": "iso path.csv log.csv --robot urm6",
+    "iso iso": "iso path.csv path.csv",
     "diagnose diagnose": "diagnose path.csv log.csv --robot urm6",
     "export export": "export log.rrd -o log.parquet",
     "fmu build": "fmu build dc_drive --backend python",
