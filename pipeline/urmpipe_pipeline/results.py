@@ -72,7 +72,7 @@ def _load(path: str) -> Any:
     return getattr(import_module(module), name)
 
 
-# Each module of a kind by name: a command imports those of its own kind alone, a third of its start.
+# Modules by their names: a command imports only those of its kind, a third of its start.
 _ROOT = "urmpipe_pipeline"
 KINDS: tuple[Kind, ...] = (
     Kind("run", f"{_ROOT}.runs.run:Run", f"{_ROOT}.runs.presenter:present", f"{_ROOT}.runs.exports:exports"),
