@@ -53,7 +53,7 @@ def iter_names(tree: ast.Module) -> Iterator[tuple[int, str]]:
                 yield node.lineno, name
             case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
                 yield node.lineno, name
-            case ast.keyword(arg=str(name)):
+            case ast.keyword(arg=str(name)) if name != "found":  # the field of a message keeps its name
                 yield node.value.lineno, name
 
 

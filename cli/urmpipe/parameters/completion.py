@@ -35,13 +35,13 @@ def words(*names: str) -> Complete:
     return lambda ctx, param, incomplete: items(names, incomplete)
 
 
-def unique_words(*names: str) -> Complete:
+def comma_separated(*names: str) -> Complete:
     """Return the completion of words that are separated by commas, each once."""
     return lambda ctx, param, incomplete: _complete_next(names, incomplete)
 
 
 def files(*suffixes: str, names: Callable[[], Iterable[str]] = tuple) -> Complete:
-    """Return the completion of a file with one of the suffixes, behind some names.
+    """Return the completion of a file with one of the suffixes, or of some names.
 
     Args:
         suffixes: What the file's name ends in; folders are offered, too, to look inside.
@@ -55,11 +55,11 @@ def folders(ctx: click.Context, param: click.Parameter, incomplete: str) -> list
     return [_item(incomplete, "dir")]
 
 
-def columns(*others: str, sign: str = "", several: bool = False) -> Complete:
+def columns(*fixed: str, sign: str = "", several: bool = False) -> Complete:
     """Return the completion of a column of the logs on the line.
 
     Args:
-        others: Words that are allowed, too.
+        fixed: Words that are allowed, too.
         sign: What follows the name of a column.
         several: Whether columns are separated by commas.
     """
@@ -67,7 +67,7 @@ def columns(*others: str, sign: str = "", several: bool = False) -> Complete:
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         logs = [*operands(ctx), *(text.partition("=")[2] for text in ctx.params.get("arguments") or ())]
         names = [name for log in logs for name in columns_of(Path(log))]
-        offered = dict.fromkeys([*others, *(f"{name}{sign}" for name in names)])
+        offered = dict.fromkeys([*fixed, *(f"{name}{sign}" for name in names)])
         return _complete_next(offered, incomplete) if several else items(offered, incomplete)
 
     return complete
@@ -84,7 +84,7 @@ def units(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[C
 
 
 def tolerances(*, iso: bool = False, shares: bool = True) -> Complete:
-    """Return the completion of KIND=VALUE,...: kinds, and behind a number its units.
+    """Return the completion of KIND=VALUE,...: kinds, and after a number its units.
 
     Args:
         iso: Whether the kinds are criteria after ISO 9283.
@@ -107,7 +107,7 @@ def tolerances(*, iso: bool = False, shares: bool = True) -> Complete:
 
 
 def items(names: Iterable[str], begun: str, before: str = "") -> list[CompletionItem]:
-    """Return the names that begin with a text, behind what stands before it."""
+    """Return the names that begin with a text, each after the part of the word before it."""
     return [_item(f"{before}{name}") for name in names if name.startswith(begun)]
 
 
@@ -125,7 +125,7 @@ def operands(ctx: click.Context) -> list[str]:
 
 
 def columns_of(log: Path) -> Sequence[str]:
-    """Return the columns that the first row of a text names; none of a file that is no such table."""
+    """Return the columns that the first row of a text names; empty if the file is not a table."""
     import csv
 
     try:
@@ -142,7 +142,7 @@ def columns_of(log: Path) -> Sequence[str]:
 
 
 def _complete_next(names: Iterable[str], incomplete: str) -> list[CompletionItem]:
-    """Return the names that may follow the last comma: those that do not stand before it."""
+    """Return the names that may follow the last comma: those that are not before it."""
     before, comma, begun = incomplete.rpartition(",")
     used = {part.partition("=")[0] for part in before.split(",")}
     return items([name for name in names if name.rstrip("=") not in used], begun, f"{before}{comma}")
@@ -152,7 +152,7 @@ def _files(suffixes: Sequence[str], incomplete: str) -> list[CompletionItem]:
     """Return the files of a kind, with the folders that the shell lists itself.
 
     The shell lists all files where none is of the kind, and where it must write a name with quotes. What it
-    lists comes first: bash drops what stands before.
+    lists comes first: bash drops the items before it.
     """
     folder, begun = re.fullmatch(r"(.*/)?([^/]*)", incomplete).groups("")  # type: ignore[union-attr]  # always
     try:

@@ -23,13 +23,13 @@ from typing import Any, NamedTuple
 from urmpipe.parameters.completion import (
     Complete,
     columns,
+    comma_separated,
     files,
     folders,
     list_names,
     networks,
     robots,
     tolerances,
-    unique_words,
     units,
     words,
 )
@@ -95,7 +95,7 @@ def _read_word(value: Any, names: tuple[str, ...]) -> str:
     return value
 
 
-def _read_words(value: Any, names: tuple[str, ...]) -> tuple[str, ...]:
+def _read_choices(value: Any, names: tuple[str, ...]) -> tuple[str, ...]:
     listed = (value,) if isinstance(value, str) else value
     words = [word for text in _read_texts(listed) for word in _read_list(text)]
     if unknown := [word for word in words if word not in names]:
@@ -222,8 +222,8 @@ def _split_units(value: Any) -> Any:
     for text in chain.from_iterable(map(_split_assignments, texts)):
         column, unit = (part.strip() for part in text.rpartition("=")[::2])
         if result.setdefault(column, unit) != unit:
-            found = f"{result[column]} and {unit} {f'for {column}' if column else 'without a column'}"
-            raise OptionError(Finding(found=found, allowed="one unit, or that of a column as COLUMN=UNIT"))
+            both = f"{result[column]} and {unit} {f'for {column}' if column else 'without a column'}"
+            raise OptionError(Finding(found=both, allowed="one unit, or that of a column as COLUMN=UNIT"))
     return result
 
 
@@ -449,8 +449,8 @@ def texts(
 
 def words_of(metavar: str, *names: str) -> Kind:
     """Return the kind of words among some: a list, or a text of them between commas."""
-    read = partial(_read_words, names=names)
-    return Kind(metavar, f"{', '.join(names)} or a list of them", read, unique_words(*names), repeats=True)
+    read = partial(_read_choices, names=names)
+    return Kind(metavar, f"{', '.join(names)} or a list of them", read, comma_separated(*names), repeats=True)
 
 
 FLAG = Kind("", "true or false", _read_flag)

@@ -5,7 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, Literal, TypedDict
 
 from urmpipe.parameters import kinds
-from urmpipe.parameters.completion import unique_words
+from urmpipe.parameters.completion import comma_separated
 from urmpipe.parameters.param import Param
 from urmpipe.parameters.shared import Inputs, PathLike, Placing, Progress
 
@@ -26,7 +26,7 @@ class Report(Inputs, Progress, total=False):
         "str | Sequence[FigureFormat]",
         Param(
             kinds.texts(
-                "FORMATS", "pdf, svg, png or a list of them", unique_words("pdf", "svg", "png"), split=True
+                "FORMATS", "pdf, svg, png or a list of them", comma_separated("pdf", "svg", "png"), split=True
             ),
             "Formats of figures: pdf, svg, png.",
             default="pdf,png",
