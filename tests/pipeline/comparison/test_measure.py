@@ -1,4 +1,4 @@
-"""What is measured beside delta: orientation, joints, path and speed, where a side has gaps or lacks them."""
+"""What is measured beside delta, against independent code; `measure.cases` has joints and gaps."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation, Slerp
 
 from asserting import there
 from made_runs import path_run, run_of
-from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import RotationForm, translation
+from urmpipe_models.math3d import RotationForm
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, tcp_trajectory
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.measure import MIN_STD, Quantity, compute_statistics, correlation, measure
+from urmpipe_pipeline.comparison.measure import Quantity, compute_statistics, correlation, measure
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
@@ -29,90 +29,12 @@ from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.trajectories import Sync, match
 
 LOGS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
-TURN = 2 * np.pi
 T = np.linspace(0.0, 5.0, 300)
-
-
-def planar(kinds: str = "rrp") -> Chain:
-    """An arm of joints that turn (r) or slide (p)."""
-    words = {"r": "revolute", "p": "prismatic"}
-    joints = tuple(Joint(f"j{k}", words[kind]) for k, kind in enumerate(kinds))  # type: ignore[arg-type]
-    return Chain("arm", joints, tip=translation(0.3, 0.0, 0.0))
-
-
-def arm_run(q: FloatArray, names: tuple[str, ...], kinds: str = "rrp", name: str = "log") -> Run:
-    return run_of(q, planar(kinds), name=name, joints=names)
-
-
-def joints() -> FloatArray:
-    return np.column_stack([np.sin(T), 1.0 + 0.5 * np.cos(T), 0.1 * T])
-
-
-NAMES = ("a", "b", "s")
-TWO = ((0.005, "path"), (0.0047, "log"))
+SIDES = ((0.005, "path"), (0.0047, "log"))
 
 
 def held(reference: Run, log: Run, **tolerance: float) -> Deviation:
     return compare_runs(reference, [log], CompareOptions(tolerance or {"axis": 1e9})).runs[0]
-
-
-# Joints
-
-
-def test_joints_are_held_against_each_other_in_their_units() -> None:
-    off = np.array([0.01, -0.02, 0.003])
-    found = held(arm_run(joints() + off, NAMES), arm_run(joints(), NAMES))
-    np.testing.assert_allclose(there(found.joint_delta), np.tile(off, (300, 1)), atol=1e-15)
-    units = {name: one.unit for name, one in found.joint_statistics.items()}
-    assert units == {"a": "rad", "b": "rad", "s": "m"}
-    assert found.joint_turns == (0, 0, 0)
-
-
-def test_joints_of_the_same_names_are_matched_by_name_and_others_by_place() -> None:
-    q = joints()[:, [0, 1, 0]]
-    by_name = held(arm_run(q[:, [1, 0, 2]], ("b", "a", "c"), "rrr"), arm_run(q, ("a", "b", "c"), "rrr"))
-    assert np.abs(there(by_name.joint_delta)).max() == 0.0
-    by_place = held(arm_run(q, ("x", "y", "z"), "rrr"), arm_run(q, ("a", "b", "c"), "rrr"))
-    assert np.abs(there(by_place.joint_delta)).max() == 0.0
-    assert list(by_place.joint_statistics) == ["a", "b", "c"]
-
-
-def test_turns_counted_apart_at_the_start_are_no_deviation() -> None:
-    off = np.array([TURN + 0.01, -3 * TURN - 0.02, 0.0])
-    found = held(arm_run(joints() + off, NAMES), arm_run(joints(), NAMES))
-    assert found.joint_turns == (1, -3, 0)
-    np.testing.assert_allclose(there(found.joint_delta)[:, :2], [[0.01, -0.02]] * 300, atol=1e-14)
-
-
-def test_a_start_beside_half_a_turn_is_counted_to_the_near_side() -> None:
-    near = np.column_stack([np.full(300, np.pi - 0.01), np.zeros(300), np.zeros(300)])
-    other = near * np.array([-1.0, 1.0, 1.0])  # -pi + 0.01: 0.02 further on
-    found = held(arm_run(near, NAMES), arm_run(other, NAMES))
-    assert found.joint_turns == (1, 0, 0)
-    assert found.joint_statistics["a"].max == pytest.approx(0.02, abs=1e-14)
-
-
-def test_a_turn_lost_on_the_way_stays_a_deviation_where_it_happens() -> None:
-    q = joints()
-    q[100:, 0] += TURN
-    found = held(arm_run(q, NAMES), arm_run(joints(), NAMES), joint=0.1)
-    assert (found.joint_turns, found.verdict) == ((0, 0, 0), "fail")
-    assert np.flatnonzero(found.out_of_tolerance)[0] == 100
-    assert found.joint_statistics["a"].max == pytest.approx(TURN, abs=1e-14)
-
-
-def test_a_wild_first_sample_does_not_put_the_others_a_turn_out() -> None:
-    q = joints()
-    q[0, 0] += TURN
-    found = held(arm_run(q, NAMES), arm_run(joints(), NAMES), joint=0.1)
-    assert found.joint_turns == (0, 0, 0)
-    assert np.flatnonzero(found.out_of_tolerance).tolist() == [0]
-
-
-def test_joints_that_slide_have_no_turns() -> None:
-    found = held(arm_run(joints() + [0.0, 0.0, 7.0], NAMES), arm_run(joints(), NAMES))  # noqa: RUF005
-    assert found.joint_turns == (0, 0, 0)
-    assert found.joint_statistics["s"].mean == pytest.approx(7.0, abs=1e-14)
 
 
 # Orientations
@@ -166,29 +88,31 @@ def test_the_reference_turns_on_the_great_arc_between_its_samples() -> None:
     assert found.statistics["norm"].max < 1e-14
 
 
-def test_missing_orientations_leave_the_angle_open_between_their_neighbours() -> None:
-    position, rotation = poses(20)
-    quat = rotation.as_quat()
-    quat[5] = np.nan
-    at = np.column_stack(
-        [np.interp(np.arange(0, 19.01, 0.5), np.arange(20), column) for column in position.T]
+# What has no value
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    values=hnp.arrays(float, st.integers(1, 30), elements=st.floats(-2.0, 2.0)),
+    missing=st.sets(st.integers(0, 29)),
+)
+def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArray, missing: set[int]) -> None:
+    rows = [row for row in missing if row < len(values)][: len(values) - 1]
+    values[rows] = np.nan
+    count, t = np.arange(len(values)), np.linspace(0.0, 1.0, len(values))
+    measured = Quantity("angle", "angle", "rad", values)
+    one = compute_statistics(measured, t, count, {"angle": 1.0})
+    assert (one.samples, one.missing) == (len(values) - len(rows), len(rows))
+    above = int(np.count_nonzero(np.abs(values) > 1.0))
+    assert (
+        one.out_of_tolerance
+        == above + len(rows)
+        == int(np.count_nonzero(measured.out_of_tolerance({"angle": 1.0})))
     )
-    log = path_run(at, np.tile([0.0, 0, 0, 1], (39, 1)), "quat_xyzw", name="log")
-    found = held(path_run(position, quat, "quat_xyzw", tsp=0.01), log, angle=4.0)
-    assert np.flatnonzero(np.isnan(there(found.angle))).tolist() == [9, 10, 11]  # 4.5, 5 and 5.5
-    assert len(found.sample) == 39
-    angle = found.statistics["angle"]
-    assert (angle.verdict, angle.samples, angle.missing, angle.out_of_tolerance) == ("fail", 36, 3, 3)
-    assert found.out_of_tolerance[[9, 10, 11]].all()
-    assert np.isfinite(found.statistics["angle"].rms)
-
-
-def test_orientations_that_are_missing_throughout_are_none() -> None:
-    position, _ = poses(20)
-    nothing = np.full((20, 4), np.nan)
-    found = held(path_run(position, nothing, "quat_xyzw"), path_run(position, nothing, "quat_xyzw", name="b"))
-    assert found.angle is None
-    assert "angle" not in found.statistics
+    assert round(there(one.out_fraction) * len(values)) == one.out_of_tolerance
+    assert one.verdict == ("fail" if above or rows else "pass")
+    free = compute_statistics(measured, t, count, {"axis": 1.0})
+    assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
 
 
 # Path
@@ -219,26 +143,6 @@ def test_the_speed_of_positions_is_that_of_the_parabola_through_the_neighbours()
     )
 
 
-def test_no_speed_is_taken_across_samples_left_out_and_gaps() -> None:
-    position = np.column_stack([T, 0 * T, 0 * T]) * (0.005 / T[1])  # 1 m/s
-    log = position.copy()
-    log[[50, 52]] = np.nan  # 51 stands alone
-    log[53:] += 10.0
-    found = held(path_run(position), path_run(log, name="log"))
-    lone = int(np.flatnonzero(found.sample == 51)[0])
-    assert np.flatnonzero(np.isnan(found.speed)).tolist() == [lone]
-    np.testing.assert_allclose(np.delete(found.speed, lone), 1.0, rtol=1e-9)
-    gap = replace(found.run, t_ns=found.run.t_ns + np.where(np.arange(300) >= 100, 10**9, 0))
-    late = held(path_run(np.tile(position, (2, 1))), gap)
-    np.testing.assert_allclose(late.speed[np.isfinite(late.speed)], 1.0, rtol=1e-9)
-
-
-def test_a_single_sample_has_no_speed() -> None:
-    found = held(path_run(np.zeros((1, 3))), path_run(np.zeros((1, 3)), name="log"))
-    assert np.isnan(found.speed).tolist() == [True]
-    assert found.speed_correlation is None
-
-
 def test_a_correlation_is_that_of_numpy() -> None:
     rng = np.random.default_rng(6)
     first = rng.normal(size=500)
@@ -251,18 +155,6 @@ def test_a_correlation_is_that_of_numpy() -> None:
     assert correlation(first, -first) == pytest.approx(-1.0, abs=1e-15)
 
 
-def test_what_does_not_change_correlates_with_nothing() -> None:
-    rng = np.random.default_rng(7)
-    speed = rng.uniform(0.0, 0.5, 500)
-    rounding = 0.0025 + 1e-16 * rng.integers(-3, 4, 500).astype(np.float64)
-    assert correlation(rounding, speed) is None
-    assert correlation(speed, np.full(500, 0.3)) is None
-    assert correlation(0.0025 + MIN_STD * speed, speed) is None
-    assert correlation(0.0025 + 1e-6 * speed, speed) == pytest.approx(1.0, abs=1e-9)  # 1e-16 m of 1e-7 m
-    assert correlation(np.full(500, np.nan), speed) is None
-    assert correlation(np.array([1.0]), np.array([2.0])) is None
-
-
 # Blocks of rows
 
 
@@ -271,11 +163,12 @@ def test_what_does_not_change_correlates_with_nothing() -> None:
 def test_no_size_of_the_blocks_changes_a_bit(kind: str, block_rows: int) -> None:
     rng = np.random.default_rng(8)
     position, rotation = np.cumsum(rng.normal(0, 0.01, (300, 3)), axis=0), Rotation.random(300, rng=rng)
+    q = np.sin(np.outer(T, np.arange(1.0, 7.0)))
     quat = np.where(rng.random((300, 1)) < 0.1, np.nan, rotation.as_quat())
     runs = {
-        "joints": (arm_run(joints() + rng.normal(0, 0.01, (300, 3)), NAMES), arm_run(joints(), NAMES)),
-        "poses": tuple(path_run(position, quat, tsp=tsp, name=name) for tsp, name in TWO),
-        "path": tuple(path_run(position, tsp=tsp, name=name) for tsp, name in TWO),
+        "joints": (run_of(q + rng.normal(0, 0.01, (300, 6))), run_of(q)),
+        "poses": tuple(path_run(position, quat, tsp=tsp, name=name) for tsp, name in SIDES),
+        "path": tuple(path_run(position, tsp=tsp, name=name) for tsp, name in SIDES),
     }[kind]
     reference, log = (replace(tcp_trajectory(run), discontinuities=np.array([40, 41])) for run in runs)
     late = np.where(np.arange(300) < 200, 0, 300_000_000)
