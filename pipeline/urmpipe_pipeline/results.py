@@ -80,7 +80,7 @@ KINDS: tuple[Kind, ...] = (
         "comparison",
         f"{_ROOT}.comparison.comparison:Comparison",
         f"{_ROOT}.comparison.presenter:present",
-        f"{_ROOT}.comparison.exports:exports",
+        f"{_ROOT}.comparison.tables:exports",
     ),
     Kind(
         "diagnosis",

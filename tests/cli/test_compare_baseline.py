@@ -11,7 +11,7 @@ import pytest
 
 from four_logs import NOISE, Captured, compare, lay_logs, names, read_lines, recorded, said
 from urmpipe.main import run
-from urmpipe_pipeline.comparison.tables import format_worse_count
+from urmpipe_pipeline.comparison.baseline import format_worse_count
 
 
 @pytest.fixture(autouse=True)

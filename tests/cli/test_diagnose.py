@@ -24,7 +24,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.facts import remedy_hints
+from urmpipe_pipeline.comparison.presenter import remedy_hints
 from urmpipe_pipeline.diagnosis.causes import Cause, Unexplained
 from urmpipe_pipeline.presentation.section import Advice
 from urmpipe_pipeline.results import present

@@ -6,6 +6,8 @@
 - rigid: the R, t of the least sum |p_reference - R p - t|^2 (Umeyama 1991, eq. 38-42, without scale).
 - tool: the d of the least sum |p_reference - p - R_log d|^2, the mean of R_log^T (p_reference - p).
 - base+tool: base and tool of the least residuals of hand-eye calibration.
+
+`format_alignment` formats the motion and its rule.
 """
 
 from __future__ import annotations
@@ -30,6 +32,8 @@ from urmpipe_models.math3d import (
     to_matrices,
     to_quaternions,
 )
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import ORIENTED, Alignment, AlignMode, Matched, run_finding
 
@@ -192,3 +196,44 @@ def _with_orientation(matched: Matched, mode: AlignMode, run: Run) -> tuple[Matc
         message = f"{mode}: found no orientation of the log, allowed: {ORIENTED}"
         raise LogError(run_finding(run, message, parameter="align"))
     return matched if len(known) == len(quat) else matched.at(known), quat[known]
+
+
+def format_alignment(one: Deviation) -> tuple[str, str]:
+    """Return how a log was moved in space, and by which rule."""
+    alignment = one.alignment
+    match alignment.mode:
+        case "none":
+            return "none", "both sides as recorded"
+        case "tool":
+            moved = text.format_quantity(float(np.linalg.norm(alignment.tool)), "m")
+            by = f"{_vector(alignment.tool)} mm in the tool's frame"
+            return f"tool centre point moved by {moved}", f"the best constant offset: {by}"
+        case "base+tool":
+            return _base_and_tool_words(alignment)
+    turned = text.format_quantity(alignment.angle, "rad")
+    moved = text.format_quantity(float(alignment.moved(one.actual).max()), "m")
+    first = alignment.mode == "start"
+    rule = "the first compared poses agree" if first else "the best rigid motion"
+    about = f"rotated about the origin, then translated by {_vector(alignment.translation)} mm"
+    return f"{alignment.mode}: moved by up to {moved}, turned by {turned}", f"{rule}: {about}"
+
+
+def _base_and_tool_words(alignment: Alignment) -> tuple[str, str]:
+    """Return how base and tool were moved, by how much and to where."""
+    sides = (
+        ("base", alignment.translation, alignment.angle),
+        ("tool", alignment.tool, alignment.tool_angle),
+    )
+    moved = (
+        f"{name} by {text.format_quantity(float(np.linalg.norm(shift)), 'm')}"
+        f" and {text.format_quantity(turn, 'rad')}"
+        for name, shift, turn in sides
+    )
+    base, tool = _vector(alignment.translation), _vector(alignment.tool)
+    by = f"base at {base} mm, tool at {tool} mm in the tool's frame"
+    return f"moved and turned: {', '.join(moved)}", f"the best base and tool: {by}"
+
+
+def _vector(metres: tuple[float, ...]) -> str:
+    """Return a vector in [m] as (x, y, z) in [mm]."""
+    return f"({', '.join(text.format_number(value, 'm') for value in metres)})"

@@ -19,7 +19,13 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import apply_alignment
 from urmpipe_pipeline.comparison.comparison import Comparison, tolerance_sort_key
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
-from urmpipe_pipeline.comparison.wording import SYMBOLS, format_peak, format_time_of_max, format_value, symbol
+from urmpipe_pipeline.comparison.verdict import (
+    SYMBOLS,
+    format_amount,
+    format_peak,
+    format_time_of_max,
+    symbol,
+)
 from urmpipe_pipeline.diagnosis.cause_texts import format_cause, joint_names
 from urmpipe_pipeline.diagnosis.result import Diagnosis, format_residual
 from urmpipe_pipeline.presentation.digits import written
@@ -104,7 +110,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
             f"Equal scale on all axes. A dot is where a pose was asked for, the arrow from it"
             f" the {arrows.name}, in the colour of its size.",
             f"Poses of {one.name} in three dimensions, each with its deviation as an arrow."
-            f" {decided} at x, y, z = {text.format_point(place)} m: {format_value(one.worst_statistics)}.",
+            f" {decided} at x, y, z = {text.format_point(place)} m: {format_amount(one.worst_statistics)}.",
             (),
             spots[2:],
             arrows,
@@ -118,7 +124,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
         "Path in space",
         said,
         f"Paths of the reference and of {one.name} in three dimensions. {decided} at"
-        f" x, y, z = {text.format_point(place)} m: {format_value(one.worst_statistics)}.",
+        f" x, y, z = {text.format_point(place)} m: {format_amount(one.worst_statistics)}.",
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             *supposed,
@@ -370,7 +376,7 @@ def _log(one: Deviation, colour: str) -> Path:
 def _decided(one: Deviation, *, several: bool) -> Spot:
     """Return where the verdict on a log was decided: by what, how much and when."""
     whose = f", {one.name}" if several else ""
-    said = f"{format_value(one.worst_statistics)} {format_time_of_max(one.worst_statistics)}{whose}"
+    said = f"{format_amount(one.worst_statistics)} {format_time_of_max(one.worst_statistics)}{whose}"
     return Spot(spot_at(one.actual[one.worst_statistics_index]), said, DEVIATION_COLOUR)
 
 

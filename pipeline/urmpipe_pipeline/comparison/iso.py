@@ -35,9 +35,13 @@ from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.measure import measure, measure_shares
 from urmpipe_pipeline.comparison.path_distance import distance_from_path
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync
-from urmpipe_pipeline.comparison.verdict import MIN_SHARES, check_tolerance, deviation_tolerances
+from urmpipe_pipeline.comparison.verdict import (
+    MIN_SHARES,
+    check_tolerance,
+    deviation_tolerances,
+    format_share,
+)
 from urmpipe_pipeline.comparison.warnings import large_tolerances, same_data
-from urmpipe_pipeline.comparison.wording import format_share
 from urmpipe_pipeline.iso9283.command_path import Planes, RoundedCorner, Stop
 from urmpipe_pipeline.iso9283.criteria import euler_angles, min_cycles
 from urmpipe_pipeline.iso9283.cycles import (

@@ -17,9 +17,9 @@ import numpy as np
 from urmpipe_models.display import format_count
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import apply_alignment
+from urmpipe_pipeline.comparison.baseline import baseline_section, criterion_checks, worse_facts
 from urmpipe_pipeline.comparison.comparison import BaselineComparison, Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.tables import baseline_section, criterion_checks, worse_facts
 from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.iso9283.criteria import combine_verdicts
 from urmpipe_pipeline.iso9283.figures import (

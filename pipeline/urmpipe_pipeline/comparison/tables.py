@@ -1,49 +1,42 @@
-"""Tables and sections of a comparison.
+"""Tables of a comparison, for display and for export.
 
-1. Tables: the logs from best to worst, the statistics of each, and its line among those of other results.
-2. `baseline_section`, `baseline_checks`: what changed since a baseline, the worse first.
+1. `ranking_tables`, `statistics_tables`: the logs from best to worst, and the statistics of each.
+2. `comparison_lines`, `statistics_rows`: its lines among those of other results, and what --csv writes.
+3. `exports`: the compared samples and both trajectories of all logs, and the criteria after ISO 9283.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
+import numpy as np
+
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import (
-    ROW,
-    BaselineComparison,
-    Comparison,
-    CriterionChange,
-    QuantityChange,
-    Worse,
-)
-from urmpipe_pipeline.comparison.deviation import Deviation, Share, ShareKind, Statistics, Verdict
-from urmpipe_pipeline.comparison.facts import MEANING, format_alignment, max_place, max_value, share_value
-from urmpipe_pipeline.comparison.verdict import UNITS
-from urmpipe_pipeline.comparison.wording import absolute_symbol, quantity_name, symbol
-from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.comparison.align import format_alignment
+from urmpipe_pipeline.comparison.baseline import count_quantities
+from urmpipe_pipeline.comparison.comparison import ROW, Comparison
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, ShareKind, Statistics
+from urmpipe_pipeline.comparison.verdict import absolute_symbol, symbol
+from urmpipe_pipeline.iso9283.result import IsoTest
+from urmpipe_pipeline.iso9283.tables import COLUMNS
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.presentation.exports import ExportColumn, Exports, ExportTable, Poses, Rows, Times
+from urmpipe_pipeline.presentation.exports import columns_of as export_columns
 from urmpipe_pipeline.presentation.palette import run_colour
-from urmpipe_pipeline.presentation.parts import (
-    Heads,
-    columns_of,
-    minute_of,
-    option_words,
-    rows_table,
-    table_of,
-)
-from urmpipe_pipeline.presentation.section import (
-    Cell,
-    Check,
-    Column,
-    Fact,
-    Judged,
-    Place,
-    Ref,
-    Section,
-    Table,
-    Value,
-)
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute_of, rows_table
+from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Ref, Table, Value
+from urmpipe_pipeline.runs.exports import clock_stamps, export_metadata
+from urmpipe_pipeline.text import drop_surrogates
+from urmpipe_pipeline.trajectories import joint_order
+
+MEANING = {"coverage": "of the reference, shown by the log", "judged": "of the log's motion, judged"}
+"""What a share is of."""
 
 ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
 """What the kinds of deviation are about."""
@@ -273,189 +266,151 @@ def statistics_rows(result: Comparison) -> Table:
     return rows_table("Statistics", ROW, result.rows())
 
 
-NAMED = 30
-"""Quantities and logs that a fact names; more are counted."""
+def max_place(one: Deviation, held: Statistics) -> Place | None:
+    """Return where a log was when a quantity of it was largest; None where joints alone are compared."""
+    place = one.place(held)
+    return None if place is None else Place(place)
 
-WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "out_fraction": "out", "samples": "samples"}
-"""What people call what may be worse."""
+
+def max_value(one: Statistics | None, *, most: bool = False) -> Value | None:
+    """Return the largest absolute value of a quantity, with what is allowed of it; None without one."""
+    if one is None:
+        return None
+    return Value(one.max, one.unit, one.tolerance, one.verdict, one.utilisation, most=most)
 
 
-def baseline_section(found: BaselineComparison, rank: int) -> Section:
-    """Return what changed since an earlier comparison."""
-    said = "a log of the baseline, not compared any more"
-    gone = [
-        Section(one.run, "fail", checks=(_check(one.run, "log is there", f"{one.run}: {said}"),))
-        for one in found.missing
-        if one.quantity is None
+def share_value(one: Share | None) -> Value | None:
+    """Return a share with what is needed of it; None without one."""
+    if one is None:
+        return None
+    used = math.inf if one.verdict == "fail" else one.utilisation
+    return Value(one.value, "%", one.tolerance, one.verdict, used, least=True)
+
+
+NO_ORIENTATION = LogWarning(
+    "no-orientation",
+    "a comparison holds positions: every orientation is written as 0 0 0 1, compare translations only",
+)
+
+
+def exports(comparison: Comparison) -> Exports:
+    """Return what can leave of a comparison."""
+    about = export_metadata(comparison.name, comparison.provenance) | {
+        "reference": comparison.reference.name,
+        "tolerance": dict(comparison.tolerance),
+        "verdict": comparison.verdict,
+        "runs": [run.name for run in comparison.runs],
+    }
+    rows = {"compared": Rows(partial(delta_table, comparison), lambda table: _fields(comparison))}
+    if comparison.iso is not None:
+        rows["criteria"] = Rows(partial(criteria_table, comparison.iso), partial(_criteria, comparison))
+    poses = {"": lambda rows: _poses(comparison)}
+    return Exports("comparison", about, rows, poses, {}, (NO_ORIENTATION,))
+
+
+def delta_table(comparison: Comparison) -> ExportTable:
+    """Return the compared samples of all logs, one below the other: deviation, reference and actual in SI.
+
+    Where joints alone are compared, their deviations, under the names that the reference has for them.
+    """
+    runs = comparison.runs
+    names = np.repeat([drop_surrogates(run.name) for run in runs], [len(run.sample) for run in runs])
+    columns = [
+        ExportColumn("run", "", names),
+        ExportColumn("sample", "", np.concatenate([run.sample for run in runs])),
     ]
-    return Section(
-        f"Against the baseline {found.name}",
-        found.verdict,
-        tuple(_facts(found)),
-        tuple(_tables(found)),
-        sections=tuple(gone),
-        rank=rank,
-    )
+    timed = all(run.run.timed for run in runs)
+    if timed:
+        columns.append(ExportColumn("t [s]", "s", Times(np.concatenate([run.t_ns for run in runs]), "s")))
+    placed = all(run.statistics for run in runs)
+    if not placed:
+        joints, units = comparison.reference.joints, comparison.reference.joint_units
+        values = np.concatenate([_joint_delta(comparison, run) for run in runs])
+        columns += export_columns([f"delta_{name}" for name in joints], units, values)
+    for what, axes in (("delta", AXES), ("reference", AXES[:3]), ("actual", AXES[:3])) if placed else ():
+        values = np.concatenate([getattr(run, what) for run in runs])
+        columns += export_columns([f"{what}_{axis}" for axis in axes], ["m"] * len(axes), values)
+    outside = np.concatenate([run.out_of_tolerance for run in runs]).astype(np.int64)
+    columns.append(ExportColumn("out_of_tolerance", "", outside))
+    clock = np.concatenate([run.run.log.clock_start_ns + run.t_ns for run in runs])
+    return ExportTable(tuple(columns), clock if timed else None)
 
 
-def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
-    """Yield a check for each quantity of a log that was compared then."""
-    for one in found.changes:
-        if one.run == run:
-            noise = text.format_stated(one.noise, one.now.unit)
-            said = f"{absolute_symbol(one.now)}: {format_worse(one)} (noise {noise})" if one.worse else ""
-            yield _check(run, quantity_name(one.now), said)
-    for lost in found.missing:
-        if lost.run == run:
-            said = f"{lost.quantity}: in the baseline, not compared any more"
-            yield _check(run, f"{lost.quantity} is there", said)
+def criteria_table(test: IsoTest) -> ExportTable:
+    """Return a row a criterion and place of a test after ISO 9283, then a failed cycle, in SI.
+
+    What is not there is NaN or empty. Each row has its own unit: 1 of a share.
+    """
+    rows = list(test.rows())
+    texts = {
+        name: np.array([str(row[name] or "") for row in rows]) for name in ("name", "at", "unit", "verdict")
+    }
+    numbers = {
+        name: np.array([math.nan if row[name] is None else row[name] for row in rows])
+        for name in ("value", "tolerance")
+    }
+    every = texts | numbers | {"cycles": np.array([row["cycles"] for row in rows])}
+    columns = (ExportColumn(name, "", every[name]) for name in COLUMNS)
+    return ExportTable(tuple(columns), None)
 
 
-def criterion_checks(found: BaselineComparison) -> Iterator[Check]:
-    """Yield a check for each criterion after ISO 9283 that was compared then."""
-    for one in found.criteria:
-        noise = f" (noise {written(Value(one.noise, _shown(one.now.unit), given=True), unit=True)})"
-        said = f"{one.now.name}: {format_criterion_change(one)}{noise}" if one.worse else ""
-        yield _check("criteria", one.now.name, said)
-    for lost in found.missing:
-        said = f"{lost.quantity}: in the baseline, without a value now"
-        yield _check("criteria", f"{lost.quantity} is there", said)
-
-
-def format_criterion_change(one: CriterionChange) -> str:
-    """Return a criterion before and now: "0.1000 → 0.2000 mm"."""
-    unit = _shown(one.now.unit)
-    before, now = abs(one.before.value or 0.0), abs(one.now.value or 0.0)
-    return f"{written(Value(before, unit, now))} → {written(Value(now, unit, before), unit=True)}"
-
-
-def _shown(unit: str) -> str:
-    """Return the unit by which a criterion is written: shares as %."""
-    return "%" if unit == "1" else unit
-
-
-def _check(run: str, name: str, said: str) -> Check:
-    """Return a check that fails if there is something to say."""
-    about = f"{run} against baseline"
-    return Check(name, "fail" if said else "pass", said, about, kind="worse-than-baseline")
-
-
-def format_worse_count(found: BaselineComparison) -> str:
-    """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
-    said = [f"{count_quantities(len(found.worse))} worse"] if found.worse else []
-    criteria = text.join_list([one.now.name for one in found.worse_criteria])
-    said += [f"{criteria} worse"] if criteria else []
-    said += [f"{len(found.missing)} gone"] if found.missing else []
-    return ", ".join(said) or "nothing worse"
-
-
-def count_quantities(count: int) -> str:
-    """Return a count of quantities: "1 quantity", "5 quantities"."""
-    return f"{count} {'quantity' if count == 1 else 'quantities'}"
-
-
-def format_worse(one: QuantityChange) -> str:
-    """Return what of a quantity is worse, before and now: "max 1.0000 → 2.0000 mm, out 1.0 % → 3.0 %"."""
-    pairs = {name: _pair(one, name) for name in one.worse}
-    return ", ".join(
-        f"{WORDS[name]} {written(before)} → {written(now, unit=True)}"
-        for name, (before, now) in pairs.items()
-    )
-
-
-def _pair(one: QuantityChange, name: Worse) -> tuple[Value, Value]:
-    """Return a statistic before and now, with digits that tell them apart if it changed."""
-    before, now = getattr(one.before, name), getattr(one.now, name)
-    unit = {"out_fraction": "%", "samples": ""}.get(name, one.now.unit)
-    told = name in (*one.worse, *one.better)
-    return Value(before, unit, now if told else None), Value(now, unit, before if told else None)
-
-
-def worse_facts(found: BaselineComparison) -> Iterator[Fact]:
-    """Yield what decides against a baseline: how much is worse, and what."""
-    yield Fact("Since the baseline", format_worse_count(found))
-    worse = [f"{symbol(one.now)} of {one.run} ({_words(one.worse)})" for one in found.worse]
-    yield Fact("Worse", _listed(worse))
-    yield Fact("Gone", _listed(list(map(str, found.missing))))
-
-
-def _facts(found: BaselineComparison) -> Iterator[Fact]:
-    yield from worse_facts(found)
-    yield Fact("New", _listed(list(map(str, found.new))))
-    noise = (f"{kind} {text.format_stated(value, UNITS[kind])}" for kind, value in found.noise.items())
-    yield Fact("Noise", ", ".join(noise), "smaller changes are not listed")
-    yield Fact("Recording of the baseline", str(found.recording or ""), brief=False)
-
-
-def _tables(found: BaselineComparison) -> Iterator[Table]:
-    """Yield the quantities that changed by more than the noise, and what was made differently."""
-    changed = sorted((one for one in found.changes if one.changed), key=lambda one: not one.worse)
-    if changed:
-        yield Table(f"Changed since {found.name} by more than the noise", columns_of(changed, _HEADS))
-    criteria = sorted(
-        (one for one in found.criteria if one.worse or one.better), key=lambda one: not one.worse
-    )
-    if criteria:
-        yield Table(
-            f"Criteria changed since {found.name} by more than the noise", columns_of(criteria, _CRITERIA)
-        )
-    if found.differences:
-        rows = [
-            (one.what, *(option_words(one.what, value, UNITS) for value in (one.before, one.now)))
-            for one in found.differences
-        ]
-        heads = {"what": "What", "before": "before", "now": "now"}
-        yield table_of("Made differently", heads, rows, brief=True)
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
-
-
-def _words(found: Sequence[Worse]) -> str:
-    return ", ".join(WORDS[name] for name in found)
-
-
-def _columns(name: Worse) -> dict[str, tuple[str, Callable[[QuantityChange], Cell]]]:
-    """Return a statistic before and now; a share or a count only where it changed."""
-
-    def cells(one: QuantityChange) -> tuple[Cell, Cell]:
-        shown = name in ("max", "rms", *one.worse, *one.better)
-        return _pair(one, name) if shown else (None, None)
-
-    word = WORDS[name]
+def _criteria(comparison: Comparison, table: ExportTable) -> dict[str, Any]:
+    """Return the fields of a table of criteria: its texts as cells, its numbers as arrays."""
+    columns = {one.name: np.asarray(one.values) for one in table.columns}
     return {
-        f"{word}_before": (f"{word} before", lambda one: cells(one)[0]),
-        f"{word}_now": (f"{word} now", lambda one: cells(one)[1]),
+        "comparison": drop_surrogates(comparison.name),
+        "reference": drop_surrogates(comparison.reference.name),
+        **{name: values.tolist() if values.dtype.kind == "U" else values for name, values in columns.items()},
     }
 
 
-def _verdict(one: QuantityChange, verdict: Verdict | None) -> Judged:
-    """Return a verdict where it changed."""
-    return Judged(verdict if one.before.verdict != one.now.verdict else None)
+def _joint_delta(comparison: Comparison, run: Deviation) -> FloatArray:
+    """Return a log's deviations in the order of the reference's joints [rad] or [m], shape (m, joints)."""
+    order = joint_order(comparison.reference.joints, run.run.log.joints) or ()
+    return np.column_stack(run.values)[:, np.argsort(order)]
 
 
-_CRITERIA: Heads[CriterionChange] = {
-    "name": ("Criterion", lambda one: one.now.name),
-    "worse": ("worse", lambda one: "worse" if one.worse else "better"),
-    "before": ("before", lambda one: Value(one.before.value, _shown(one.now.unit))),
-    "now": ("now", lambda one: Value(one.now.value, _shown(one.now.unit))),
-}
-"""The columns of criteria that changed, by their keys."""
+def _fields(comparison: Comparison) -> dict[str, Any]:
+    """Return the fields of a comparison in SI, with a struct a log in the cell `runs`."""
+    return {
+        "name": drop_surrogates(comparison.name),
+        "reference": drop_surrogates(comparison.reference.name),
+        "verdict": comparison.verdict,
+        "tolerance": dict(comparison.tolerance),
+        "runs": [_deviation(comparison, run) for run in comparison.runs],
+    }
 
-_HEADS: Heads[QuantityChange] = {
-    "run": ("Log", lambda one: Ref(one.run)),
-    "quantity": ("Quantity", lambda one: symbol(one.now)),
-    "worse": ("worse", lambda one: _words(one.worse)),
-    "better": ("better", lambda one: _words(one.better)),
-    **_columns("max"),
-    **_columns("rms"),
-    **_columns("out_fraction"),
-    **_columns("samples"),
-    "largest_change": ("most at one sample", lambda one: Value(one.largest_change, one.now.unit)),
-    "t_largest_change": ("at t", lambda one: Value(one.t_largest_change, "s")),
-    "verdict_before": ("verdict before", lambda one: _verdict(one, one.before.verdict)),
-    "verdict_now": ("verdict now", lambda one: _verdict(one, one.now.verdict)),
-}
-"""The columns of what changed, by their keys."""
+
+def _deviation(comparison: Comparison, run: Deviation) -> dict[str, Any]:
+    """Return the fields of a log; where joints alone are compared, their names and deviations."""
+    timed, nothing = run.run.timed, np.empty((0, 0))
+    joints = [*map(drop_surrogates, comparison.reference.joints)]
+    placed = {"delta": run.delta, "reference": run.reference, "actual": run.actual}
+    return {
+        "name": drop_surrogates(run.name),
+        "verdict": run.verdict,
+        "sample": run.sample,
+        "t": run.t if timed else nothing,
+        "clock_ns": run.run.log.clock_start_ns + run.t_ns if timed else nothing,
+        **(placed if run.statistics else {"joints": joints, "delta": _joint_delta(comparison, run)}),
+        "out_of_tolerance": run.out_of_tolerance,
+    }
+
+
+def _poses(comparison: Comparison) -> list[Poses]:
+    """Return the reference and the log at the compared samples of each log, both on the log's clock.
+
+    Raises:
+        RecordingError: If joints alone are compared.
+    """
+    if not comparison.worst.statistics:
+        where = str(comparison.recording or comparison.name)
+        raise RecordingError(Finding("a comparison of joints alone, so no pose", where))
+    found = []
+    for one in comparison.runs:
+        clock = clock_stamps(one.run, one.t_ns)
+        upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(clock), 1))
+        prefix = "" if len(comparison.runs) == 1 else f"{one.name}-"
+        found.append(Poses(f"{prefix}reference", clock, one.reference, upright))
+        found.append(Poses(f"{prefix}actual", clock, one.actual, upright))
+    return found

@@ -21,8 +21,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.align import align
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.sync import BY_HAND, BY_MOTION, synchronise
-from urmpipe_pipeline.comparison.verdict import UNITS, tolerance_for
-from urmpipe_pipeline.comparison.wording import format_unseen
+from urmpipe_pipeline.comparison.verdict import UNITS, format_unseen, tolerance_for
 from urmpipe_pipeline.diagnosis.problem import AT_REST
 from urmpipe_pipeline.joint_log import LogWarning, Role
 from urmpipe_pipeline.provenance import list_assumptions

@@ -9,8 +9,7 @@ import numpy as np
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS
-from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, tolerance_for
-from urmpipe_pipeline.comparison.wording import SYMBOLS
+from urmpipe_pipeline.comparison.verdict import SYMBOLS, DeltaMeterResult, tolerance_for
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
 from urmpipe_pipeline.presentation.parts import ends, within_words

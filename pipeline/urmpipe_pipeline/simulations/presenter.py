@@ -10,8 +10,8 @@ from itertools import groupby
 from urmpipe_models.display import format_count
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Verdict
-from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
-from urmpipe_pipeline.comparison.wording import (
+from urmpipe_pipeline.comparison.verdict import (
+    DeltaMeterResult,
     absolute_symbol,
     format_delta_meter,
     format_out_of_tolerance,

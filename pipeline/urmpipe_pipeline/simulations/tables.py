@@ -11,8 +11,7 @@ from typing import overload
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
-from urmpipe_pipeline.comparison.wording import SYMBOLS
+from urmpipe_pipeline.comparison.verdict import SYMBOLS, DeltaMeterResult
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
 from urmpipe_pipeline.presentation.section import Cell, Judged, Ref, Table, Value
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation, extremes

@@ -22,7 +22,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.align import MIN_BREADTH, apply_alignment, frame_to_option
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.facts import deviation_facts
+from urmpipe_pipeline.comparison.presenter import deviation_facts
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Advice
 from urmpipe_pipeline.runs.ingest import with_robot

@@ -12,8 +12,8 @@ from made_runs import off, paths
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.baseline import (
     compare_with_baseline,
+    format_worse,
 )
-from urmpipe_pipeline.comparison.tables import format_worse
 
 ROUNDING = 1e-15
 """Positions of 1 m round at 2e-16 m, and are taken apart twice."""

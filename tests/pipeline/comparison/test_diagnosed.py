@@ -13,8 +13,8 @@ from presented import cells, facts, figures, scene_of
 from urmpipe_models.errors import Hint, OptionError
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.facts import decisive_facts
 from urmpipe_pipeline.comparison.figures import cause_marks
+from urmpipe_pipeline.comparison.presenter import decisive_facts
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, diagnosis_tables
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, CORRECTED_COLOUR, DEVIATION_COLOUR
 from urmpipe_pipeline.presentation.scene import ArmMark

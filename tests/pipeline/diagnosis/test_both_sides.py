@@ -12,7 +12,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.comparison.facts import remedy_hints
+from urmpipe_pipeline.comparison.presenter import remedy_hints
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.runs.run import Run
 

@@ -17,8 +17,8 @@ from presented import cells, every_section, facts, scene_of
 from repeated import along, evaluated, still
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.exports import exports
 from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
+from urmpipe_pipeline.comparison.tables import exports
 from urmpipe_pipeline.iso9283.criteria import judge_criterion
 from urmpipe_pipeline.iso9283.tables import format_tolerance, sort_worst_first, to_value
 from urmpipe_pipeline.presentation.section import Presentation, Table
