@@ -3,8 +3,7 @@
 1. `parse_tolerance` and `check_tolerance` take a tolerance from the user, `complete_tolerance` its defaults.
 2. `tolerance_for` looks up that of a quantity: |deviation| <= tolerance passes, a missing value fails.
 3. `judge_delta_meter` judges a meter of a co-simulated system by it.
-4. `format_verdict`, `format_decisive` and others format a verdict: the same in the terminal, the recording and
-   the report.
+4. `format_verdict`, `format_decisive` and others format them for the terminal, the recording and the report.
 """
 
 from __future__ import annotations
