@@ -147,21 +147,6 @@ def test_a_wrap_of_values_within_pi_is_no_speed(capsys: Captured, folder: Path) 
         assert (abs(float(lines[0][4])) < 180.0) == bool(more)  # the last value is within pi
 
 
-def test_all_of_a_path_needs_a_recording_and_a_closed_form(capsys: Captured, folder: Path) -> None:
-    assert run(["ik", "default.csv", "--robot", "arm6", "--tsp", "1", "--all"]) == 2
-    assert capsys.readouterr().err == (
-        "error: every (--every): found with a path and no recording, allowed: with a recording; or with"
-        " targets"
-        " without times; --output run.rrd records every branch as a ghost arm\n"
-    )
-    assert run(["ik", "default.csv", "--robot", "urm6", "--tsp", "1", "--all", "-o", "a.rrd"]) == 2
-    assert capsys.readouterr().err == (
-        "error: every (--every): found with a path of urm6 that has no closed form, allowed: with poses"
-        " and an arm"
-        " that has a closed form; or with targets without times\n"
-    )
-
-
 @pytest.mark.slow
 def test_the_demo_path_solved_for_urm6_passes_against_itself(
     urmpipe: Callable[..., Any], folder: Path

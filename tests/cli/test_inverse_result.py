@@ -7,14 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urmpipe
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.math3d import to_quaternions
@@ -199,74 +197,3 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
     assert np.abs(far.q[0] - Q[0] - 4 * np.pi).max() < 1e-9
     near = urmpipe.ik(TARGETS, free, start=(Q[0] + 4 * np.pi).tolist(), within_pi=True)
     assert np.abs(near.q[0] - Q[0]).max() < 1e-9
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (
-            {"targets": np.zeros((5, 2))},
-            "targets: found an array of shape (5, 2), allowed: (n, 3), positions in m,",
-        ),
-        ({"targets": np.zeros((0, 3))}, "targets: found none, allowed: one or more"),
-        ({"t": [0.0]}, "t: found shape (1,), allowed: (2,), one time for each target, in s"),
-        (
-            {"targets": [[0.0, 0.1], [0.0]]},
-            "targets: found a list that is not an array of numbers, allowed: (n, 3),",
-        ),
-        ({"targets": {"x": 0.1}}, "targets: found a dict that is not an array of numbers, allowed: (n, 3),"),
-        (
-            {"targets": pd.DataFrame({"z": [0.2], "y": [0.0], "x": [0.1]})},
-            "targets: found a table, allowed: an array of shape (n, 3), positions in m, or (n, 4, 4), poses,"
-            ' such as table[["x", "y", "z"]].to_numpy()',
-        ),
-        ({"t": "ab"}, "t: found a str that is not an array of numbers, allowed: numbers"),
-        (
-            {"t": [0.0, 1e-12]},
-            "t: found times that do not increase, allowed: strictly increasing, by 1 ns or",
-        ),
-        ({"t": [0.0, 1e12]}, "t: found a time that is not finite or too large, allowed: up to 9e+09 s"),
-        ({"t": [0.0, np.nan]}, "t: found a time that is not finite or too large, allowed: up to 9e+09 s"),
-        ({"tsp": 0.0}, "tsp (--tsp): found 0.0, allowed: a positive time in s"),
-        ({"tsp": np.nan}, "tsp (--tsp): found nan, allowed: a positive time in s"),
-        ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: strictly increasing, by 1 ns or"),
-        ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of the two"),
-        ({"start": [0.0]}, "start (--start): found 1 value, allowed: 6, one for each of theta1, "),
-        (
-            {"start": "zero"},
-            "start (--start): found 'zero', allowed: joint values in rad and m, or with units, ",
-        ),
-        (
-            {"start": [np.nan] * 6},
-            "start (--start): found a value that is not finite, allowed: 6, one for each of ",
-        ),
-        ({"seed": -1}, "seed (--seed): found -1, allowed: a whole number, 0 or more"),
-        ({"seed": -1, "tsp": 1.0}, "seed (--seed): found -1, allowed: a whole number, 0 or more"),
-        ({"restarts": 1.5}, "restarts (--restarts): found 1.5, allowed: a whole number, 0 or more"),
-        (
-            {"tolerance": np.nan, "tsp": 1.0},
-            "tolerance (--tolerance): found nan, allowed: a positive length in m, such as",
-        ),
-        (
-            {"method": "magic", "tsp": 1.0},
-            "method (--method): found 'magic', allowed: auto, closed, iterative",
-        ),
-        ({"robot": None}, "robot (--robot): found none, allowed: a TOML, a URDF or one of arm6, "),
-        (
-            {"output": "log.txt"},
-            "output (--output): found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd",
-        ),
-    ],
-)
-def test_wrong_arguments(options: dict[str, object], said: str) -> None:
-    given: dict[str, object] = {"targets": TARGETS, "robot": "arm6"} | options
-    with pytest.raises(OptionError) as error:
-        urmpipe.ik(**given)  # type: ignore[arg-type]
-    assert str(error.value).startswith(said)
-
-
-def test_a_file_brings_its_own_times(tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match="t: found times beside a file, allowed: with arrays"):
-        urmpipe.ik(tmp_path / "path.csv", "arm6", t=[0.0])
-    with pytest.raises(LogError, match="found no such file"):
-        urmpipe.ik(tmp_path / "path.csv", "arm6")

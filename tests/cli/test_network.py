@@ -22,30 +22,6 @@ Run = Callable[..., Any]
 FOUR_BAR = (1.481134361, -2.271319288)
 """The rocker's angle of the shipped four-bar in both assemblies in [rad], to nine digits."""
 
-PARALLEL = """
-[bodies.left]
-[bodies.right]
-[bodies.across]
-[joints.A]
-kind = "revolute"
-bodies = ["ground", "left"]
-start = 0.1
-[joints.B]
-kind = "revolute"
-bodies = ["left", "across"]
-a = [[0, 0, 0.4], [0, 0, 0]]
-[joints.C]
-kind = "revolute"
-bodies = ["across", "right"]
-a = [[0.9, 0, 0], [0, 0, 0.4]]
-[joints.D]
-kind = "revolute"
-bodies = ["ground", "right"]
-a = [[0.9, 0, 0], [0, 0, 0]]
-start = 0.1
-"""
-"""A parallelogram; its axes are y."""
-
 
 def bennett(b: float) -> str:
     """Return the shipped Bennett linkage with other lengths b, as a share of its own."""
@@ -58,39 +34,11 @@ def bennett(b: float) -> str:
     )
 
 
-def test_list_names_every_network_with_its_source(urmpipe: Run) -> None:
-    ran = urmpipe("network", "list")
-    assert ran.code == 0
-    assert all(name in ran.out for name in network_names())
+def test_the_list_as_json_has_a_source_of_each(urmpipe: Run) -> None:
     listed = json.loads(urmpipe("network", "list", "--json").out)
     assert listed["schema"] == 1
     assert [one["name"] for one in listed["networks"]] == list(network_names())
     assert all(one["source"] and one["description"] for one in listed["networks"])
-    assert set(network_names()) == {
-        "bennett", "bricard", "cam-follower", "cluster-crc", "cluster-eg", "cluster-gc", "cluster-gg",
-        "four-bar", "geared-five-bar", "nine-revolute", "nine-revolute-controlled", "rack-and-pinion", "rccc",
-        "rssr", "sarrus", "screw-jack", "slider-crank", "stewart-gough", "stewart-gough-driven",
-    }  # fmt: skip
-
-
-def test_check_tells_mobility_and_why_kutzbach_differs(urmpipe: Run) -> None:
-    ran = urmpipe("network", "check", "four-bar")
-    assert (ran.code, ran.err) == (0, "")
-    assert ran.out.startswith("PASS  four-bar: assembled, a mechanism of mobility 1 (Kutzbach -2: ")
-    told = json.loads(urmpipe("network", "check", "four-bar", "--json").out)
-    assert {key: told[key] for key in ("name", "kind", "structure", "bodies", "variables", "mobility")} == {
-        "name": "four-bar", "kind": "mechanism", "structure": "closed chain", "bodies": 4, "variables": 4,
-        "mobility": 1,
-    }  # fmt: skip
-    assert (told["kutzbach"], len(told["redundant"]), told["passive"], told["special"]) == (-2, 3, [], False)
-    assert {"theta2", "theta4", "A", "B"} == set(told["loops"][0])
-    assert len(told["loops"]) == 1
-    assert told["residual"] < 1e-12
-    assert set(told) == {
-        "schema", "name", "kind", "structure", "bodies", "variables", "mobility", "kutzbach", "loops",
-        "clusters", "redundant", "passive", "special", "residual", "assemblies", "closure_errors",
-        "warnings", "output",
-    }  # fmt: skip
 
 
 def test_solve_finds_both_assemblies_of_a_four_bar(urmpipe: Run) -> None:
@@ -194,48 +142,6 @@ def test_a_control_out_of_reach_fails(urmpipe: Run, tmp_path: Path) -> None:
     assert json.loads(ran.out)["assemblies"] == []
 
 
-def test_a_special_configuration_is_a_warning_and_fails_if_strict(urmpipe: Run, tmp_path: Path) -> None:
-    quarter = f"start = {math.pi / 2!r}"
-    flat = PARALLEL.replace("start = 0.1", quarter).replace(
-        "[joints.C]", f"{quarter.replace('= ', '= -')}\n[joints.C]"
-    )
-    (tmp_path / "flat.toml").write_text(flat.replace("[joints.D]", f"{quarter}\n[joints.D]"))
-    ran = urmpipe("network", "check", "flat.toml", "--json")
-    told = json.loads(ran.out)
-    assert (ran.code, told["special"], told["mobility"]) == (0, True, 2)
-    said = "a special configuration: the mobility is 2 here, and 1 at configurations nearby"
-    assert ran.err == f"warning: {said}\n"
-    strict = urmpipe("network", "check", "flat.toml", "--strict")
-    assert (strict.code, strict.out) == (2, "")
-    assert strict.err == f"error: strict (--strict): found 1 warning, allowed: none\nerror: {said}\n"
-    (tmp_path / "regular.toml").write_text(PARALLEL)
-    told = json.loads(urmpipe("network", "check", "regular.toml", "--json").out)
-    assert (told["special"], told["mobility"], told["warnings"]) == (False, 1, [])
-
-
-def test_over_driven_controls_are_told(urmpipe: Run, tmp_path: Path) -> None:
-    driven = PARALLEL.replace(
-        'bodies = ["ground", "left"]\nstart = 0.1', 'bodies = ["ground", "left"]\ndriven = "s"'
-    )
-    driven = driven.replace('bodies = ["across", "right"]\n', 'bodies = ["across", "right"]\ndriven = "u"\n')
-    driven += "[controls.s]\nstart = 0.3\n[controls.u]\nstart = 0.3\n"
-    (tmp_path / "driven.toml").write_text(driven)
-    ran = urmpipe("network", "check", "driven.toml", "--json")
-    told = json.loads(ran.out)
-    assert (ran.code, told["mobility"]) == (0, 1)
-    assert [one["kind"] for one in told["warnings"]] == ["stuck-control"]
-
-
-def test_assemblies_that_are_no_list_are_told(urmpipe: Run) -> None:
-    ran = urmpipe("network", "solve", "nine-revolute", "--all", "--json")
-    told = json.loads(ran.out)
-    assert (ran.code, len(told["assemblies"])) == (0, 1)
-    assert [one["kind"] for one in told["warnings"]] == ["continuum"]
-    assert (
-        "with mobility 3: its assemblies cannot be listed; 3 more controls" in told["warnings"][0]["message"]
-    )
-
-
 @pytest.mark.slow
 def test_a_recording_and_a_drawing_are_written_and_replaced(urmpipe: Run, tmp_path: Path) -> None:
     arguments = (
@@ -295,62 +201,6 @@ def test_json_has_the_poses_of_bodies(urmpipe: Run, command: str) -> None:
         assert pose["quat_xyzw"][3] >= 0.0
 
 
-def test_an_input_and_a_foreign_file_are_not_replaced(urmpipe: Run, tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text(PARALLEL)
-    (tmp_path / "mine.svg").write_text("<svg/>")
-    for arguments, said in (
-        (("--draw", "mine.svg"), "mine.svg: found a file that is not a drawing of urmpipe"),
-        (("-o", "mine.toml"), "mine.toml: found an input of this command"),
-        (("-o", "mine.csv"), "mine.csv: found a name that does not fit a recording"),
-    ):
-        ran = urmpipe("network", "check", "mine.toml", *arguments)
-        assert ran.code == 2
-        assert said in ran.err
-    assert (tmp_path / "mine.svg").read_text() == "<svg/>"
-    assert (tmp_path / "mine.toml").read_text() == PARALLEL
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (
-            ("check", "four-bar", "--set", "crak=1", "--set", "x=2"),
-            [
-                "controls (--controls): control found 'crak' (did you mean crank?), allowed: crank",
-                "controls (--controls): control found 'x', allowed: crank",
-            ],
-        ),
-        (
-            ("check", "four-bar", "--set", "crank"),
-            ["controls (--controls): found 'crank', allowed: NAME=VALUE, each name once"],
-        ),
-        (
-            ("check", "four-bar", "--set", "crank=a"),
-            ["controls (--controls): found crank = a, allowed: a number, or an angle with its unit"],
-        ),
-        (
-            ("solve", "four-bar", "--set", "crank=1m"),
-            ["controls (--controls): found crank = 1m, allowed: a number, or an angle with its unit"],
-        ),
-        (("solve", "missing.toml"), ["missing.toml: cannot be read: No such file or directory"]),
-    ],
-)
-def test_wrong_use_is_told(urmpipe: Run, arguments: tuple[str, ...], said: list[str]) -> None:
-    ran = urmpipe("network", *arguments)
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err.splitlines() == [f"error: {line}" for line in said]
-
-
-def test_all_that_is_wrong_with_a_file_is_told_at_once_and_as_json(urmpipe: Run, tmp_path: Path) -> None:
-    wrong = PARALLEL.replace('"across", "right"', '"acros", "right"').replace('kind = "revolute"\n', "", 1)
-    (tmp_path / "wrong.toml").write_text(wrong)
-    ran = urmpipe("network", "check", "wrong.toml")
-    assert ran.code == 2
-    assert [line.split(" ")[1] for line in ran.err.splitlines()] == ["wrong.toml:5:", "wrong.toml:14:"]
-    told = json.loads(urmpipe("network", "check", "wrong.toml", "--json").out)
-    assert [one["line"] for one in told["errors"]] == [5, 14]
-
-
 def test_python_gives_the_same_as_the_command(urmpipe: Run) -> None:
     checked = api.network_check("rssr", controls={"crank": 0.5})
     told = json.loads(urmpipe("network", "check", "rssr", "--set", "crank=0.5", "--json").out)
@@ -370,16 +220,3 @@ def test_a_recording_where_nobody_may_write_is_refused_in_a_line(urmpipe: Run) -
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("error: /proc/x.rrd: cannot be written: ")
     assert len(ran.err.splitlines()) == 1
-
-
-def test_tables_in_python_are_a_network_too() -> None:
-    tables = {"bodies": {"b": {}}, "joints": {"A": {"kind": "revolute", "bodies": ["ground", "b"]}}}
-    checked = api.network_check(tables)
-    assert checked.mobility is not None
-    assert (checked.name, checked.structure, checked.mobility.mobility) == ("network", "tree", 1)
-    with pytest.raises(api.NetworkError) as error:
-        api.load_network({**tables, "joints": {"A": {"kind": "revolute", "bodies": ["ground", "c"]}}})
-    assert [str(one) for one in error.value.findings] == [
-        "bodies.b: nothing is tied to it; allowed: bodies with a joint or an element",
-        "joints.A.bodies: body found 'c', allowed: ground, b",
-    ]

@@ -14,7 +14,6 @@ import pytest
 
 import urmpipe as api
 from asserting import there
-from urmpipe_datasets import NETWORKS
 
 Run = Callable[..., Any]
 
@@ -177,93 +176,3 @@ def test_ctrl_c_leaves_no_file(tmp_path: Path, file: str, share: float) -> None:
             "four-bar", {"crank": (0, 1)}, output=tmp_path / file, draw=tmp_path / "a.svg", progress=stop
         )
     assert list(tmp_path.iterdir()) == []
-
-
-NUMBER = "a number, or an angle with its unit"
-LOAD = "BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ] in m, N and N.m, such as coupler:0,0,0:0,-50,0"
-ON_BRANCH = "allowed: a range on its branch, or another assembly by --branch or --start"
-
-WRONG: list[tuple[str, list[str]]] = [
-    ("four-bar", ["drives: found nothing that drives four-bar, allowed: crank"]),
-    ("four-bar crank", ["[CONTROL=FROM:TO]...: found 'crank', allowed: NAME=VALUE, each name once"]),
-    ("four-bar crank=0 crank=1", [
-        "[CONTROL=FROM:TO]...: found 'crank=1', allowed: NAME=VALUE, each name once",
-    ]),
-    ("four-bar crank=0:1:2", ["drives: found crank = '0:1:2', allowed: FROM:TO, or one value"]),
-    ("four-bar crank=1:nan", [f"drives: found crank = nan, allowed: {NUMBER}"]),
-    ("four-bar theta2=0:1", [
-        "drives: theta2 is a function of controls, allowed: the controls themselves, or a joint that is free",
-    ]),
-    ("four-bar crank=0:1 theta4=1:2", ["drives: found 2 drives, crank, theta4, allowed: 1, the mobility"]),
-    ("rssr S1=0:1", ["drives: S1 has 3 variables, allowed: S1[1], S1[2], S1[3]"]),
-    ("rssr S1[4]=0:1", ["drives: S1[4] has 3 variables, allowed: a number from 1 to 3"]),
-    ("four-bar theta4=20deg:120deg", [
-        "drives: no motion from the assembly at the start leads to theta4 = 0.34906585: the motion turns back"
-        f" at theta4 = 1.42744876; {ON_BRANCH}",
-    ]),
-    ("stewart-gough-driven leg1=0.8:1.1 leg2=0.6", [
-        "drives: found leg1 = 1.1, allowed: 0.65 to 1",
-        "drives: found leg2 = 0.6, allowed: 0.65 to 1",
-    ]),
-    ("four-bar crank=0:1 --steps 5 --duration 1s", [
-        "duration (--duration): found together with steps, allowed: one of the two",
-    ]),
-    ("four-bar crank=0:1 --branch 3", ["branch (--branch): found 3, allowed: 1 to 2"]),
-    ("four-bar crank=0:1 --start theta4=1,2", ["start (--start): found theta4 = '1,2', allowed: 1 in rad"]),
-    ("four-bar crank=0:1 --wrench bar:0,0,0:1,2,3", [
-        "wrenches (--wrenches): body found 'bar', allowed: ground, input, coupler, output",
-    ]),
-    ("four-bar crank=0:1 --torque theta4=1m", [
-        "torques (--torques): found theta4 = '1m', allowed: a number in N.m",
-    ]),
-    ("four-bar crank=0:1 -o run.txt", [
-        "output (--output): found 'run.txt', allowed: a name that ends in .csv (a motion log) or .rrd (a"
-        " recording)",
-    ]),
-    ("four-bar --log log.csv --steps 5 --law quintic", [
-        f"{name} (--{name}): found together with a log, allowed: without one, which has times of its own"
-        for name in ("steps", "law")
-    ]),
-    ("four-bar --log log.csv crank=foo", ["drives: column found 'foo', allowed: crank, leg1"]),
-    ("four-bar --log log.csv crank=leg1", [
-        "drives: column leg1 is in m, allowed: rad, the unit of crank",
-    ]),
-    ("four-bar --log missing.csv", ["missing.csv: found no such file"]),
-    ("four-bar crank=0:1foo x=3 --steps 0 --law quintic --branch 0 --point bar --wrench coupler --torque z=1"
-     " --start q=2", [
-        "steps (--steps): found 0, allowed: a whole number, 1 or more",
-        "branch (--branch): found 0, allowed: a whole number, 1 or more",
-        "law (--law): found without a duration, allowed: with one",
-        "branch (--branch): found together with start, allowed: one of the two",
-        "drives: drive found 'x', allowed: crank, A, B, theta4",
-        f"drives: found crank = 1foo, allowed: {NUMBER}",
-        "start (--start): joint found 'q', allowed: theta2, A, B, theta4",
-        "point (--point): body found 'bar', allowed: ground, input, coupler, output",
-        f"wrenches (--wrenches): found 'coupler', allowed: {LOAD}",
-        "torques (--torques): joint found 'z', allowed: theta2, A, B, theta4",
-    ]),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("arguments", "lines"), WRONG)
-def test_wrong_input_is_reported_at_once(
-    urmpipe: Run, tmp_path: Path, arguments: str, lines: list[str]
-) -> None:
-    (tmp_path / "log.csv").write_text(
-        "t (s),crank (rad),leg1 (m)\n" + "".join(f"{k / 100},0.9,0.8\n" for k in range(5))
-    )
-    ran = urmpipe("network", "drive", *arguments.split())
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err.splitlines() == [f"error: {line}" for line in lines]
-    assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
-
-
-def test_a_drive_that_leaves_the_motion_open_is_refused(urmpipe: Run, tmp_path: Path) -> None:
-    text = (NETWORKS / "rccc.toml").read_text(encoding="utf-8").replace('driven = "crank"', "")
-    (tmp_path / "open.toml").write_text(text.replace("[controls.crank]\nstart = 0.8", ""))
-    assert urmpipe("network", "drive", "open.toml", "r1=0:1", "--steps", "3").code == 0
-    ran = urmpipe(
-        "network", "drive", "nine-revolute", f"{api.load_network('nine-revolute').joints[0].name}=0:1"
-    )
-    assert (ran.code, len(ran.err.splitlines())) == (2, 1)
-    assert "the network still moves, with mobility 2; allowed: 2 more drives, of " in ran.err
