@@ -12,9 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from asserting import refusal, there
+from asserting import there
 from made_runs import arms, off, paths
-from urmpipe_models.errors import LogError, OutputError
+from urmpipe_models.errors import LogError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.results import present
@@ -78,19 +78,6 @@ def test_the_properties_are_the_statistics_bit_for_bit(tmp_path: Path) -> None:
     assert float(told["longest_out_interval"]) == there(run.longest_out_interval).duration
 
 
-def test_a_joint_that_is_called_x_is_not_the_axis(tmp_path: Path) -> None:
-    result = arms({"a": np.full((20, 6), 0.01)}, tolerance={"axis": 1.0, "joint": 0.002})
-    run = result.runs[0]
-    assert run.joint_delta is not None
-    renamed = {"x": replace(run.joint_statistics["q1"], quantity="x")}
-    changed = replace(
-        result,
-        runs=(replace(run, joint_statistics=renamed, joint_turns=(0,), joint_delta=run.joint_delta[:, :1]),),
-    )
-    cases = written(changed, tmp_path / "verdict.xml")[0].findall("testcase")
-    assert [case.get("name") for case in cases] == ["x", "y", "z", "joint x", "coverage", "judged"]
-
-
 def test_an_error_replaces_no_file_of_another_and_no_input(tmp_path: Path) -> None:
     mine, other = tmp_path / "mine.xml", tmp_path / "other.xml"
     written(paths({"a": off(0.0, 5)}), mine)
@@ -113,14 +100,3 @@ def test_any_name_of_a_file_is_held(tmp_path: Path, name: str) -> None:
     root = written(result, tmp_path / "verdict.xml")
     if name.isprintable():
         assert root[0].get("name") == root.get("name") == name
-
-
-def test_a_junit_file_of_ours_is_replaced_and_no_other(tmp_path: Path) -> None:
-    path = tmp_path / "verdict.xml"
-    for _ in range(2):
-        written(paths({"a": off(0.0, 5)}), path)
-    path.write_text('<?xml version="1.0" encoding="UTF-8"?>\n<testsuites/>\n')
-    assert refusal(OutputError, written, paths({"a": off(0.0, 5)}), path) == (
-        f"{path}: found a file that is not a JUnit file of urmpipe, allowed: a new name,"
-        " or such a JUnit file to replace"
-    )
