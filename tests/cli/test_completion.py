@@ -6,9 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import click
 import pytest
@@ -17,11 +15,13 @@ from click.shell_completion import ShellComplete
 from command_contexts import EVERY, NAMES
 from urmpipe.main import cli
 from urmpipe.parameters.completion import CRITERIA, DEVIATIONS, SHARES
-from urmpipe.parameters.kinds import DELIMITERS, SOURCES
+from urmpipe.parameters.kinds import FORMS, SOURCES
+from urmpipe.parameters.outputs import Export
+from urmpipe.parameters.param import params_of
+from urmpipe_models import math3d
 from urmpipe_pipeline.comparison.verdict import UNITS
 from urmpipe_pipeline.sources import source_names
-
-RunCommand = Callable[..., Any]
+from urmpipe_pipeline.tables import FORMATS
 
 FREE = {
     "--planes", "--band", "--cycles", "--base", "--tool", "--base-link", "--tip-link", "--period", "--tsp",
@@ -125,13 +125,11 @@ def test_every_option_completes_unless_its_value_is_free(folder: Path, context: 
     assert silent == []
 
 
-def test_words_are_those_of_the_pipeline(folder: Path, urmpipe: RunCommand) -> None:
+def test_words_are_those_of_the_models_and_the_pipeline() -> None:
     assert {**DEVIATIONS, **SHARES, **CRITERIA} == UNITS
     assert source_names() == SOURCES
-    allowed = f"{', '.join(DELIMITERS)}, or the character itself"
-    assert urmpipe("ingest", "log.csv", "--delimiter", "foo").err == (
-        f"error: delimiter (--delimiter): found 'foo', allowed: {allowed}\n"
-    )
+    assert FORMS == math3d.FORMS
+    assert params_of(Export)["to"].kind.allowed == ", ".join(FORMATS)
 
 
 def test_completing_loads_nothing_heavy() -> None:

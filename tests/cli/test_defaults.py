@@ -10,16 +10,12 @@ from pathlib import Path
 import pytest
 
 from urmpipe import read_recording
-from urmpipe.main import find_commands, run
-from urmpipe.parameters.kinds import FORMS
-from urmpipe_models import math3d as orientation
+from urmpipe.main import run
 from urmpipe_pipeline.comparison.comparison import Comparison
 
 LOG = "t [s],a,b,c,d,e,f\n" + "".join(f"{k * 0.005},{k},1,2,3,4,5\n" for k in range(20))
 
 INGEST = ("ingest", "log.csv", "--unit", "deg", "--joints", "a,b,c,d,e,f")
-
-NAMES = ", ".join(find_commands())
 
 Captured = pytest.CaptureFixture[str]
 
@@ -39,10 +35,6 @@ def result(capsys: Captured) -> dict[str, object]:
     return found
 
 
-def test_the_forms_are_those_of_the_models() -> None:
-    assert FORMS == orientation.FORMS
-
-
 def test_defaults_of_a_folder_above_hold_and_are_told(lab: Path, capsys: Captured) -> None:
     (lab / "urmpipe.toml").write_text('robot = "ur5e"\nunit = ["deg"]\n[ingest]\nstrict = true\n')
     assert run(["ingest", "log.csv", "--json"]) == 0
@@ -50,14 +42,6 @@ def test_defaults_of_a_folder_above_hold_and_are_told(lab: Path, capsys: Capture
     found = json.loads(out)
     assert (found["robot"], found["units"]["a"]) == ("ur5e", "deg")
     assert err == f"note: defaults of {lab}/urmpipe.toml: robot=ur5e, unit=deg, strict=true\n"
-
-
-def test_the_command_line_comes_before_the_defaults(lab: Path, capsys: Captured) -> None:
-    (lab / "urmpipe.toml").write_text('robot = "ur5e"\nunit = "deg"\ntsp = "10ms"\n')
-    assert run(["ingest", "log.csv", "--json", "--robot", "urm6", "--unit", "rad"]) == 0
-    found = result(capsys)
-    assert (found["robot"], found["tsp"]) == ("urm6", 0.01)
-    assert found["units"]["a"] == "rad"  # type: ignore[index]
 
 
 def test_of_an_option_in_several_files_the_nearest_decides(lab: Path, capsys: Captured) -> None:
@@ -90,148 +74,12 @@ def test_each_error_names_the_file_that_it_is_in(lab: Path, capsys: Captured) ->
     assert capsys.readouterr().err == f"error: {upper}: {said}\n"
 
 
-def test_files_in_it_are_seen_from_its_folder(lab: Path, capsys: Captured) -> None:
-    (lab / "urmpipe.toml").write_text('map = "maps/lab.toml"\n')
-    (lab / "maps").mkdir()
-    (lab / "maps" / "lab.toml").write_text('robot = "ur3"\n[units]\nb = "deg"\n')
-    assert run(["ingest", "log.csv", "--json"]) == 0
-    assert result(capsys)["robot"] == "ur3"
-
-
 def test_everything_that_is_wrong_with_it(lab: Path, capsys: Captured) -> None:
     (lab / "urmpipe.toml").write_text('robt = "ur5e"\n[compare]\ntolrance = 0.1\n')
     assert run(["ingest", "log.csv"]) == 2
     first, second = capsys.readouterr().err.splitlines()
     assert first.startswith(f"error: {lab}/urmpipe.toml: key robt: unknown (did you mean robot?); allowed: ")
     assert "key compare.tolrance: unknown (did you mean tolerance?); allowed: " in second
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("tsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
-        ("[ingest]\ntsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
-        ("derivative = 'x'", "key derivative: found 'x', allowed: central, savgol"),
-        ("strict = 'yes'", "key strict: found 'yes', allowed: true or false"),
-        ("tsp = true", "key tsp: found true, allowed: a positive time in s, such as 0.005 or 5ms"),
-        ("[ignest]\ntsp = 1", f"key ignest: found 'ignest' (did you mean ingest?), allowed: {NAMES}"),
-    ],
-)
-def test_what_is_wrong_in_it_is_told_by_file_and_key(
-    lab: Path, capsys: Captured, text: str, said: str
-) -> None:
-    (lab / "urmpipe.toml").write_text(f"{text}\n")
-    assert run(["ingest", "log.csv", "-q"]) == 2
-    assert capsys.readouterr().err == f"error: {lab}/urmpipe.toml: {said}\n"
-
-
-def test_a_wrong_tolerance_in_it_is_told_by_file_and_key(lab: Path, capsys: Captured) -> None:
-    (lab / "urmpipe.toml").write_text("[compare]\ntolerance = {axes = '2mm'}\n")
-    assert run(["compare", "log.csv", "-q"]) == 2
-    assert capsys.readouterr().err.startswith(
-        f"error: {lab}/urmpipe.toml: key tolerance: found 'axes=2mm', allowed: a length in m, or axis=, "
-    )
-
-
-def test_explain_prints_alternatives_and_writes_nothing(lab: Path, capsys: Captured) -> None:
-    assert run([*INGEST, "--explain"]) == 0
-    out = capsys.readouterr().out
-    assert "Otherwise" in out
-    assert "--delimiter SIGN" in out
-    assert sorted(path.name for path in Path.cwd().iterdir()) == ["log.csv"]
-
-
-def test_a_map_that_was_written_reads_the_next_log(lab: Path, capsys: Captured) -> None:
-    assert (
-        run(
-            [
-                "ingest",
-                "log.csv",
-                "--robot",
-                "ur5e",
-                "--unit",
-                "deg",
-                "--tool",
-                "0,0,0.1",
-                "--write-map",
-                "m.toml",
-            ]
-        )
-        == 0
-    )
-    assert "Map: m.toml  (use it: urmpipe ingest LOG --map m.toml)" in capsys.readouterr().out
-    Path("next.csv").write_text(LOG)
-    assert run(["ingest", "next.csv", "--map", "m.toml", "--strict", "--json"]) == 0
-    found = result(capsys)
-    assert found["robot"] == "ur5e"
-    assert found["joints"] == list("abcdef")
-    assert found["units"] == {"t": "s", **dict.fromkeys("abcdef", "deg")}
-    assert not found["warnings"]
-
-
-def test_a_map_replaces_only_a_map(lab: Path, capsys: Captured) -> None:
-    assert run([*INGEST, "-q", "--write-map", "log.csv"]) == 2
-    said = "error: log.csv: found an input of this command, allowed: any other name for the map\n"
-    assert capsys.readouterr().err == said
-    Path("notes.toml").write_text("mine = 1\n")
-    assert run([*INGEST, "-q", "--write-map", "notes.toml"]) == 2
-    assert "found a file that is not a map of urmpipe" in capsys.readouterr().err
-    assert Path("notes.toml").read_text() == "mine = 1\n"
-    for _ in range(2):
-        assert run([*INGEST, "-q", "--write-map", "m.toml"]) == 0
-
-
-def test_a_quiet_command_tells_no_defaults(lab: Path, capsys: Captured) -> None:
-    (lab / "urmpipe.toml").write_text("period = 0.01\n")
-    assert run([*INGEST, "-q"]) == 0
-    assert capsys.readouterr().err == ""
-    (lab / "urmpipe.toml").write_text("quiet = true\n")
-    assert run([*INGEST]) == 0
-    assert capsys.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize(
-    "name", ["json", "audit", "write-map", "output", "explain", "junit", "csv", "baseline"]
-)
-def test_what_one_call_is_to_give_is_no_default(lab: Path, capsys: Captured, name: str) -> None:
-    (lab / "urmpipe.toml").write_text(f"{name} = 'x'\n")
-    assert run([*INGEST]) == 2
-    said = f"key {name}: found an option of a single call, allowed: --{name} on the command line"
-    assert capsys.readouterr().err == f"error: {lab}/urmpipe.toml: {said}\n"
-
-
-def test_a_map_keeps_intervals_and_the_form_of_dates(lab: Path, capsys: Captured) -> None:
-    head, *rows = LOG.splitlines()
-    dated = [f"03.04.2021 10:00:00.{k:03d},{row.partition(',')[2]}" for k, row in enumerate(rows)]
-    Path("dates.csv").write_text("\n".join([head.replace("t [s]", "time"), *dated]) + "\n")
-    given = ["--unit", "time=dmy", "--unit", "deg", "--joints", "a,b,c,d,e,f", "--interval", "b=0:360"]
-    assert run(["ingest", "dates.csv", *given, "--write-map", "m.toml", "-q"]) == 0
-    assert run(["ingest", "dates.csv", "--map", "m.toml", "--json", "--interval", "c=-180:180"]) == 0
-    found = result(capsys)
-    assert found["clock_start"] == 1617444000.0
-    said = {one["what"]: one["value"] for one in found["inferences"]}  # type: ignore[attr-defined]
-    assert said["interval of b"] == "0..360 deg"
-    assert said["interval of c"] == "-180..180 deg"
-
-
-def test_all_outputs_are_written_or_none(lab: Path, capsys: Captured) -> None:
-    assert run([*INGEST, "--audit", "a.csv", "--write-map", "missing/m.toml", "--json"]) == 2
-    assert "found no folder missing" in capsys.readouterr().err
-    assert sorted(path.name for path in Path.cwd().iterdir()) == ["log.csv"]
-    assert run([*INGEST, "--audit", "a.csv", "--write-map", "./a.csv"]) == 2
-    assert capsys.readouterr().err == "error: found a.csv as audit and as map; allowed: a name for each\n"
-    assert run([*INGEST, "--explain", "-o", "a.rrd"]) == 2
-    said = "error: output (--output): found a.rrd, allowed: no output: --explain writes no recording\n"
-    assert capsys.readouterr().err == said
-    assert run([*INGEST, "--audit", "a.csv", "--write-map", "m.toml"]) == 0
-    assert "Audit: a.csv  (0 lines)" in capsys.readouterr().out
-    assert sorted(path.name for path in Path.cwd().iterdir()) == ["a.csv", "log.csv", "log.rrd", "m.toml"]
-
-
-def test_a_map_is_never_replaced_by_the_map_that_it_led_to(lab: Path, capsys: Captured) -> None:
-    assert run([*INGEST, "-q", "--write-map", "m.toml"]) == 0
-    assert run(["ingest", "log.csv", "-q", "--map", "m.toml", "--write-map", "m.toml"]) == 2
-    assert capsys.readouterr().err.startswith("error: m.toml: found an input of this command, allowed: ")
 
 
 @pytest.mark.slow
@@ -251,21 +99,6 @@ def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Ca
     )
     (lab / "urmpipe.toml").write_text("unit = 'deg'\n")
     assert run(["compare", "log.rrd", "log.rrd", "-q"]) == 0
-
-
-def test_tables_and_truths_are_no_values(lab: Path, capsys: Captured) -> None:
-    (lab / "urmpipe.toml").write_text("[robot]\n")
-    assert run([*INGEST, "-q"]) == 0
-    assert capsys.readouterr().err == ""
-    (lab / "urmpipe.toml").write_text("tsp = {a = 'deg'}\n")
-    assert run([*INGEST]) == 2
-    assert "key tsp: found {'a': 'deg'}, allowed: a positive time in s, " in capsys.readouterr().err
-    (lab / "urmpipe.toml").write_text("robot = true\n")
-    assert run([*INGEST]) == 2
-    assert (
-        "urmpipe.toml: key robot: found true, allowed: a name, a TOML or URDF file, "
-        in capsys.readouterr().err
-    )
 
 
 def limited_by_git(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,6 +52,14 @@ def test_each_option_stands_once_and_every_line_fits(context: click.Context) -> 
         assert len(listed) == 1, option.opts
 
 
+@ALL
+def test_every_command_has_examples_and_every_option_says_what_it_does(context: click.Context) -> None:
+    if not isinstance(context.command, click.Group):
+        _, _, examples = context.get_help().partition("Example")
+        assert f"  {context.command_path} " in examples
+    assert [one.opts for one in options_of(context) if not one.help] == []
+
+
 def test_the_help_of_compare_begins_with_what_is_used_most() -> None:
     context = next(one for one in EVERY if one.command_path == "urmpipe compare")
     assert headings_of(context) == [

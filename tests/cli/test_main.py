@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import fields
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,9 +17,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from urmpipe.main import cli, find_commands, run
-from urmpipe.parameters import kinds
 from urmpipe_datasets import LOGS
-from urmpipe_models.errors import Finding
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
@@ -33,37 +29,6 @@ def test_the_short_help_of_every_command_is_its_own() -> None:
         command = cli.get_command(context, name)
         assert command is not None
         assert command.get_short_help_str(limit=200) == short
-
-
-def commands() -> Iterator[tuple[tuple[str, ...], click.Command]]:
-    """Every command and subcommand with its words."""
-    context = click.Context(cli)
-    for name in find_commands():
-        command = cli.get_command(context, name)
-        assert command is not None
-        yield (name,), command
-        if isinstance(command, click.Group):
-            yield from (((name, sub), command.commands[sub]) for sub in command.commands)
-
-
-@pytest.mark.parametrize(
-    ("words", "command"),
-    list(commands()),
-    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
-)
-def test_every_command_has_help_with_examples_and_every_option_says_what_it_does(
-    words: tuple[str, ...], command: click.Command
-) -> None:
-    result = CliRunner().invoke(cli, [*words, "--help"])
-    assert result.exit_code == 0
-    if not isinstance(command, click.Group):
-        assert "Examples:" in result.output or "Example:" in result.output
-        assert f"urmpipe {' '.join(words)}" in result.output
-    for parameter in command.params:
-        if isinstance(parameter, click.Option):
-            assert parameter.help, f"{parameter.name} has no help"
-    narrow = CliRunner().invoke(cli, [*words, "--help"], terminal_width=80).output
-    assert [line for line in narrow.splitlines() if len(line) > 80] == []
 
 
 @pytest.mark.slow
@@ -81,89 +46,6 @@ def test_version(urmpipe: RunCommand) -> None:
     for words in ((), ("ingest",), ("robot", "list")):
         ran = urmpipe(*words, "--version")
         assert (ran.code, ran.out) == (0, f"urmpipe, version {version('urmpipe')}\n")
-
-
-COMMAND_NAMES = ", ".join(find_commands())
-DURATIONS = "allowed: a positive time in s, such as 0.005 or 5ms"
-OFFSETS = "allowed: stamps, start, auto, or a time in s, such as -0.2 or 200ms"
-FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("igest x", f"found 'igest' (did you mean ingest?), allowed: {COMMAND_NAMES}"),
-        ("show urm6", f"found 'show' (did you mean robot show?), allowed: {COMMAND_NAMES}"),
-        ("robots list", f"found 'robots' (did you mean robot?), allowed: {COMMAND_NAMES}"),
-        ("robot lst", "found 'lst' (did you mean list?), allowed: equations, export, list, show"),
-        ("ingest", "found no LOG..., allowed: urmpipe ingest [OPTIONS] LOG..."),
-        (
-            "ingest x --robt a",
-            "--robt: no such option (did you mean --robot?); see urmpipe ingest --help",
-        ),
-        ("ingest x --tsp", "--tsp: found no value, allowed: --tsp NUMBER[s|ms|us]"),
-        (
-            "ingest x --delimiter",  # as from a shell that ended the line at ;
-            "--delimiter: found no value, allowed: --delimiter comma|semicolon|tab|spaces|bar",
-        ),
-        ("ingest x --joints", "--joints: found no value, allowed: --joints A,B,C"),
-        ("ingest x --unit", "--unit: found no value, allowed: --unit [COLUMN=]UNIT"),
-        ("ingest x --decimal", "--decimal: found no value, allowed: --decimal point|comma|.|,"),
-        ("ingest x -o", "-o: found no value, allowed: -o RUN.rrd"),
-        ("ingest x --json=1", "--json: found a value, allowed: --json alone"),
-        ("ik x --restarts -1", "restarts (--restarts): found '-1', allowed: a whole number, 0 or more"),
-        ("ingest x --tsp never", f"tsp (--tsp): found 'never', {DURATIONS}"),
-        ("ingest x --tsp -1", f"tsp (--tsp): found '-1', {DURATIONS}"),
-        ("ingest x --tsp 5m", f"tsp (--tsp): found '5m', {DURATIONS}"),
-        ("ingest x --derivative magic", "derivative (--derivative): found 'magic', allowed: central, savgol"),
-        (
-            "ingest x --interval 3",
-            "interval (--interval): found '3', allowed: LOW:HIGH or JOINT=LOW:HIGH, in the file's unit or"
-            " with units,"
-            " such as -180deg:180deg",
-        ),
-        ("ingest x --base 0,0,1kg", f"base (--base): found '0,0,1kg', {FRAMES}"),
-        ("compare x --sync soon", f"sync (--sync): found 'soon', {OFFSETS}"),
-    ],
-)
-def test_wrong_use_is_one_line_that_says_what_is_allowed(urmpipe: RunCommand, line: str, said: str) -> None:
-    ran = urmpipe(*line.split())
-    assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        (
-            "iso LOG LOG --planes 1000000000",
-            "planes (--planes): found 1000000000, allowed: 10000 at most",
-        ),
-        (
-            "ik PATH --robot urm6 --unit m --restarts 10001",
-            "restarts (--restarts): found 10001, allowed: 10000 at most",
-        ),
-        (
-            "network solve four-bar --restarts 1000000000",
-            "restarts (--restarts): found 1000000000, allowed: 200000 at most",
-        ),
-        (
-            "simulate one-drive --duration 1e300",
-            "duration (--duration): found 1e+300 s, allowed: below 1e+09 s",
-        ),
-        ("ingest LOG --tsp 1e-300", "tsp (--tsp): found 1e-300 s, allowed: 1e-09 s or more: times are in ns"),
-        (
-            "fmu build repolarizer -s joints=1001",
-            "unit repolarizer: option joints: found 1001, allowed: 1000 at most",
-        ),
-    ],
-)
-def test_values_that_would_take_all_time_or_memory_name_their_option(
-    urmpipe: RunCommand, line: str, said: str
-) -> None:
-    logs = {"LOG": str(LOGS / "matlab.csv"), "PATH": str(LOGS / "path.csv")}
-    ran = urmpipe(*(logs.get(word, word) for word in line.split()))
-    assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")
 
 
 HUGE = "t,q1 [rad],q2 [rad],q3 [rad],q4 [rad],q5 [rad],q6 [rad],x [m],y [m],z [m]\n"
@@ -237,27 +119,6 @@ def test_a_command_with_a_letter_missing_is_meant(name: str, at: int) -> None:
     assert f"(did you mean {name}?)" in result.exception.message
 
 
-def test_a_length_may_have_its_unit_in_a_frame() -> None:
-    typed, plain = (
-        kinds.FRAME.read(text) for text in ("0,1cm,150 mm,0,0,90deg", "0,0.01,0.15,0,0,1.5707963267948966")
-    )
-    assert typed == plain
-
-
-def test_an_error_is_one_line_and_json_if_asked_for(urmpipe: RunCommand) -> None:
-    ran = urmpipe("ingest", "missing.csv")
-    assert ran.code == 2
-    assert ran.out == ""
-    assert ran.err.startswith("error: missing.csv: ")
-    assert ran.err.count("\n") == 1
-    ran = urmpipe("ingest", "missing.csv", "--json")
-    assert ran.code == 2
-    answer = json.loads(ran.out)
-    assert answer["schema"] == 1
-    assert answer["errors"][0].keys() == {one.name for one in fields(Finding)}
-    assert answer["errors"][0]["file"] == "missing.csv"
-
-
 def test_debug_adds_the_traceback(urmpipe: RunCommand) -> None:
     ran = urmpipe("ingest", "missing.csv", "--debug")
     assert ran.code == 2
@@ -320,40 +181,6 @@ def test_outputs_that_are_closed_are_no_fault() -> None:
             ["sh", "-c", f'"$@" {closed}', "sh", *command], capture_output=True, check=False
         )
         assert (done.returncode, done.stderr) == (0, b""), closed
-
-
-LONG = "x" * 100
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        [LONG],
-        ["ingest", "log.csv", "--tsp", LONG],
-        ["ingest", "log.csv", "--interval", LONG],
-        ["ingest", "log.csv", "--tool", LONG],
-        ["ingest", "log.csv", "--robot", LONG],
-        ["ingest", "log.csv", "--delimiter", LONG],
-        ["compare", "path.csv", "log.csv", "--sync", LONG],
-        ["compare", "path.csv", "log.csv", "--tolerance", LONG],
-        ["compare", "path.csv", "log.csv", "--align", LONG],
-        ["ik", "targets.csv", "--start", LONG],
-        ["ik", "targets.csv", "--seed", LONG],
-        ["ik", "targets.csv", "--tolerance", LONG],
-        ["simulate", LONG],
-        ["simulate", "log-to-delta", "--set", LONG],
-        ["robot", "show", LONG],
-    ],
-)
-def test_a_long_value_is_cut_where_an_error_shows_it(
-    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "log.csv").write_text("t [s],q1 [rad]\n0,0\n0.1,0.1\n", encoding="utf-8")
-    assert run(arguments) == 2
-    told = capsys.readouterr().err
-    assert "x" * 20 in told
-    assert "x" * 61 not in told
 
 
 def test_an_error_that_a_stop_caused_is_a_stop(

@@ -266,49 +266,6 @@ def test_a_new_command_is_one_file(
     assert "  toy       Print a toy.\n" in capsys.readouterr().out
 
 
-def test_all_faults_of_the_options_of_a_line_are_one_error(capsys: pytest.CaptureFixture[str]) -> None:
-    wrong = ["--tsp", "x", "--align", "base", "--tolerance", "foo=1", "--robot", ""]
-    assert run(["compare", "a.csv", "b.csv", *wrong]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition(": found ")[0] for line in lines] == [
-        f"error: {name} (--{name})" for name in ("tsp", "align", "tolerance", "robot")
-    ]
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["log.csv"], "found 'log.csv', a log, allowed: a command before it, such as urmpipe ingest log.csv"),
-        (
-            ["log.csv", "two.csv", "--json"],
-            "found 'log.csv', logs, allowed: a command before it, such as urmpipe compare log.csv two.csv",
-        ),
-        (
-            ["run.rrd"],
-            "found 'run.rrd', a recording, allowed: a command before it, such as urmpipe view run.rrd or"
-            " urmpipe report run.rrd",
-        ),
-        (
-            ["my.toml"],
-            "found 'my.toml', a TOML file, allowed: a command before it, such as urmpipe simulate my.toml or"
-            " urmpipe network check my.toml or urmpipe robot show my.toml",
-        ),
-    ],
-)
-def test_a_file_in_the_place_of_a_command_names_the_command(
-    words: list[str],
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in ("log.csv", "two.csv", "run.rrd", "my.toml"):
-        Path(name).touch()
-    assert run(words) == 2
-    assert capsys.readouterr().err == f"error: {said}\n"
-
-
 @pytest.mark.parametrize("flag", ["-h", "--help"])
 def test_both_names_of_help_work(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["ingest", flag]) == 0
