@@ -1,4 +1,4 @@
-"""urmpipe: does the motion this environment produced agree with the motion that was asked for?
+"""urmpipe: does the motion this environment produced agree with the commanded motion?
 
     import urmpipe
     run = urmpipe.ingest("log.csv", robot="urm6")
@@ -180,7 +180,7 @@ Result.draw = staticmethod(_draw)
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name when it is first asked for."""
+    """Load a public name when it is first used."""
     from importlib import import_module
 
     if name not in _HOME:

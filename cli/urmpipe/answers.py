@@ -77,22 +77,22 @@ class Call:
 
         return elapsed_time(title, quiet=self.quiet)
 
-    def given(self, is_meant: Callable[[str], bool] = lambda name: True) -> list[str]:
+    def explicit_options(self, is_counted: Callable[[str], bool]) -> list[str]:
         """Return the options on the command line, by their long names.
 
         Args:
-            is_meant: Whether the parameter of a name counts.
+            is_counted: Whether the parameter of a name counts.
         """
         return [
             max(param.opts, key=len)
             for param in self.ctx.command.params
             if isinstance(param, click.Option)
-            and is_meant(param.name or "")
+            and is_counted(param.name or "")
             and self.ctx.get_parameter_source(param.name or "") == ParameterSource.COMMANDLINE
         ]
 
     def without_log_options(self, operands: Sequence[Path], options: Mapping[str, Any]) -> dict[str, Any]:
-        """Return options without those of logs if no operand is a log; note it if some operands are none.
+        """Return options without those of logs if no operand is a log; note it if some operands are not logs.
 
         Args:
             operands: Recordings, logs and folders of them.
@@ -104,17 +104,17 @@ class Call:
         from urmpipe.parameters.comparing import LOG_PARAMETERS
         from urmpipe_pipeline.operands import is_log
 
-        given = self.given(LOG_PARAMETERS.__contains__)
+        log_options = ", ".join(self.explicit_options(LOG_PARAMETERS.__contains__))
         recordings = [str(path) for path in operands if not is_log(path)]
         files = ", ".join(recordings)
         if len(recordings) < len(operands):
-            if given and recordings:
-                self.note(f"{', '.join(given)} applied to the logs only: {files} used as ingested")
+            if log_options and recordings:
+                self.note(f"{log_options} applied to the logs only: {files} used as ingested")
             return dict(options)
-        if given:
-            found = f"{', '.join(given)}: found with recordings only ({files})"
+        if log_options:
+            fault = f"{log_options}: found with recordings only ({files})"
             allowed = "with at least one log; recordings are used as ingested"
-            raise click.UsageError(f"{found}, allowed: {allowed}")
+            raise click.UsageError(f"{fault}, allowed: {allowed}")
         return {name: value for name, value in options.items() if name not in LOG_PARAMETERS}
 
     def deciding_defaults(self, options: Mapping[str, Any]) -> tuple[str, ...]:

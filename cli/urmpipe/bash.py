@@ -1,4 +1,4 @@
-"""Completion in bash that keeps a value with = or : in one piece, and the cursor behind what goes on."""
+"""Completion in bash that keeps a value with = or : in one piece, and no blank after an unfinished one."""
 
 from __future__ import annotations
 

@@ -83,8 +83,8 @@ def _read_option(ctx: click.Context, option: click.Parameter, value: Any) -> Any
         return param.kind.read(value)
     except (ValueError, TypeError, OptionError) as error:
         for fault in param.kind.find_faults(name, value, error):
-            found = json.dumps(value) if isinstance(value, bool) else fault.found  # a bool is of urmpipe.toml
-            fault_at = locate_fault(ctx, option, replace(fault, found=found))
+            text = json.dumps(value) if isinstance(value, bool) else fault.found  # a bool is of urmpipe.toml
+            fault_at = locate_fault(ctx, option, replace(fault, found=text))
             ctx.meta.setdefault(FAULTS, []).append(fault_at)
         return None
 
@@ -184,7 +184,7 @@ class Group(click.Group):
 
 
 def usage_finding(error: click.UsageError) -> Finding:
-    """Return what is wrong with a line, or with the urmpipe.toml that sets its options."""
+    """Return the fault of a line, or of the urmpipe.toml that sets its options."""
     ctx = error.ctx
     match error:
         case click.NoSuchOption():
@@ -192,17 +192,17 @@ def usage_finding(error: click.UsageError) -> Finding:
             text = f"{error.option_name}: no such option{format_suggestion(error.option_name, options)}"
         case click.BadOptionUsage(option_name=name):
             needs_value = "requires" in error.message  # the message alone distinguishes the two
-            found, allowed = ("no value", _metavar(ctx, name)) if needs_value else ("a value", "alone")
-            text = f"{name}: found {found}, allowed: {name} {allowed}"
+            fault, allowed = ("no value", _metavar(ctx, name)) if needs_value else ("a value", "alone")
+            text = f"{name}: found {fault}, allowed: {name} {allowed}"
         case click.MissingParameter(param=click.Parameter() as param):
             text = f"found no {_display_name(param)}, allowed: {_usage(ctx)}"
         case click.BadParameter(param=click.Parameter() as param):
             return locate_fault(ctx, param, Finding(error.message))
-        case click.UsageError() if ctx and "unexpected extra" in error.message:  # no class of its own
-            found = error.message.partition("(")[2].rstrip(")")
+        case click.UsageError() if ctx and "unexpected extra" in error.message:  # it has no separate class
+            extra = error.message.partition("(")[2].rstrip(")")
             takes_robot = any("--robot" in param.opts for param in ctx.command.params)
             robot = "; --robot sets a robot" if takes_robot else ""
-            text = f"found {found} besides the rest, allowed: {_usage(ctx)}{robot}"
+            text = f"found {extra} besides the rest, allowed: {_usage(ctx)}{robot}"
         case _:
             text = error.format_message()
     return Finding(text if ctx is None or "allowed: " in text else f"{text}; see {ctx.command_path} --help")

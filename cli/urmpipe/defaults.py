@@ -196,7 +196,7 @@ def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Co
 
 
 def _key_fault(name: str, options: Mapping[str, Any], all_options: Mapping[str, Any]) -> str | None:
-    """Return what is wrong with a key, or None; its value is read as that of an option."""
+    """Return the fault of a key, or None; its value is read as that of an option."""
     from urmpipe_models.errors import format_names, format_suggestion
 
     allowed = [key for key, option in options.items() if not option.param.each_call]

@@ -214,7 +214,7 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def _stop_again(dropped: sys.UnraisableHookArgs) -> None:
-    """Stop where Python dropped the error: in a callback of its own, such as of an import.
+    """Stop where Python dropped the error: in one of its callbacks, such as of an import.
 
     From another thread and a little later: an interrupt before this function returns would be dropped, too.
     """
@@ -269,16 +269,16 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _parse_leniently(arguments: Sequence[str]) -> tuple[Mapping[str, Any], Sequence[str]]:
-    """Return the options of a line as texts and its other words, whatever is wrong with it."""
+    """Return the options of a line as texts and its other words, also of a faulty one."""
     command: click.Command = cli
     ctx = click.Context(cli, resilient_parsing=True, **cli.context_settings)
     words = list(arguments)
     while isinstance(command, click.Group) and words:
         name = words.pop(0)
-        found = command.get_command(ctx, name)
-        if found is None:
+        subcommand = command.get_command(ctx, name)
+        if subcommand is None:
             return {}, arguments
-        command = found
+        command = subcommand
     settings = {"resilient_parsing": True, "ignore_unknown_options": True, "allow_extra_args": True}
     ctx = command.make_context(command.name, words, ctx, **settings)
     operands = [

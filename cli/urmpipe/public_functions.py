@@ -2,7 +2,7 @@
 
 1. `public_function` reads all keywords before the work, with one error for all faults, gives the function the
    values that their kinds return, and its defaults, and shows the warnings of the result.
-2. Operands: what is given by position, as lists, paths and results.
+2. Operands: positional arguments, as lists, paths and results.
 3. Warnings as errors (`strict`).
 """
 
@@ -48,7 +48,11 @@ def public_function(
     params = dict(sorted(declared.items(), key=lambda item: not item[1].shell))  # those of Python alone last
 
     def decorate(function: Callable[Parameters, ResultT]) -> Callable[Parameters, ResultT]:
-        named = [one for one in signature(function).parameters.values() if one.kind != Parameter.VAR_KEYWORD]
+        named = [
+            parameter
+            for parameter in signature(function).parameters.values()
+            if parameter.kind != Parameter.VAR_KEYWORD
+        ]
         annotations = {name: kind for group in groups for name, kind in group.__annotations__.items()}
         keywords = [
             Parameter(
@@ -63,16 +67,16 @@ def public_function(
         ]
         known = signature(function).replace(parameters=[*named, *keywords])
         read = {
-            name: params[name] if name in params else Param(operands[name], "", default=one.default)
-            for name, one in known.parameters.items()
+            name: params[name] if name in params else Param(operands[name], "", default=parameter.default)
+            for name, parameter in known.parameters.items()
             if name in params or name in operands
         }
 
         @wraps(function)
         def checked(*args: Parameters.args, **kwargs: Parameters.kwargs) -> ResultT:
-            given = known.bind(*args, **kwargs).arguments
-            result = function(**given | read_parameters(read, given))  # type: ignore[call-arg]
-            for message in dict.fromkeys(_iter_new_warnings(result, given.values())):
+            arguments = known.bind(*args, **kwargs).arguments
+            result = function(**arguments | read_parameters(read, arguments))  # type: ignore[call-arg]
+            for message in dict.fromkeys(_iter_new_warnings(result, arguments.values())):
                 warnings.warn(message, UrmpipeWarning, stacklevel=2)
             return result
 
@@ -151,9 +155,9 @@ def reject_recording(operand: object, allowed: str) -> None:
         raise LogError(Finding(file=str(operand), found="a recording", allowed=allowed))
 
 
-def raise_warnings(strict: bool, found: Sequence[LogWarning]) -> None:
+def raise_warnings(strict: bool, reported: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are errors; ignored columns are not warnings."""
-    errors = [warning for warning in found if warning.kind != PASSED_OVER]
+    errors = [warning for warning in reported if warning.kind != PASSED_OVER]
     if strict and errors:
         first = Finding(parameter="strict", found=format_count(len(errors), "warning"), allowed="none")
         raise LogError(first, *(warning.as_finding() for warning in errors))

@@ -106,7 +106,9 @@ def accuracy(
         motions = runs.run(velocities)
         speed = None if limit is None else running_speed(_judge(runs, limit, error), velocities)
         result = _accuracy(rows, request, runs, motions, speed, limit, error, notes)
-        raise_warnings(values["strict"], [one for one in result.warnings if one.kind != ON_PYTHON])
+        raise_warnings(
+            values["strict"], [warning for warning in result.warnings if warning.kind != ON_PYTHON]
+        )
         return written.recorded(result, lambda share: progress(RUNNING_SHARE + (1.0 - RUNNING_SHARE) * share))
 
 

@@ -141,8 +141,8 @@ def run_comparison(
         def checked(comparison: Comparison) -> Comparison:
             """Return a comparison with the warnings about the noise, if no warning is an error."""
             if earlier is not None:
-                others = [warning for warning in comparison.warnings if warning.kind != LARGE_NOISE]
-                warnings = (*others, *large_noises(noise, comparison.tolerance))
+                kept = [warning for warning in comparison.warnings if warning.kind != LARGE_NOISE]
+                warnings = (*kept, *large_noises(noise, comparison.tolerance))
                 comparison = replace(comparison, warnings=warnings)
             _raise_warnings(values["strict"], comparison)
             return comparison
@@ -172,9 +172,9 @@ def normalise_operands(operands: Mapping[str, Sequence[Any]], *further: type) ->
         OptionError: With everything that is not an operand.
     """
     types = (RunLike, Simulation, Held, *further)
-    named = {name: list(_with_tables(name.removesuffix("s"), given)) for name, given in operands.items()}
+    named = {name: list(_with_tables(name.removesuffix("s"), values)) for name, values in operands.items()}
     map_collecting_errors(lambda item: check_types(*item, types, OPERANDS), named.items())
-    return [operand for given in named.values() for operand in given]
+    return [operand for values in named.values() for operand in values]
 
 
 def _with_tables(name: str, operands: Sequence[Any]) -> Iterator[Any]:
@@ -253,8 +253,8 @@ def _raise_warnings(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are errors."""
     of_logs = [warning.of(run.name) for run in result.runs for warning in run.run.warnings]
     explaining = (MISSING_TOOL, SWAPPED, CLOCKS_DIFFER)  # they explain a result
-    others = [warning for warning in result.warnings if warning.kind not in explaining]
-    raise_warnings(strict, (*of_logs, *others))
+    of_result = [warning for warning in result.warnings if warning.kind not in explaining]
+    raise_warnings(strict, (*of_logs, *of_result))
 
 
 def _files(operands: Sequence[Operand | Comparison | None]) -> list[Path]:

@@ -117,10 +117,12 @@ def _diagnose_finished(comparison: Comparison) -> Comparison:
         allowed = "a comparison log by log"
         raise OptionError(Finding(about="reference", found="a test after ISO 9283", allowed=allowed))
     options = comparison.provenance.options
-    asked = CompareOptions(
+    compare_options = CompareOptions(
         comparison.tolerance, options.get("tcp", "fk"), options.get("sync"), from_text=True, diagnose=True
     )
-    runs = tuple(_diagnose_run(comparison.reference, deviation, asked) for deviation in comparison.runs)
+    runs = tuple(
+        _diagnose_run(comparison.reference, deviation, compare_options) for deviation in comparison.runs
+    )
     provenance = replace(comparison.provenance, options={**options, "diagnose": True})
     return replace(comparison, runs=runs, provenance=provenance, recording=None)
 

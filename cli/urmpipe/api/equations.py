@@ -51,12 +51,12 @@ class Equations(Displayable):
     @property
     def operations(self) -> Operations:
         """What all of it costs as expanded sums."""
-        return sum_operations(one.operations for one in self.terms)
+        return sum_operations(cost.operations for cost in self.terms)
 
     @property
     def reduced(self) -> Operations:
         """What all of it costs as C computes it."""
-        return sum_operations(one.reduced for one in self.terms)
+        return sum_operations(cost.reduced for cost in self.terms)
 
     def _headline(self) -> str:
         """Return the arm, its coordinates, and what the formulas cost."""
@@ -65,22 +65,22 @@ class Equations(Displayable):
         )
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a coordinate and term: names, and operations before and after reduction."""
+        """Return one row per coordinate and term: names, and operations before and after reduction."""
         import pandas as pd
 
         columns = ("joint", "term", "additions", "multiplications")
         reduced = ("reduced_additions", "reduced_multiplications")
-        rows = [(one.joint, one.term, *one.operations, *one.reduced) for one in self.terms]
+        rows = [(cost.joint, cost.term, *cost.operations, *cost.reduced) for cost in self.terms]
         return pd.DataFrame(rows, columns=[*columns, *reduced])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe robot equations --json` prints."""
         terms = [
             {
-                "joint": one.joint, "term": one.term,
-                "operations": one.operations._asdict(), "reduced": one.reduced._asdict(),
+                "joint": cost.joint, "term": cost.term,
+                "operations": cost.operations._asdict(), "reduced": cost.reduced._asdict(),
             }
-            for one in self.terms
+            for cost in self.terms
         ]  # fmt: skip
         return {
             "schema": 1,
@@ -102,7 +102,7 @@ def equations(robot: Robot, **options: Unpack[EquationsParameters]) -> Equations
             robot equations`, by their names.
 
     Raises:
-        UrmpipeError: With what is wrong with the arm, such as no masses or too many coordinates; if SymPy
+        UrmpipeError: With all faults of the arm, such as no masses or too many coordinates; if SymPy
             (extra `planning`) is not installed; if the output may not be written.
 
     Source: [Iso9283]_ eq. 8-13, section 4.

@@ -50,16 +50,16 @@ def plan(path: PathLike | PathRows, robot: Robot | None = None, **options: Unpac
             SI.
 
     Returns:
-        The plan, a row a sample: `t` in [s], shape (n,), `motion` (arc length `s` in [m] and its derivatives
-        `v`, `a`, `j`, each of shape (n,)), `position` in [m], shape (n, 3), `joints` (`q` in [rad] or
-        [m], `qd` in [rad/s] or [m/s], `qdd` in [rad/s2] or [m/s2], each of shape (n, joints); None without a
-        robot). Of the whole: `duration` in [s], `scaled` (the share of the speed that is left), `obstacles`
-        (what is in the arm's way), `verdict` ("pass", or "fail" with obstacles; None without a robot),
-        `warnings`, `to_frame()`.
+        The plan, one row per sample: `t` in [s], shape (n,), `motion` (arc length `s` in [m] and its
+        derivatives `v`, `a`, `j`, each of shape (n,)), `position` in [m], shape (n, 3), `joints` (`q` in
+        [rad] or [m], `qd` in [rad/s] or [m/s], `qdd` in [rad/s2] or [m/s2], each of shape (n, joints); None
+        without a robot). Of the whole: `duration` in [s], `scaled` (the share of the speed that is left),
+        `obstacles` (what is in the arm's way), `verdict` ("pass", or "fail" with obstacles; None without a
+        robot), `warnings`, `to_frame()`.
 
     Raises:
         UrmpipeError: With everything that is wrong with the path, the arm or an option. A row out of reach is
-            an error; what keeps the arm from moving between the rows stands in the result (`obstacles`).
+            an error; what keeps the arm from moving between the rows is in the result (`obstacles`).
 
     Source: [Iso9283]_ section 2, section 4 steps 1 to 19.
     """

@@ -18,8 +18,8 @@ def read_recording(path: PathLike, *, lazy: bool = False) -> Result:
 
     Args:
         path: A recording (.rrd) that urmpipe wrote.
-        lazy: Whether arrays are read only when they are used, a slice of rows alone; the file must stand as
-            long. They are used as arrays are, and `np.asarray` makes one of them.
+        lazy: Whether arrays are read only when they are used, a slice of rows alone; the file must exist
+            until then. They are used as arrays are, and `np.asarray` makes one of them.
 
     Raises:
         RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.

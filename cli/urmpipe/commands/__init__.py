@@ -1,1 +1,1 @@
-"""One file a command; each is a thin shell around one function of `urmpipe.api`."""
+"""One file per command; each is a thin shell around one function of `urmpipe.api`."""

@@ -36,5 +36,5 @@ def accuracy(call: Call, path: str, output: Path | None, **options: Any) -> Answ
     with call.progress(f"Running along {path}") as progress:
         result = urmpipe.accuracy(path, output=output, on_message=call.note, progress=progress, **options)
     lines = [] if result.recording is None else [recording_line(result.recording, is_replaced)]
-    warnings = [one for one in result.warnings if one.kind != ON_PYTHON]  # which is noted already
+    warnings = [warning for warning in result.warnings if warning.kind != ON_PYTHON]  # which is noted already
     return Answer(result, lines, warnings=warnings)

@@ -69,7 +69,7 @@ def answer_comparison(
     """
     options = call.without_log_options((reference, *logs), options)
     earlier = None if logs or not options["baseline"] else load_finished(call, reference)
-    if not options["baseline"] and not call.given("noise".__eq__):
+    if not options["baseline"] and not call.explicit_options("noise".__eq__):
         options["noise"] = None  # urmpipe.toml sets it for the calls with a baseline
     if earlier is None:
         output = output or default_output(_output_name(reference, logs))
@@ -108,7 +108,7 @@ def load_finished(call: Call, reference: Path, *also: str) -> Any:
     from urmpipe_pipeline.operands import load_comparison
 
     comparison = load_comparison(reference)
-    options = call.given(lambda name: name not in OF_RESULTS and name not in also)
+    options = call.explicit_options(lambda name: name not in OF_RESULTS and name not in also)
     if comparison is not None and options:
         raise click.UsageError(
             f"{', '.join(options)}: found with the recording of a comparison ({reference}), which stands as"

@@ -62,7 +62,7 @@ def demo(call: Call, output: Path) -> Answer:
 
 
 def _print(result: Comparison, report: Report, as_expected: bool) -> None:
-    """Print the verdicts, and how to go on from there."""
+    """Print the verdicts, and what to try next."""
     from urmpipe.printing.results import print_presentation
     from urmpipe.printing.terminal import print_line, recording_line
     from urmpipe_datasets import LOGS

@@ -42,7 +42,7 @@ def diagnose(
     """
     options = call.without_log_options((reference, *logs), options)
     finished = None if logs else load_finished(call, reference, "output")
-    if not options["baseline"] and not call.given("noise".__eq__):
+    if not options["baseline"] and not call.explicit_options("noise".__eq__):
         options["noise"] = None  # urmpipe.toml sets it for the calls with a baseline
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
     output = output or default_output(f"{(logs or (reference,))[0].resolve().stem}{more}-diagnosed")

@@ -32,7 +32,7 @@ def report(call: Call, recordings: tuple[Path, ...], output: Path | None, **opti
       urmpipe report compared.rrd --figures DIR --figure-names "Deviation*"
     """
     figures = options["figures"]
-    without = [] if figures else [name for name in OF_FIGURES if call.given(name.__eq__)]
+    without = [] if figures else [name for name in OF_FIGURES if call.explicit_options(name.__eq__)]
     if without:
         hint = Hint("figures", None, "names their folder")
         raise OptionError(

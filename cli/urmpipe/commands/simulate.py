@@ -47,8 +47,8 @@ def simulate(
     failed FMU.
     """
     if list == (system is not None):
-        found = f"{system} and --list" if list else "neither a system nor --list"
-        raise click.UsageError(f"found {found}, allowed: one of the two")
+        operands = f"{system} and --list" if list else "neither a system nor --list"
+        raise click.UsageError(f"found {operands}, allowed: one of the two")
     if system is None:
         return _list_systems()
     if write_system is not None:
@@ -65,10 +65,11 @@ def _run(call: Call, system: str, output: Path, options: Mapping[str, Any]) -> A
     with redirect_prints(), call.progress(f"Simulating {system}") as progress:
         result = urmpipe.simulate(system, output=output, on_message=call.note, progress=progress, **options)
     failure = f"{result.failed}; the samples until then are in {result.recording}"
+    warnings = [warning for warning in result.warnings if warning.kind != ON_PYTHON]  # which is noted already
     return Answer(
         result,
         _iter_lines(result, is_replaced, options["draw"]),
-        warnings=[one for one in result.warnings if one.kind != ON_PYTHON],  # which is noted already
+        warnings=warnings,
         errors=[] if result.failed is None else [Finding(failure)],
         is_incomplete=result.failed is not None,
     )
@@ -110,7 +111,7 @@ def _write_system(call: Call, system: str, path: Path) -> Answer:
         param.name
         for param in call.ctx.command.params
         if param.name not in ("write_system", "system", "json", "quiet", "debug")
-        and call.given(str(param.name).__eq__)
+        and call.explicit_options(str(param.name).__eq__)
     ]
     if of_runs:
         message = "found for a system that is only written"
