@@ -16,20 +16,17 @@ from hypothesis import strategies as st
 
 import made_runs
 from asserting import there
+from recordable import build_comparison, build_run
 from same_results import assert_same
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
-from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import AlignMode
-
-MakeRun = Callable[..., Run]
-MakeComparison = Callable[..., Comparison]
 
 
 def round_trip(result: Result, folder: Path) -> Any:
@@ -101,31 +98,29 @@ def without_any_value(run: Run) -> Run:
         pytest.param(140_000, full, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
-def test_a_run_comes_back_as_it_was(
-    rows: int, change: Callable[[Run], Run], make_run: MakeRun, tmp_path: Path
-) -> None:
-    run = make_run(rows=rows)
+def test_a_run_comes_back_as_it_was(rows: int, change: Callable[[Run], Run], tmp_path: Path) -> None:
+    run = build_run(rows=rows)
     assert rows < 1500 or len(run.repolarizations) >= 2
     run = change(run)
     assert_same(round_trip(run, tmp_path), run)
 
 
-def test_a_comparison_of_paths_is_recorded(make_run: MakeRun, tmp_path: Path) -> None:
-    run = path_run(make_run(rows=20))
-    comparison = compare_runs(run, [run, make_run(rows=20)])
+def test_a_comparison_of_paths_is_recorded(tmp_path: Path) -> None:
+    run = path_run(build_run(rows=20))
+    comparison = compare_runs(run, [run, build_run(rows=20)])
     back = round_trip(comparison, tmp_path)
-    assert [one.run.log.joints for one in back.runs] == [(), make_run(rows=20).log.joints]
+    assert [one.run.log.joints for one in back.runs] == [(), build_run(rows=20).log.joints]
     np.testing.assert_array_equal(back.runs[0].actual, comparison.runs[0].actual)
 
 
 @pytest.mark.slow
-def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_path: Path) -> None:
-    comparison = make_comparison(("coppeliasim", "matlab", "solidworks"))
+def test_a_comparison_comes_back_as_it_was(tmp_path: Path) -> None:
+    comparison = build_comparison(("coppeliasim", "matlab", "solidworks"))
     assert [one.verdict for one in comparison.runs] == ["pass", "pass", "fail"]
     assert comparison.runs[2].out_of_tolerance.any()
     assert_same(round_trip(comparison, tmp_path), comparison)
     earlier = replace(
-        make_comparison(("matlab", "old")), tolerance={"axis": 0.002}, recording=Path("before.rrd")
+        build_comparison(("matlab", "old")), tolerance={"axis": 0.002}, recording=Path("before.rrd")
     )
     baseline = compare_with_baseline(comparison, earlier, {"axis": 1e-5})
     assert baseline.changes and baseline.new and baseline.missing and baseline.differences
@@ -133,18 +128,18 @@ def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
-def test_a_comparison_with_samples_left_out_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run()
+def test_a_comparison_with_samples_left_out_comes_back_as_it_was(tmp_path: Path) -> None:
+    run = build_run()
     position = there(run.tcp).position.copy()
     position[[0, 5, 6, 700]] = np.nan
     run = replace(run, tcp=replace(there(run.tcp), position=position))
-    comparison = compare_runs(path_run(make_run(rows=1400)), [run], CompareOptions(sync=-0.1))
+    comparison = compare_runs(path_run(build_run(rows=1400)), [run], CompareOptions(sync=-0.1))
     assert comparison.runs[0].left_out == 101  # 20 before and 80 after the path, one NaN
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
-def test_comparisons_with_recorded_poses_come_back_as_they_were(make_run: MakeRun, tmp_path: Path) -> None:
-    reference, log = full(make_run("asked for")), full(make_run("log"))
+def test_comparisons_with_recorded_poses_come_back_as_they_were(tmp_path: Path) -> None:
+    reference, log = full(build_run("asked for")), full(build_run("log"))
     own = compare_with_recorded_tcp(log)
     assert_same(round_trip(own, tmp_path), own)
     comparison = compare_runs(reference, [log], CompareOptions(tcp="recorded"))
@@ -154,10 +149,8 @@ def test_comparisons_with_recorded_poses_come_back_as_they_were(make_run: MakeRu
 
 @pytest.mark.slow
 @pytest.mark.parametrize("align", get_args(AlignMode))
-def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(
-    align: AlignMode, make_run: MakeRun, tmp_path: Path
-) -> None:
-    reference, log = make_run("asked for"), make_run("log", offset=0.002)
+def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(align: AlignMode, tmp_path: Path) -> None:
+    reference, log = build_run("asked for"), build_run("log", offset=0.002)
     turned = replace(log, q=log.q + 2 * np.pi * np.array([0, 0, 1, 0, 0, -2]))
     comparison = compare_runs(reference, [turned, full(log)], CompareOptions({"angle": 0.001}, align=align))
     first = comparison.runs[0]
@@ -185,9 +178,9 @@ NAMES = (
 
 
 @pytest.mark.slow
-def test_runs_may_have_any_names(make_run: MakeRun, tmp_path: Path) -> None:
+def test_runs_may_have_any_names(tmp_path: Path) -> None:
     comparison = compare_runs(
-        make_run("reference", 40), [make_run(f"run {i}", 40) for i in range(len(NAMES))]
+        build_run("reference", 40), [build_run(f"run {i}", 40) for i in range(len(NAMES))]
     )
     named = tuple(
         replace(one, name=name, run=replace(one.run, name=name))
@@ -216,7 +209,6 @@ OPTIONS = st.recursive(
     row=st.none() | st.integers(-3, 10**12),
 )
 def test_metadata_of_any_text_come_back(
-    make_run: MakeRun,
     tmp_path: Path,
     texts: list[str],
     joints: list[str],
@@ -225,7 +217,7 @@ def test_metadata_of_any_text_come_back(
     row: int | None,
 ) -> None:
     name, source, kind, message, file, what, value, unit, command, created = texts
-    run = make_run(rows=3)
+    run = build_run(rows=3)
     log = replace(
         run.log, name=name, source=source, files=(SourceFile(file, what, 2**40),), joints=tuple(joints),
         clock_start_ns=row or 0, first_line=9, digits=None,
@@ -241,8 +233,8 @@ def test_metadata_of_any_text_come_back(
     assert_same(read_recording(write_recording(run, path)), run)
 
 
-def test_options_come_back_as_json_has_them(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=3)
+def test_options_come_back_as_json_has_them(tmp_path: Path) -> None:
+    run = build_run(rows=3)
     options = {"file": Path("a/b.toml"), "range": (1, 2.5), "n": np.int64(3), "tool": np.array([0.0, 0.1])}
     run = replace(run, provenance=replace(run.provenance, options=options))
     stored = {"file": str(Path("a/b.toml")), "range": [1, 2.5], "n": 3, "tool": [0.0, 0.1]}
@@ -250,17 +242,17 @@ def test_options_come_back_as_json_has_them(make_run: MakeRun, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_a_mended_recording_is_the_same(make_comparison: MakeComparison, tmp_path: Path) -> None:
+def test_a_mended_recording_is_the_same(tmp_path: Path) -> None:
     """Rerun's own tool cuts and orders the chunks anew."""
-    comparison = make_comparison(("coppeliasim",), rows=70_000)
+    comparison = build_comparison(("coppeliasim",), rows=70_000)
     path = write_recording(comparison, tmp_path / "whole.rrd")
     rerun_tool("rrd", "optimize", str(path), "-o", str(tmp_path / "mended.rrd"))
     assert_same(read_recording(tmp_path / "mended.rrd"), comparison)
 
 
 @pytest.mark.slow
-def test_rerun_finds_nothing_wrong(make_comparison: MakeComparison, tmp_path: Path) -> None:
-    path = write_recording(make_comparison(NAMES[:3]), tmp_path / "odd.rrd")
+def test_rerun_finds_nothing_wrong(tmp_path: Path) -> None:
+    path = write_recording(build_comparison(NAMES[:3]), tmp_path / "odd.rrd")
     assert "1 file verified without error" in rerun_tool("rrd", "verify", str(path))
 
 
@@ -273,26 +265,26 @@ def rerun_tool(*arguments: str) -> str:
 
 
 @pytest.mark.slow
-def test_progress_is_told_up_to_one(make_run: MakeRun, tmp_path: Path) -> None:
+def test_progress_is_told_up_to_one(tmp_path: Path) -> None:
     shares: list[float] = []
-    write_recording(make_run(rows=70_000), tmp_path / "run.rrd", progress=shares.append)
+    write_recording(build_run(rows=70_000), tmp_path / "run.rrd", progress=shares.append)
     assert shares == sorted(shares)
     assert len(shares) > 8
     assert (shares[0] > 0.0, shares[-1]) == (True, 1.0)
 
 
-def test_an_input_is_never_replaced(make_run: MakeRun, tmp_path: Path) -> None:
-    path = write_recording(make_run(rows=5), tmp_path / "one.rrd")
+def test_an_input_is_never_replaced(tmp_path: Path) -> None:
+    path = write_recording(build_run(rows=5), tmp_path / "one.rrd")
     before = path.read_bytes()
     with pytest.raises(OutputError) as caught:
-        write_recording(make_run(rows=6), path, inputs=[tmp_path / "log.csv", path])
+        write_recording(build_run(rows=6), path, inputs=[tmp_path / "log.csv", path])
     message = f"{path}: found an input of this command, allowed: any other name for the recording"
     assert str(caught.value) == message
     assert path.read_bytes() == before
 
 
-def test_a_stopped_writer_leaves_the_old_output(make_run: MakeRun, tmp_path: Path) -> None:
-    path = write_recording(make_run(rows=5), tmp_path / "one.rrd")
+def test_a_stopped_writer_leaves_the_old_output(tmp_path: Path) -> None:
+    path = write_recording(build_run(rows=5), tmp_path / "one.rrd")
     before = path.read_bytes()
 
     def stop(share: float) -> None:
@@ -300,5 +292,5 @@ def test_a_stopped_writer_leaves_the_old_output(make_run: MakeRun, tmp_path: Pat
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_recording(make_run(), path, progress=stop)
+        write_recording(build_run(), path, progress=stop)
     assert [(one, one.read_bytes()) for one in tmp_path.iterdir()] == [(path, before)]

@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from recordable import build_run
 from same_results import assert_same
 from urmpipe_models.errors import RecordingError
 from urmpipe_models.processes import module_command, module_environment
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.run import Run
-
-MakeRun = Callable[..., Run]
 
 HOW = "reading it ended the process: Aborted (SIGABRT)"
 ABORTED = f"found a damaged recording ({HOW}), allowed: one as it was written"
@@ -32,9 +30,9 @@ def changed(path: Path, at: int, copy: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_a_byte_that_aborts_the_reader_is_one_line(make_run: MakeRun, tmp_path: Path) -> None:
+def test_a_byte_that_aborts_the_reader_is_one_line(tmp_path: Path) -> None:
     """Changed tokens of the compression (LZ4: how much is copied) abort it: they are tried until one does."""
-    path = write_recording(make_run(rows=5), tmp_path / "whole.rrd")
+    path = write_recording(build_run(rows=5), tmp_path / "whole.rrd")
     whole, tokens = read_recording(path), re.finditer(rb"\x00\x13@\x11", path.read_bytes())
     said = ""
     for number, token in enumerate(tokens):
@@ -53,8 +51,8 @@ def test_a_byte_that_aborts_the_reader_is_one_line(make_run: MakeRun, tmp_path: 
     assert ended.returncode == -signal.SIGABRT  # else nothing would need a process of its own
 
 
-def test_a_changed_value_is_told(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=50)
+def test_a_changed_value_is_told(tmp_path: Path) -> None:
+    run = build_run(rows=50)
     path = write_recording(run, tmp_path / "whole.rrd")
     content = path.read_bytes()
     value = next(one.tobytes() for one in np.ravel(run.log.q) if content.count(one.tobytes()) == 1)
@@ -69,8 +67,8 @@ def test_a_changed_value_is_told(make_run: MakeRun, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_changed_letter_of_the_metadata_is_told(make_run: MakeRun, tmp_path: Path) -> None:
-    path = write_recording(make_run(rows=5), tmp_path / "whole.rrd")
+def test_a_changed_letter_of_the_metadata_is_told(tmp_path: Path) -> None:
+    path = write_recording(build_run(rows=5), tmp_path / "whole.rrd")
     run = read_recording(path)
     assert isinstance(run, Run)
     created, content, said = run.provenance.created.encode()[:19], path.read_bytes(), set()

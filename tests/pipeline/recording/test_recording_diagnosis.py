@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 
 from asserting import there
 from diagnoses import diagnosis_of
+from recordable import build_comparison
 from recorded import columns, rows_of, static, views
 from same_results import assert_same
 from urmpipe_models.errors import RecordingError
@@ -19,13 +19,11 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.results import enclosing_result, read_recording, write_recording
 
-MakeComparison = Callable[..., Comparison]
-
 
 @pytest.fixture
-def diagnosed(make_comparison: MakeComparison) -> Comparison:
+def diagnosed() -> Comparison:
     """A comparison of one log that was diagnosed."""
-    result = make_comparison(("log",))
+    result = build_comparison(("log",))
     return replace(result, runs=(replace(result.runs[0], diagnosis=diagnosis_of(result.runs[0])),))
 
 

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,18 +14,14 @@ import numpy as np
 import pytest
 import rerun as rr
 
+from recordable import build_comparison, build_run
 from urmpipe_models.errors import OutputError, RecordingError
-from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_ours, is_recording
 from urmpipe_pipeline.recording.codec import encode
 from urmpipe_pipeline.recording.layout import LAYOUT_VERSION, checksum, metadata_json
 from urmpipe_pipeline.recording.reader import Store
 from urmpipe_pipeline.recording.writer import verify
 from urmpipe_pipeline.results import read_recording, write_recording
-from urmpipe_pipeline.runs.run import Run
-
-MakeRun = Callable[..., Run]
-MakeComparison = Callable[..., Comparison]
 
 
 def trouble(path: Path) -> str:
@@ -68,8 +64,8 @@ def test_no_recording(tmp_path: Path, content: bytes | None) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0001, 0.3, 0.9, 0.99999])
-def test_a_recording_that_was_cut_off(make_run: MakeRun, tmp_path: Path, share: float) -> None:
-    whole = write_recording(make_run(), tmp_path / "whole.rrd").read_bytes()
+def test_a_recording_that_was_cut_off(tmp_path: Path, share: float) -> None:
+    whole = write_recording(build_run(), tmp_path / "whole.rrd").read_bytes()
     path = tmp_path / "cut.rrd"
     path.write_bytes(whole[: max(12, int(len(whole) * share))])
     assert is_recording(path)
@@ -88,9 +84,9 @@ def test_a_recording_of_another_program(tmp_path: Path, application: str) -> Non
     assert trouble(path) == f"found a recording of {application}, allowed: one of urmpipe"
 
 
-def test_a_recording_is_known_without_rerun(make_run: MakeRun, tmp_path: Path) -> None:
+def test_a_recording_is_known_without_rerun(tmp_path: Path) -> None:
     """Rerun takes long to import, which is done while a log is read: not before it begins."""
-    ours, other = write_recording(make_run(), tmp_path / "run.rrd"), tmp_path / "log.csv"
+    ours, other = write_recording(build_run(), tmp_path / "run.rrd"), tmp_path / "log.csv"
     other.write_text("t,q1\n0,1\n")
     script = (
         "import sys; from pathlib import Path; from urmpipe_pipeline.recording import is_ours, is_recording;"
@@ -158,9 +154,9 @@ def test_a_recording_with_damaged_metadata(tmp_path: Path, metadata: str, reason
 
 
 @pytest.mark.slow
-def test_a_recording_without_an_array(make_run: MakeRun, tmp_path: Path) -> None:
+def test_a_recording_without_an_array(tmp_path: Path) -> None:
     """As `rerun rrd optimize` leaves it when the end of the data is lost."""
-    metadata = metadata_json("run", encode(make_run(rows=3)).tree)
+    metadata = metadata_json("run", encode(build_run(rows=3)).tree)
     path = foreign(tmp_path / "less.rrd", "urmpipe", told(metadata))
     assert trouble(path) == "found 0 of 3 rows in /log/t_ns, allowed: all as were written"
 
@@ -191,11 +187,11 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_one_line_and_leaves_the_old_output(make_run: MakeRun, small_disk: Path) -> None:
-    path = write_recording(make_run(rows=5), small_disk / "one.rrd")
+def test_a_full_disk_is_one_line_and_leaves_the_old_output(small_disk: Path) -> None:
+    path = write_recording(build_run(rows=5), small_disk / "one.rrd")
     before = path.read_bytes()
     with pytest.raises(OutputError) as error:
-        write_recording(make_run(rows=100_000), path)
+        write_recording(build_run(rows=100_000), path)
     assert str(error.value) == f"{path}: cannot be written: No space left on device"
     assert [(one, one.read_bytes()) for one in small_disk.iterdir()] == [(path, before)]
 
@@ -204,11 +200,11 @@ SWITCHED_OFF = """
 import sys
 from pathlib import Path
 sys.path[:0] = sys.argv[2:]
-import conftest
+import recordable
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.results import write_recording
 try:
-    write_recording(conftest.build_run(rows=5), Path(sys.argv[1]))
+    write_recording(recordable.build_run(rows=5), Path(sys.argv[1]))
 except OutputError as error:
     print(error)
 """
@@ -216,10 +212,9 @@ except OutputError as error:
 
 @pytest.mark.slow
 def test_rerun_switched_off_is_one_line(tmp_path: Path) -> None:
-    here = Path(__file__).parent
-    folders = [str(here), str(here.parents[1] / "shared")]
+    shared = Path(__file__).parents[2] / "shared"
     done = subprocess.run(
-        [sys.executable, "-c", SWITCHED_OFF, str(tmp_path / "one.rrd"), *folders],
+        [sys.executable, "-c", SWITCHED_OFF, str(tmp_path / "one.rrd"), str(shared)],
         capture_output=True, text=True, check=False, timeout=100, env={**os.environ, "RERUN": "off"},
     )  # fmt: skip
     wanted = "Rerun is switched off by the environment variable RERUN; allowed: unset or on\n"
@@ -228,9 +223,9 @@ def test_rerun_switched_off_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp_path: Path) -> None:
+def test_what_reads_back_otherwise_is_named(tmp_path: Path) -> None:
     """The first, the middle and the last row of each array, the number of rows, and the metadata."""
-    comparison = make_comparison(("coppeliasim",), rows=40_000)
+    comparison = build_comparison(("coppeliasim",), rows=40_000)
     path = write_recording(comparison, tmp_path / "one.rrd")
     found = encode(comparison)
     metadata = Store(path).metadata
@@ -258,8 +253,8 @@ def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp
 
 
 @pytest.mark.slow
-def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=5)
+def test_what_cannot_be_read_back_is_named(tmp_path: Path) -> None:
+    run = build_run(rows=5)
     path = write_recording(run, tmp_path / "one.rrd")
     path.write_bytes(path.read_bytes()[:-20])
     found = encode(run)
@@ -270,8 +265,8 @@ def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) ->
     )
 
 
-def test_what_could_not_be_read_back_is_not_written(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=5)
+def test_what_could_not_be_read_back_is_not_written(tmp_path: Path) -> None:
+    run = build_run(rows=5)
     run = replace(run, log=replace(run.log, digits="four"))  # type: ignore[arg-type]
     with pytest.raises(OutputError) as caught:
         write_recording(run, tmp_path / "one.rrd")

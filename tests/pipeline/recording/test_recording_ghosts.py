@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rerun.chunk import RrdReader
 
+from recordable import build_solved
 from recorded import rows_of, static
 from same_results import assert_same
 from solved import solved
@@ -42,12 +42,9 @@ from urmpipe_pipeline.recording.views.label_places import name_places
 from urmpipe_pipeline.recording.views.scene_drawing import AXIS, LINK, OPACITY, THIN, capsules
 from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH
 from urmpipe_pipeline.results import present, read_recording, write_recording
-from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import ghosts, scene
 
-MakeSolved = Callable[..., IkResult]
-
-STEP_NS = 20_000_000  # of the motion that make_solved makes
+STEP_NS = 20_000_000  # of the motion that build_solved makes
 SCENE = "/shown/scene"
 
 
@@ -55,24 +52,24 @@ SCENE = "/shown/scene"
 
 
 @pytest.mark.parametrize("timed", [True, False])
-def test_solved_targets_come_back_as_they_were(timed: bool, make_solved: MakeSolved, tmp_path: Path) -> None:
-    one = make_solved(timed=timed)
+def test_solved_targets_come_back_as_they_were(timed: bool, tmp_path: Path) -> None:
+    one = build_solved(timed=timed)
     if timed:
         one = replace(one, motion=one.as_run())
     assert_same(read_recording(write_recording(one, tmp_path / "solved.rrd")), one)
 
 
-def test_positions_alone_and_targets_that_are_none_come_back(make_solved: MakeSolved, tmp_path: Path) -> None:
-    one = make_solved(timed=False)
+def test_positions_alone_and_targets_that_are_none_come_back(tmp_path: Path) -> None:
+    one = build_solved(timed=False)
     position = one.targets.position.copy()
     position[5] = np.nan
     one = replace(one, targets=Targets(position), angle=None, all_solutions=False)
     assert_same(read_recording(write_recording(one, tmp_path / "solved.rrd")), one)
 
 
-def test_branches_may_be_called_anything(make_solved: MakeSolved, tmp_path: Path) -> None:
+def test_branches_may_be_called_anything(tmp_path: Path) -> None:
     names = ("1", "q", "a/b", "a\\", "a", "a ", "", "unnamed", "elbow (2)", "ü, 肘", "**", "a\ud800b")
-    one = make_solved(names=names, rows=20)
+    one = build_solved(names=names, rows=20)
     assert [ghost.name for ghost in ghosts(one)] == list(names)
     path = write_recording(one, tmp_path / "solved.rrd")
     assert_same(read_recording(path), one)
@@ -134,11 +131,9 @@ def drawn(path: Path, entity: str, name: str, *, timed: bool) -> dict[int, list[
 
 
 @pytest.mark.parametrize("timed", [True, False])
-def test_each_ghost_is_drawn_where_its_joints_put_it_and_gone_elsewhere(
-    timed: bool, make_solved: MakeSolved, tmp_path: Path
-) -> None:
+def test_each_ghost_is_drawn_where_its_joints_put_it_and_gone_elsewhere(timed: bool, tmp_path: Path) -> None:
     """Rerun shows the last value that there was, so one must say that there is none."""
-    one = make_solved(timed=timed)
+    one = build_solved(timed=timed)
     path = write_recording(one, tmp_path / "solved.rrd")
     for number, ghost in enumerate(ghosts(one)):
         there = np.flatnonzero(np.isfinite(ghost.q).all(axis=1)).tolist()
@@ -158,8 +153,8 @@ def test_each_ghost_is_drawn_where_its_joints_put_it_and_gone_elsewhere(
             np.testing.assert_allclose(begin + along, end[row], rtol=0, atol=1e-6)
 
 
-def test_the_arm_is_gone_where_a_target_has_no_solution(make_solved: MakeSolved, tmp_path: Path) -> None:
-    path = write_recording(make_solved(), tmp_path / "solved.rrd")
+def test_the_arm_is_gone_where_a_target_has_no_solution(tmp_path: Path) -> None:
+    path = write_recording(build_solved(), tmp_path / "solved.rrd")
     expected = dict.fromkeys((*range(5), *range(9, 40)), 1) | {5: 0}
     for entity in ("robot/tip", "point/targets"):
         found = drawn(path, entity, "Points3D:positions", timed=True)
@@ -168,11 +163,11 @@ def test_the_arm_is_gone_where_a_target_has_no_solution(make_solved: MakeSolved,
 
 @pytest.mark.parametrize("own", [True, False])
 def test_the_shapes_of_the_arm_are_too_small_to_be_seen_where_it_is_gone(
-    own: bool, make_solved: MakeSolved, shapes: Path, tmp_path: Path
+    own: bool, shapes: Path, tmp_path: Path
 ) -> None:
     robot = read_urdf(shapes)
     robot = robot if own else replace(robot, visuals=())
-    path = write_recording(make_solved(robot=robot), tmp_path / "solved.rrd")
+    path = write_recording(build_solved(robot=robot), tmp_path / "solved.rrd")
     root = "/".join(
         next(
             chunk.entity_path for chunk in RrdReader(path).store().stream() if "turn1" in chunk.entity_path
@@ -185,16 +180,16 @@ def test_the_shapes_of_the_arm_are_too_small_to_be_seen_where_it_is_gone(
         assert [at // STEP_NS for at in moved] == [*range(6), *range(9, 40)]
 
 
-def test_a_long_ghost_is_thinned_out_but_begins_where_it_begins(make_solved: MakeSolved) -> None:
-    first, second = drawn_ghosts(scene(make_solved(rows=9000)).arms)
+def test_a_long_ghost_is_thinned_out_but_begins_where_it_begins() -> None:
+    first, second = drawn_ghosts(scene(build_solved(rows=9000)).arms)
     for ghost, begins in ((first, {0, 9, 30}), (second, {2, 9, 30})):
         assert POSES // 2 <= len(ghost.moving.rows) <= POSES + 3
         assert begins <= set(ghost.moving.rows.tolist())
 
 
-def test_of_many_single_poses_the_ghosts_of_the_first_are_drawn(make_solved: MakeSolved) -> None:
+def test_of_many_single_poses_the_ghosts_of_the_first_are_drawn() -> None:
     """Of every tenth, say, a ghost would stand beside the arm of another target."""
-    ghost, _ = drawn_ghosts(scene(make_solved(rows=POSES + 50, timed=False)).arms)
+    ghost, _ = drawn_ghosts(scene(build_solved(rows=POSES + 50, timed=False)).arms)
     assert ghost.moving.rows.tolist() == [*range(5), *range(9, 20), *range(30, POSES)]
     assert ghost.moving.gone.tolist() == [5, 20, POSES]
 
@@ -221,9 +216,9 @@ def test_an_arm_that_only_slides_has_ghosts(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_each_branch_has_a_colour_of_its_own_and_its_name(make_solved: MakeSolved, tmp_path: Path) -> None:
+def test_each_branch_has_a_colour_of_its_own_and_its_name(tmp_path: Path) -> None:
     names = tuple(f"branch {k}" for k in range(1, 9))
-    path = write_recording(make_solved(names=names), tmp_path / "solved.rrd")
+    path = write_recording(build_solved(names=names), tmp_path / "solved.rrd")
     assert len(set(GHOST_COLOURS.values())) == 8
     assert run_colour(0) == list(GHOST_COLOURS.values())[-1]
     for number, (name, colour) in enumerate(zip(names, GHOST_COLOURS.values(), strict=True)):
@@ -237,10 +232,8 @@ def test_each_branch_has_a_colour_of_its_own_and_its_name(make_solved: MakeSolve
         assert {row[0] for row in labels.values() if row} == {name}
 
 
-def test_the_second_of_two_ghosts_is_half_as_thick_and_axes_are_thinner_than_links(
-    make_solved: MakeSolved, tmp_path: Path
-) -> None:
-    path = write_recording(make_solved(names=tuple("abcd")), tmp_path / "solved.rrd")
+def test_the_second_of_two_ghosts_is_half_as_thick_and_axes_are_thinner_than_links(tmp_path: Path) -> None:
+    path = write_recording(build_solved(names=tuple("abcd")), tmp_path / "solved.rrd")
     shapes = [
         np.array(drawn(path, f"ghost/{number}", "Capsules3D:radii", timed=True)[12]) for number in range(4)
     ]
@@ -252,8 +245,8 @@ def test_the_second_of_two_ghosts_is_half_as_thick_and_axes_are_thinner_than_lin
     assert (THIN, LINK > 2 * AXIS) == (0.5, True)
 
 
-def test_the_name_of_the_branch_chosen_stands_at_the_arm(make_solved: MakeSolved, tmp_path: Path) -> None:
-    one = make_solved(timed=False)
+def test_the_name_of_the_branch_chosen_stands_at_the_arm(tmp_path: Path) -> None:
+    one = build_solved(timed=False)
     labels = np.array(one.solutions.labels)
     labels[:12, 0], labels[12:, 0] = "up", "down"
     one = replace(one, solutions=replace(one.solutions, labels=labels))
@@ -268,14 +261,14 @@ def test_the_name_of_the_branch_chosen_stands_at_the_arm(make_solved: MakeSolved
     assert np.abs(candidates - np.array(places[12])).max(axis=1).min() < 1e-6
 
 
-def test_the_branch_chosen_has_a_name_only_beside_others(make_solved: MakeSolved) -> None:
-    one = make_solved()
+def test_the_branch_chosen_has_a_name_only_beside_others() -> None:
+    one = build_solved()
     assert [bool(arm.label) for arm in scene(one).arms] == [True] * 3
     assert [bool(arm.label) for arm in scene(replace(one, all_solutions=False)).arms] == [False]
 
 
-def test_along_a_motion_a_new_branch_is_told_at_its_row(make_solved: MakeSolved) -> None:
-    one = make_solved(rows=9000)
+def test_along_a_motion_a_new_branch_is_told_at_its_row() -> None:
+    one = build_solved(rows=9000)
     labels = np.array(one.solutions.labels)
     labels[:4001, 0], labels[4001:, 0] = "up", "down"
     arms = scene(replace(one, solutions=replace(one.solutions, labels=labels))).arms
@@ -286,12 +279,12 @@ def test_along_a_motion_a_new_branch_is_told_at_its_row(make_solved: MakeSolved)
     assert {told[row] for row in told if row < 4001} == {"chosen: up"}
 
 
-def test_a_name_keeps_its_place_in_a_motion_and_leaps_between_single_poses(make_solved: MakeSolved) -> None:
+def test_a_name_keeps_its_place_in_a_motion_and_leaps_between_single_poses() -> None:
     names = tuple(f"{k}" for k in range(8))
 
     def places(timed: bool) -> list[int]:
         """Return at how many of its places the name of each ghost stands."""
-        arms = scene(make_solved(timed=timed, names=names)).arms
+        arms = scene(build_solved(timed=timed, names=names)).arms
         found = []
         for arm, label in zip(arms, drawn_labels(arms, 0.0, 12), strict=True):
             every = name_places(*bones_of(arm.chain, arm.q[label.moving.rows]))
@@ -303,20 +296,20 @@ def test_a_name_keeps_its_place_in_a_motion_and_leaps_between_single_poses(make_
     assert max(places(timed=False)) > 1
 
 
-def test_the_viewer_opens_where_most_branches_are(make_solved: MakeSolved, tmp_path: Path) -> None:
-    store = Store(write_recording(make_solved(), tmp_path / "solved.rrd"))
+def test_the_viewer_opens_where_most_branches_are(tmp_path: Path) -> None:
+    store = Store(write_recording(build_solved(), tmp_path / "solved.rrd"))
     # At row 2 the arm and both ghosts are there for the first time.
     assert store.opening == (TIME, 2 * STEP_NS)
-    store = Store(write_recording(make_solved(timed=False), tmp_path / "poses.rrd"))
+    store = Store(write_recording(build_solved(timed=False), tmp_path / "poses.rrd"))
     assert store.opening == (ROW, 3)  # rows count from 1
 
 
 # --- without times ---------------------------------------------------------------------------------
 
 
-def test_single_poses_stand_on_rows_alone(make_solved: MakeSolved, tmp_path: Path) -> None:
+def test_single_poses_stand_on_rows_alone(tmp_path: Path) -> None:
     """There is no time to play: every chunk that is drawn stands on the rows, from 1."""
-    path = write_recording(make_solved(timed=False), tmp_path / "solved.rrd")
+    path = write_recording(build_solved(timed=False), tmp_path / "solved.rrd")
     on = set()
     for chunk in RrdReader(path).store().stream():
         if not chunk.is_static and not chunk.entity_path.startswith("/__"):
@@ -324,10 +317,10 @@ def test_single_poses_stand_on_rows_alone(make_solved: MakeSolved, tmp_path: Pat
     assert on == {"row"}
 
 
-def test_what_is_shown_of_targets_without_times_has_no_line_and_no_speed(make_solved: MakeSolved) -> None:
+def test_what_is_shown_of_targets_without_times_has_no_line_and_no_speed() -> None:
     """A line from one pose to the next would look like a motion."""
     for timed, speeds in ((True, 5), (False, 0)):
-        figures = present(make_solved(timed=timed)).body.figures()
+        figures = present(build_solved(timed=timed)).body.figures()
         views = [view for figure in figures if isinstance(figure, Figure) for view in figure.views]
         units = [panel.unit for view in views for panel in view.panels]
         assert sum("/s" in unit for unit in units) == speeds
@@ -338,8 +331,8 @@ def test_what_is_shown_of_targets_without_times_has_no_line_and_no_speed(make_so
 # --- what is in view -------------------------------------------------------------------------------
 
 
-def test_all_of_the_arms_is_in_view(make_solved: MakeSolved) -> None:
-    shown = scene(make_solved())
+def test_all_of_the_arms_is_in_view() -> None:
+    shown = scene(build_solved())
     arm = next(drawn_arm(one) for one in shown.arms)
     beside = drawn_ghosts(shown.arms)
     centre, radius = ball(extent(arm, beside, [], None))
@@ -347,8 +340,8 @@ def test_all_of_the_arms_is_in_view(make_solved: MakeSolved) -> None:
         assert np.linalg.norm(ghost.end - centre, axis=2).max() <= radius * (1 + 1e-12)
 
 
-def test_solids_are_seen_through_where_ghosts_can_be_inside(make_solved: MakeSolved, tmp_path: Path) -> None:
+def test_solids_are_seen_through_where_ghosts_can_be_inside(tmp_path: Path) -> None:
     for names, opacity in ((("a", "b"), round(255 * SEEN_THROUGH)), ((), 255)):
-        path = write_recording(make_solved(names=names, rows=5), tmp_path / f"{opacity}.rrd")
+        path = write_recording(build_solved(names=names, rows=5), tmp_path / f"{opacity}.rrd")
         entity = f"{SCENE}/robot/joint/elbow_joint/visual\\ 1"
         assert [colour & 0xFF for colour in static(path, entity, "Cylinders3D:colors")] == [opacity]

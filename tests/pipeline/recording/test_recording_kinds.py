@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from recordable import build_run
 from recorded import times_of
 from same_results import assert_same
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, TextArray
@@ -22,7 +23,6 @@ from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.layout import SLICE
 from urmpipe_pipeline.results import Kind, read_recording, write_recording
-from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 ROWS = SLICE + 3
@@ -126,10 +126,8 @@ def test_arrays_are_read_when_they_are_used(tmp_path: Path) -> None:
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(first=st.integers(-60, 60), end=st.integers(-60, 60), step=st.sampled_from([1, 2, 7, -1, -3]))
 @example(first=3, end=3, step=1)
-def test_any_slice_is_that_of_the_array(
-    first: int, end: int, step: int, make_run: Callable[..., Run], tmp_path: Path
-) -> None:
-    path, run = tmp_path / "run.rrd", make_run(rows=50)
+def test_any_slice_is_that_of_the_array(first: int, end: int, step: int, tmp_path: Path) -> None:
+    path, run = tmp_path / "run.rrd", build_run(rows=50)
     if not path.exists():
         write_recording(run, path)
     back: Any = read_recording(path, lazy=True)

@@ -12,9 +12,9 @@ import pytest
 from rerun.blueprint import Container
 from rerun.chunk import RrdReader
 
+from recordable import build_comparison
 from recorded import columns, entities, views
 from toys import Toy, figure, laid_out, panel, recorded, root_of, shown, toy
-from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Text, View
 from urmpipe_pipeline.presentation.scene import Path as Way
 from urmpipe_pipeline.presentation.scene import Scene
@@ -25,7 +25,6 @@ from urmpipe_pipeline.recording.views.blueprint import EVENTS_SHARE, LINE_SHARE,
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.simulations.simulation import Simulation
 
-MakeComparison = Callable[..., Comparison]
 MakeSimulation = Callable[..., Simulation]
 EVENT = Event(5_000_000, "it happened")
 
@@ -150,17 +149,17 @@ def test_it_opens_at_its_time_or_its_row(timed: bool, tmp_path: Path) -> None:
 
 
 def test_results_open_where_their_verdict_was_decided(
-    make_comparison: MakeComparison, make_simulation: MakeSimulation, tmp_path: Path
+    make_simulation: MakeSimulation, tmp_path: Path
 ) -> None:
-    comparison = make_comparison(("solidworks", "coppeliasim"))
+    comparison = build_comparison(("solidworks", "coppeliasim"))
     path = write_recording(comparison, tmp_path / "both.rrd")
     assert openings([path])[path].at / 1e9 == comparison.worst.worst_statistics.t_max > 0
     path = write_recording(make_simulation(), tmp_path / "simulation.rrd")
     assert openings([path])[path].at == 1_250_000_000
 
 
-def test_the_layout_of_a_comparison_is_in_the_file(make_comparison: MakeComparison, tmp_path: Path) -> None:
-    found = views(write_recording(make_comparison(("a b", "reference")), tmp_path / "both.rrd"))
+def test_the_layout_of_a_comparison_is_in_the_file(tmp_path: Path) -> None:
+    found = views(write_recording(build_comparison(("a b", "reference")), tmp_path / "both.rrd"))
     names = found["ViewBlueprint:display_name"]
     assert {
         "Arm of reference and paths [m], in crimson the deviation x50",
@@ -175,11 +174,9 @@ def test_the_layout_of_a_comparison_is_in_the_file(make_comparison: MakeComparis
     assert {"PASS a b", "PASS reference"} <= set(found["ContainerBlueprint:display_name"])
 
 
-def test_what_is_drawn_stands_below_one_root_and_on_no_clock_of_the_writer(
-    make_comparison: MakeComparison, tmp_path: Path
-) -> None:
+def test_what_is_drawn_stands_below_one_root_and_on_no_clock_of_the_writer(tmp_path: Path) -> None:
     """The other entities are the arrays of the result, at the paths of their fields."""
-    path = write_recording(make_comparison(rows=50), tmp_path / "both.rrd")
+    path = write_recording(build_comparison(rows=50), tmp_path / "both.rrd")
     roots = {entity.split("/")[1] for entity in entities(path)}
     assert roots == {"shown", "reference", "runs"}
     timelines = {name for chunk in RrdReader(path).store().stream() for name in chunk.timeline_names}

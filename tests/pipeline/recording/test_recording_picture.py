@@ -15,13 +15,13 @@ import pytest
 from numpy.typing import NDArray
 
 from made_plans import FAILED, SMALL, limited, planned
+from recordable import build_comparison, build_run, build_solved
 from toys import eye_of
 from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.robots.urdf import read_urdf
-from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
@@ -36,11 +36,7 @@ from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW
 from urmpipe_pipeline.results import present, write_recording
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.solved_targets.result import IkResult
 
-MakeRun = Callable[..., Run]
-MakeComparison = Callable[..., Comparison]
-MakeSolved = Callable[..., IkResult]
 Picture = NDArray[np.uint8]
 Eye = tuple[FloatArray, FloatArray]
 
@@ -171,20 +167,20 @@ def assert_drawn(picture: Picture, left: Sequence[str], right: Sequence[str]) ->
         assert not few, f"hardly to be seen in the {name} half: {few}"
 
 
-def test_a_run_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
-    path = write_recording(make_run(rows=4000), tmp_path / "run.rrd")
+def test_a_run_in_the_viewer(viewer: Any, tmp_path: Path) -> None:
+    path = write_recording(build_run(rows=4000), tmp_path / "run.rrd")
     picture = look(viewer, path, 12.0, JOINT_COLOURS[:6])
     assert complaints(viewer) == []
     # The arm's joints are balls in the colours of the series; the path is in the run's colour.
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], run_colour(0)], right=JOINT_COLOURS[:6])
-    wraps = len(make_run(rows=4000).repolarizations)
+    wraps = len(build_run(rows=4000).repolarizations)
     wanted = {"Arm and paths [m]", "Joints in the file [rad]", f"Joints repolarized ({wraps} marked) [rad]"}
     assert wanted <= view_names(viewer)
 
 
-def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison, tmp_path: Path) -> None:
+def test_a_comparison_in_the_viewer(viewer: Any, tmp_path: Path) -> None:
     """The first run's name has everything that an entity's path must escape."""
-    comparison = make_comparison(("a b/c.d [x] Ω", "reference"), rows=4000)
+    comparison = build_comparison(("a b/c.d [x] Ω", "reference"), rows=4000)
     path = write_recording(comparison, tmp_path / "comparison.rrd")
     right = [*JOINT_COLOURS[:6], *AXIS_COLOURS.values(), REFERENCE_COLOUR]
     picture = look(viewer, path, 12.0, right)
@@ -194,10 +190,10 @@ def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison
 
 
 def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
-    viewer: Any, make_solved: MakeSolved, tmp_path: Path
+    viewer: Any, tmp_path: Path
 ) -> None:
     """At 0.5 s neither the arm is there, whose joints have the same colours, nor a branch."""
-    one = make_solved(rows=60, names=("up", "down"))
+    one = build_solved(rows=60, names=("up", "down"))
     q = np.array(one.solutions.q)
     q[20:30] = np.nan
     reasons = np.array(one.solutions.reasons)
@@ -222,8 +218,8 @@ def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
     assert complaints(viewer) == []
 
 
-def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
-    run = replace(make_run(rows=1000), robot=None, tcp=None)
+def test_a_log_without_a_robot_in_the_viewer(viewer: Any, tmp_path: Path) -> None:
+    run = replace(build_run(rows=1000), robot=None, tcp=None)
     picture = look(viewer, write_recording(run, tmp_path / "bare.rrd"), 2.0, JOINT_COLOURS[:6])
     assert complaints(viewer) == []
     assert_drawn(picture, left=[], right=JOINT_COLOURS[:6])
@@ -274,10 +270,8 @@ def assert_stands(
     assert complaints(viewer) == []
 
 
-def test_the_arm_stands_where_its_kinematics_project_it(
-    viewer: Any, make_run: MakeRun, tmp_path: Path
-) -> None:
-    run = make_run(rows=4000)
+def test_the_arm_stands_where_its_kinematics_project_it(viewer: Any, tmp_path: Path) -> None:
+    run = build_run(rows=4000)
     robot = run.robot
     assert robot is not None
 
@@ -294,10 +288,10 @@ def test_the_arm_stands_where_its_kinematics_project_it(
 
 
 def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
-    viewer: Any, make_run: MakeRun, shapes: Path, tmp_path: Path
+    viewer: Any, shapes: Path, tmp_path: Path
 ) -> None:
     robot = read_urdf(shapes)
-    run = make_run(rows=4000, robot=robot)
+    run = build_run(rows=4000, robot=robot)
     carriers = ["turn1", "turn2", "turn3", "turn4"]
     numbers = [1 + [joint.name for joint in robot.joints].index(name) for name in carriers]
     middle = np.array([0.0, 0.0, 0.1])  # of each shape, in the frame that carries it
@@ -311,9 +305,9 @@ def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
     assert_stands(viewer, run, tmp_path, ["#ff3333", "#33ff33", "#3366ff", "#ffff33"], middles, (8.5, 13.0))
 
 
-def test_a_long_log_is_seen_whole(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
+def test_a_long_log_is_seen_whole(viewer: Any, tmp_path: Path) -> None:
     """The viewer would open so long a log on one minute of it."""
-    run = make_run(rows=120_000)
+    run = build_run(rows=120_000)
     path = write_recording(run, tmp_path / "long.rrd")
     # Both joints that turn on and on are seen up to the end of the log, left of the legend.
     picture = look(viewer, path, 12.0, JOINT_COLOURS[:6])
@@ -325,11 +319,11 @@ def test_a_long_log_is_seen_whole(viewer: Any, make_run: MakeRun, tmp_path: Path
 
 
 def test_view_opens_where_the_verdict_was_decided_and_at_a_row_where_there_are_no_times(
-    make_comparison: MakeComparison, make_solved: MakeSolved, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
-    comparison = make_comparison()
+    comparison = build_comparison()
     decided = round(comparison.worst.worst_statistics.t_max * 1e9)
-    for result, wanted in ((comparison, ("t", decided)), (make_solved(timed=False), ("row", 3))):
+    for result, wanted in ((comparison, ("t", decided)), (build_solved(timed=False), ("row", 3))):
         path = write_recording(result, tmp_path / "opened.rrd")
         with open_window(path, openings([path])[path], headless=True) as (process, client):
             (shown,) = client.get_state().recordings

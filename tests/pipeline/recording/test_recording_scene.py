@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from recordable import build_comparison, build_run
 from recorded import columns, entities, static, times_of, views
 from toys import STEP_NS, eye_of, recorded, shown, toy
 from urmpipe_models.arm.chain import Box, Chain, Inertial, Joint, Mesh, Sphere, Visual
@@ -21,7 +22,6 @@ from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.math3d import from_offset, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
-from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.scene import ArmMark, Balls, Scene, Spot
 from urmpipe_pipeline.presentation.scene import Path as Way
@@ -33,8 +33,6 @@ from urmpipe_pipeline.recording.views.tracks import DASHES, LEAST_DASH, MOST, PO
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.run import Run
 
-MakeRun = Callable[..., Run]
-MakeComparison = Callable[..., Comparison]
 SCENE = "/shown/scene"
 
 
@@ -60,8 +58,8 @@ def below(path: Path, root: str) -> set[str]:
 # --- which rows are drawn --------------------------------------------------------------------------
 
 
-def test_the_arm_moves_at_50_hz_through_its_own_kinematics(make_run: MakeRun) -> None:
-    run = make_run()
+def test_the_arm_moves_at_50_hz_through_its_own_kinematics() -> None:
+    run = build_run()
     arm = drawn_arm(scene_of(run).arms[0])
     assert run.robot is not None and arm is not None
     t_ns = run.t_ns[arm.moving.rows]
@@ -71,8 +69,8 @@ def test_the_arm_moves_at_50_hz_through_its_own_kinematics(make_run: MakeRun) ->
     assert arm.colours == (*JOINT_COLOURS[:6], REFERENCE_COLOUR, run_colour(0))
 
 
-def test_what_is_long_is_thinned_out_but_for_the_last_and_what_is_kept(make_run: MakeRun) -> None:
-    run, kept = make_run(rows=200_000), 123_457
+def test_what_is_long_is_thinned_out_but_for_the_last_and_what_is_kept() -> None:
+    run, kept = build_run(rows=200_000), 123_457
     arm, way = scene_of(run).arms[0], scene_of(run).paths[0]
     drawn, path = drawn_arm(replace(arm, kept=(kept,))), drawn_path(replace(way, kept=(kept,)))
     assert drawn is not None
@@ -85,9 +83,9 @@ def test_what_is_long_is_thinned_out_but_for_the_last_and_what_is_kept(make_run:
         assert (strip == way.position[row]).all(axis=1).any()
 
 
-def test_what_decides_is_drawn(make_comparison: MakeComparison) -> None:
+def test_what_decides_is_drawn() -> None:
     """Not one of the samples that are drawn anyway, which are every fourth."""
-    comparison = make_comparison(("coppeliasim",))
+    comparison = build_comparison(("coppeliasim",))
     one = comparison.runs[0]
     x = replace(one.statistics["x"], max=1.0, sample_max=int(one.sample[465]))
     scene = scene_of(replace(comparison, runs=(replace(one, statistics={**one.statistics, "x": x}),)))
@@ -179,8 +177,8 @@ def test_labels_of_places_close_to_each_other_are_raised_until_each_is_read(tmp_
     assert high[2] - low[2] > 0.05 * float(np.linalg.norm(np.ptp(one.values, axis=0)))
 
 
-def test_there_is_no_3d_view_of_nothing(make_run: MakeRun, tmp_path: Path) -> None:
-    run = replace(make_run(rows=20), robot=None, tcp=None)
+def test_there_is_no_3d_view_of_nothing(tmp_path: Path) -> None:
+    run = replace(build_run(rows=20), robot=None, tcp=None)
     path = write_recording(run, tmp_path / "run.rrd")
     assert not entities(path, SCENE)
     assert "Spatial3DView" not in str(views(path))
@@ -190,8 +188,8 @@ def test_there_is_no_3d_view_of_nothing(make_run: MakeRun, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("rows", [1, 2, 1500])
-def test_all_of_the_scene_is_in_view(rows: int, make_run: MakeRun) -> None:
-    run = make_run(rows=rows)
+def test_all_of_the_scene_is_in_view(rows: int) -> None:
+    run = build_run(rows=rows)
     scene = scene_of(run)
     eye, target = eye_of(present(run))
     forward = (target - eye) / np.linalg.norm(target - eye)
@@ -207,9 +205,9 @@ def test_all_of_the_scene_is_in_view(rows: int, make_run: MakeRun) -> None:
 # --- the arm as it looks ---------------------------------------------------------------------------
 
 
-def test_each_link_moves_with_its_frame(make_run: MakeRun, shapes: Path, tmp_path: Path) -> None:
+def test_each_link_moves_with_its_frame(shapes: Path, tmp_path: Path) -> None:
     robot = read_urdf(shapes)
-    run = make_run(rows=200, robot=robot)
+    run = build_run(rows=200, robot=robot)
     path = write_recording(run, tmp_path / "run.rrd")
     arm = drawn_arm(scene_of(run).arms[0])
     assert arm is not None
@@ -231,8 +229,8 @@ def test_each_link_moves_with_its_frame(make_run: MakeRun, shapes: Path, tmp_pat
     }
 
 
-def test_shapes_stand_still_in_their_frame(make_run: MakeRun, shapes: Path, tmp_path: Path) -> None:
-    path = write_recording(make_run(rows=50, robot=read_urdf(shapes)), tmp_path / "run.rrd")
+def test_shapes_stand_still_in_their_frame(shapes: Path, tmp_path: Path) -> None:
+    path = write_recording(build_run(rows=50, robot=read_urdf(shapes)), tmp_path / "run.rrd")
     box, cylinder, capsule = (f"robot/{link}/visual\\ 1" for link in ("base", "joint/turn1", "joint/turn4"))
     np.testing.assert_allclose(column(path, box, "Boxes3D:half_sizes"), [[[0.15, 0.15, 0.05]]], atol=1e-7)
     np.testing.assert_allclose(column(path, box, "Transform3D:translation"), [[[0.0, 0.0, -0.05]]], atol=1e-7)
@@ -244,11 +242,9 @@ def test_shapes_stand_still_in_their_frame(make_run: MakeRun, shapes: Path, tmp_
     )
 
 
-def test_meshes_are_in_the_recording_and_not_in_its_metadata(
-    make_run: MakeRun, shapes: Path, tmp_path: Path
-) -> None:
+def test_meshes_are_in_the_recording_and_not_in_its_metadata(shapes: Path, tmp_path: Path) -> None:
     robot = read_urdf(shapes)
-    path = write_recording(make_run(rows=50, robot=robot), tmp_path / "run.rrd")
+    path = write_recording(build_run(rows=50, robot=robot), tmp_path / "run.rrd")
     mesh = shapes.parent / "meshes" / "bar.stl"
     blob = column(path, "robot/joint/turn3/visual\\ 1", "Asset3D:blob")
     assert bytes(blob.reshape(-1).astype(np.uint8)) == mesh.read_bytes()
@@ -257,10 +253,10 @@ def test_meshes_are_in_the_recording_and_not_in_its_metadata(
 
 
 def test_an_arm_read_back_looks_as_it_did_and_a_solid_stands_for_a_mesh_that_is_gone(
-    make_run: MakeRun, shapes: Path, tmp_path: Path
+    shapes: Path, tmp_path: Path
 ) -> None:
     robot = read_urdf(shapes)
-    path = write_recording(make_run(rows=50, robot=robot), tmp_path / "run.rrd")
+    path = write_recording(build_run(rows=50, robot=robot), tmp_path / "run.rrd")
     back = read_recording(path)
     assert isinstance(back, Run)
     assert back.robot == robot
@@ -274,10 +270,8 @@ def test_an_arm_read_back_looks_as_it_did_and_a_solid_stands_for_a_mesh_that_is_
     assert column(bare, link, "Capsules3D:lengths").tolist() == [[pytest.approx(0.2)]]
 
 
-def test_an_arm_that_shows_nothing_is_drawn_in_solids_that_its_frames_move(
-    make_run: MakeRun, tmp_path: Path
-) -> None:
-    run = make_run(rows=200)
+def test_an_arm_that_shows_nothing_is_drawn_in_solids_that_its_frames_move(tmp_path: Path) -> None:
+    run = build_run(rows=200)
     path = write_recording(run, tmp_path / "run.rrd")
     assert run.robot is not None
     solids = build_placeholder_solids(run.robot)
@@ -300,8 +294,8 @@ def test_an_arm_that_shows_nothing_is_drawn_in_solids_that_its_frames_move(
         )  # once, at all times
 
 
-def test_solids_of_joints_have_their_colours_and_the_tool_its_axes(make_run: MakeRun, tmp_path: Path) -> None:
-    run = make_run(rows=20)
+def test_solids_of_joints_have_their_colours_and_the_tool_its_axes(tmp_path: Path) -> None:
+    run = build_run(rows=20)
     assert run.robot is not None
     tool = from_offset([0.01, 0.02, 0.1, 0.3, 0.2, 0.1])
     robot = run.robot.placed(tool=tool)
@@ -333,8 +327,8 @@ def test_own_shapes_win_and_only_moving_links_without_any_get_solids() -> None:
     assert added("a", "b") == added("plate", "b") == set()
 
 
-def test_a_mark_is_seen_around_the_solid_that_it_marks(make_run: MakeRun) -> None:
-    arm = drawn_arm(scene_of(make_run(rows=5)).arms[0])
+def test_a_mark_is_seen_around_the_solid_that_it_marks() -> None:
+    arm = drawn_arm(scene_of(build_run(rows=5)).arms[0])
     assert arm is not None
     for k, joint in enumerate(arm.chain.coordinates, start=1):
         housing = build_placeholder_solids(arm.chain)
@@ -350,11 +344,9 @@ def test_a_mark_is_seen_around_the_solid_that_it_marks(make_run: MakeRun) -> Non
 # --- masses ----------------------------------------------------------------------------------------
 
 
-def test_mass_centres_are_dots_as_large_as_balls_that_move_with_the_arm(
-    make_run: MakeRun, tmp_path: Path
-) -> None:
+def test_mass_centres_are_dots_as_large_as_balls_that_move_with_the_arm(tmp_path: Path) -> None:
     chain = load_robot("ur10")
-    run = make_run(rows=200, robot=chain)
+    run = build_run(rows=200, robot=chain)
     path = write_recording(run, tmp_path / "run.rrd")
     drawn = np.searchsorted(run.t_ns, times_of(path, f"{SCENE}/robot/masses"))
     assert len(drawn) > 20
@@ -368,16 +360,14 @@ def test_mass_centres_are_dots_as_large_as_balls_that_move_with_the_arm(
     assert words[0] == f"{masses[0]:.4g} kg at {chain.inertials[0].joint or 'the base'}"
 
 
-def test_an_arm_without_masses_has_no_dots(make_run: MakeRun, tmp_path: Path) -> None:
-    path = write_recording(make_run(rows=20), tmp_path / "run.rrd")
+def test_an_arm_without_masses_has_no_dots(tmp_path: Path) -> None:
+    path = write_recording(build_run(rows=20), tmp_path / "run.rrd")
     assert "masses" not in below(path, "robot")
 
 
-def test_links_are_seen_through_where_masses_are_in_them(
-    make_run: MakeRun, shapes: Path, tmp_path: Path
-) -> None:
+def test_links_are_seen_through_where_masses_are_in_them(shapes: Path, tmp_path: Path) -> None:
     robot = read_urdf(shapes)
     robot = replace(robot, inertials=(Inertial(robot.coordinates[0], 1.0),))
-    path = write_recording(make_run(rows=20, robot=robot), tmp_path / "run.rrd")
+    path = write_recording(build_run(rows=20, robot=robot), tmp_path / "run.rrd")
     (box,) = column(path, "robot/base/visual\\ 1", "Boxes3D:colors").tolist()
     assert box == [0x66666600 + round(255 * SEEN_THROUGH)]

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from recordable import build_run
 from urmpipe_pipeline.recording.writer import Sink, write_into
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.runs.run import Run
-
-MakeRun = Callable[..., Run]
 
 
 def send(sink: Sink) -> str:
@@ -55,8 +52,8 @@ def test_a_file_that_is_closed_early_is_an_error_of_the_sink(tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counted in /proc")
-def test_recordings_leave_no_thread_behind(make_run: MakeRun, tmp_path: Path) -> None:
-    run, counts = make_run(rows=3), []
+def test_recordings_leave_no_thread_behind(tmp_path: Path) -> None:
+    run, counts = build_run(rows=3), []
     for number in range(4):
         write_recording(run, tmp_path / f"{number}.rrd")
         counts.append((len(list(Path("/proc/self/task").iterdir())), threading.active_count()))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from rerun.chunk import RrdReader
 
+from recordable import build_solved
 from recorded import static
 from solved import solved
 from urmpipe_models.elementwise import FloatArray
@@ -21,8 +21,6 @@ from urmpipe_pipeline.results import present, write_recording
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import scene
 
-MakeSolved = Callable[..., IkResult]
-
 ROOT = "/shown/scene/targets"
 
 
@@ -33,8 +31,8 @@ def shown_targets(one: IkResult) -> presentation.Targets:
     return found
 
 
-def test_targets_without_times_are_frames_and_no_path(make_solved: MakeSolved, tmp_path: Path) -> None:
-    one = make_solved(timed=False)
+def test_targets_without_times_are_frames_and_no_path(tmp_path: Path) -> None:
+    one = build_solved(timed=False)
     path = write_recording(one, tmp_path / "solved.rrd")
     strips = np.array(static(path, f"{ROOT}/frames", "LineStrips3D:strips"))
     assert strips.shape == (120, 2, 3)
@@ -53,19 +51,19 @@ def test_targets_without_times_are_frames_and_no_path(make_solved: MakeSolved, t
     assert found == {f"{ROOT}/{leaf}" for leaf in ("frames", "missed")}
 
 
-def test_a_long_path_is_dashed_and_positions_are_points(make_solved: MakeSolved) -> None:
-    long = drawn_targets(shown_targets(make_solved(rows=200)))
+def test_a_long_path_is_dashed_and_positions_are_points() -> None:
+    long = drawn_targets(shown_targets(build_solved(rows=200)))
     assert (len(long.origin), len(long.points)) == (0, 0)
     assert len(long.strips) > 10
-    few = make_solved(rows=20, timed=False)
+    few = build_solved(rows=20, timed=False)
     points = drawn_targets(shown_targets(replace(few, targets=Targets(few.targets.position), angle=None)))
     np.testing.assert_array_equal(points.points, few.targets.position[few.reached])
     np.testing.assert_array_equal(points.missed, few.targets.position[~few.reached])
     assert (len(points.origin), points.strips) == (0, ())
 
 
-def test_targets_that_are_missed_say_why(make_solved: MakeSolved, tmp_path: Path) -> None:
-    path = write_recording(make_solved(), tmp_path / "solved.rrd")
+def test_targets_that_are_missed_say_why(tmp_path: Path) -> None:
+    path = write_recording(build_solved(), tmp_path / "solved.rrd")
     assert static(path, f"{ROOT}/missed", "Points3D:labels") == [
         f"row {row}: the wrist centre is 1.2 m away, allowed: 0.1 to 0.9 m" for row in range(6, 10)
     ]

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from recordable import build_run
 from urmpipe_models.errors import ViewerError
 from urmpipe_pipeline.recording import viewer
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.runs.run import Run
-
-MakeRun = Callable[..., Run]
 
 
 @pytest.fixture
-def recording(make_run: MakeRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A recording, on a computer that says it has a display."""
     monkeypatch.setenv("DISPLAY", ":0")
-    return write_recording(make_run(rows=5), tmp_path / "run.rrd")
+    return write_recording(build_run(rows=5), tmp_path / "run.rrd")
 
 
 def ends_as(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
