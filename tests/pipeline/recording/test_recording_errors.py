@@ -79,8 +79,7 @@ def test_a_recording_that_was_cut_off(tmp_path: Path, share: float) -> None:
 @pytest.mark.parametrize("application", ["another", "urmpipeline", "my urmpipe"])
 def test_a_recording_of_another_program(tmp_path: Path, application: str) -> None:
     path = foreign(tmp_path / "foreign.rrd", application)
-    assert is_recording(path)
-    assert not is_ours(path)
+    assert (is_recording(path), is_ours(path)) == (True, False)
     assert trouble(path) == f"found a recording of {application}, allowed: one of urmpipe"
 
 
@@ -100,57 +99,49 @@ def test_a_recording_is_known_without_rerun(tmp_path: Path) -> None:
     assert done.stdout == "[(True, True), (False, False)] False\n"
 
 
-def test_a_recording_without_metadata(tmp_path: Path) -> None:
-    path = foreign(tmp_path / "bare.rrd", "urmpipe")
-    assert is_ours(path)
-    assert trouble(path) == "found a recording without urmpipe's metadata, allowed: one that urmpipe wrote"
-
-
 MADE_BY = {"provenance": {"command": "compare", "inputs": [{"name": "asked.csv"}, {"name": "log.csv"}]}}
 """What recordings of all layouts have said of where they come from."""
 
+ALLOWED_LAYOUT = f"allowed: {LAYOUT_VERSION}; "
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("version", "result", "again"),
-    [
-        (4, MADE_BY, "an older urmpipe wrote it: make it again: urmpipe compare asked.csv log.csv and its"
-         " options"),
-        (5, {"provenance": []}, "an older urmpipe wrote it: make it again from what it was made of"),
-        (99, None, "a newer urmpipe wrote it: make it again from what it was made of"),
-    ],
-)  # fmt: skip
-def test_a_recording_of_another_layout_says_how_to_make_it_again(
-    version: int, result: object, again: str, tmp_path: Path
-) -> None:
+
+def of_layout(version: int, result: object) -> rr.AnyValues:
+    """Return the property of a recording of another layout, which had no checksum."""
     document = {"layout_version": version, "kind": "comparison", "result": result}
-    path = foreign(tmp_path / "other.rrd", "urmpipe", rr.AnyValues(metadata=json.dumps(document)))
-    assert trouble(path) == f"found layout version {version}, allowed: {LAYOUT_VERSION}; {again}"
+    return rr.AnyValues(metadata=json.dumps(document))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("metadata", "reason"),
+    ("metadata", "said"),
     [
+        (None, "found a recording without urmpipe's metadata, allowed: one that urmpipe wrote"),
+        (of_layout(4, MADE_BY), f"found layout version 4, {ALLOWED_LAYOUT}an older urmpipe wrote it: make it"
+         " again: urmpipe compare asked.csv log.csv and its options"),
+        (of_layout(5, {"provenance": []}), f"found layout version 5, {ALLOWED_LAYOUT}an older urmpipe wrote"
+         " it: make it again from what it was made of"),
+        (of_layout(99, None), f"found layout version 99, {ALLOWED_LAYOUT}a newer urmpipe wrote it: make it"
+         " again from what it was made of"),
         ("{", "found damaged metadata (JSONDecodeError("),
         ("[]", "found damaged metadata (TypeError("),
         ("{}", "found damaged metadata (KeyError('layout_version'))"),
         (metadata_json("", {}), "found a result of kind '', allowed: run, comparison, diagnosis, simulation"),
         (metadata_json("run", None), "found damaged metadata, /: found None, allowed: Run"),
         (metadata_json("run", {"name": 1}), "found damaged metadata, /name: found 1, allowed: str"),
-        (
-            metadata_json("run", {}, {"/q": "/q"}),
-            "found damaged metadata, /clocks: found {'/q': '/q'}, allowed: the paths of times",
-        ),
-        (
-            metadata_json("run", {"name": "a"}),
-            "found damaged metadata, /: found None, allowed: the field log of Run",
-        ),
+        (metadata_json("run", {}, {"/q": "/q"}),
+         "found damaged metadata, /clocks: found {'/q': '/q'}, allowed: the paths of times"),
+        (metadata_json("run", {"name": "a"}),
+         "found damaged metadata, /: found None, allowed: the field log of Run"),
     ],
-)
-def test_a_recording_with_damaged_metadata(tmp_path: Path, metadata: str, reason: str) -> None:
-    message = trouble(foreign(tmp_path / "bad.rrd", "urmpipe", told(metadata)))
-    assert message.startswith(reason)
+)  # fmt: skip
+def test_what_is_wrong_with_the_metadata_is_said(
+    metadata: rr.AnyValues | str | None, said: str, tmp_path: Path
+) -> None:
+    properties = [told(metadata)] if isinstance(metadata, str) else [metadata] if metadata else []
+    path = foreign(tmp_path / "bad.rrd", "urmpipe", *properties)
+    assert is_ours(path)
+    message = trouble(path)
+    assert message.startswith(said) if isinstance(metadata, str) else message == said
 
 
 @pytest.mark.slow

@@ -23,31 +23,34 @@ from urmpipe_pipeline.tables.csv_files import find_line_differences, to_text_col
 from urmpipe_pipeline.tables.export import is_export, write_all
 
 
-def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
+def said(kind: type[UrmpipeError], work: Callable[..., object], *args: Any) -> str:
     """What an error of this kind says of its only finding, on the command line."""
     with pytest.raises(kind) as caught:
-        work()
+        work(*args)
     assert len(caught.value.findings) == 1
     return caught.value.findings[0].sentence()
 
 
 def test_a_comparison_has_the_samples_that_it_compared(comparison: Comparison, tmp_path: Path) -> None:
-    work = lambda: export_result(comparison, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
-    assert said(OptionError, work) == "rows (--rows): found file with a comparison, allowed: compared"
+    assert (
+        said(OptionError, export_result, comparison, tmp_path / "a.csv", ExportOptions("csv", "file"))
+        == "rows (--rows): found file with a comparison, allowed: compared"
+    )
 
 
 def test_a_trajectory_needs_a_row_with_a_pose(run: Run, tmp_path: Path) -> None:
     empty = replace(run, q=np.full_like(run.q, np.nan))
-    work = lambda: export_result(empty, tmp_path / "a.tum", ExportOptions("tum"))  # noqa: E731
-    assert said(RecordingError, work) == "no row with a pose"
+    assert (
+        said(RecordingError, export_result, empty, tmp_path / "a.tum", ExportOptions("tum"))
+        == "no row with a pose"
+    )
     assert not list(tmp_path.iterdir())
 
 
 def test_a_log_that_came_from_no_file_has_no_columns_of_one(run: Run, tmp_path: Path) -> None:
     made = replace(run, log=replace(run.log, columns=()))
-    work = lambda: export_result(made, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
     assert (
-        said(RecordingError, work)
+        said(RecordingError, export_result, made, tmp_path / "a.csv", ExportOptions("csv", "file"))
         == "the log was not read from a file; --rows grid writes what was made of it"
     )
 
@@ -58,12 +61,13 @@ def test_an_export_of_ours_is_replaced_and_nothing_else(run: Run, tmp_path: Path
     export_result(run, path, ExportOptions(to))
     assert is_export(path)
     export_result(replace(run, name="other"), path, ExportOptions(to))
-    work = lambda: export_result(run, path, ExportOptions(to), [path])  # noqa: E731
-    assert said(OutputError, work) == "found an input of this command, allowed: any other name for the export"
+    assert (
+        said(OutputError, export_result, run, path, ExportOptions(to), [path])
+        == "found an input of this command, allowed: any other name for the export"
+    )
     for foreign in (b"", b"precious", b"# timestamp tx ty tz", b"PAR1", b"MATLAB 5.0 MAT-file Platform: nt"):
         path.write_bytes(foreign)
-        work = lambda: export_result(run, path, ExportOptions(to))  # noqa: E731
-        assert said(OutputError, work) == (
+        assert said(OutputError, export_result, run, path, ExportOptions(to)) == (
             "found a file that is not an export of urmpipe, allowed: a new name, or such an export to replace"
         )
         assert path.read_bytes() == foreign
@@ -73,7 +77,7 @@ def test_what_a_mat_file_cannot_hold_is_said_before_it_is_written(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(typed_files, "MAX_SIZE", 1000)
-    message = said(OutputError, lambda: export_result(run, tmp_path / "a.mat", ExportOptions("mat")))
+    message = said(OutputError, export_result, run, tmp_path / "a.mat", ExportOptions("mat"))
     size = 40 * 8 * (2 + 3 * 6 + 5 * 3)
     assert message == (
         f"found {size} bytes, allowed: 1000 in a MAT file of version 5; --to parquet takes all"
@@ -94,7 +98,7 @@ def test_a_file_that_reads_back_otherwise_does_not_get_its_name(tmp_path: Path) 
         part.write_text("half")
         return ["the head", "row 2"]
 
-    message = said(OutputError, lambda: write_all([tmp_path / "a.csv"], [write], "csv", ()))
+    message = said(OutputError, write_all, [tmp_path / "a.csv"], [write], "csv", ())
     assert message == "differs when read back: the head, row 2"
     assert not list(tmp_path.iterdir())
 

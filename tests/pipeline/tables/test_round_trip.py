@@ -129,15 +129,3 @@ def test_what_was_read_leaves_as_it_was(specimen: Specimen) -> None:
                 # Two neighbours may convert to one value in SI: then the shorter text is written.
                 ulp = 0.0 if "[rad]" in header or "[m]" in header else math.ulp(float(other))
                 assert abs(float(one) - float(other)) <= ulp
-
-
-def test_the_grid_is_a_log_again(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(
-        "t,q1 [deg],q2 [deg]\n" + "".join(f"{k},{3 * k},{-k}\n" for k in range(9))
-    )
-    run = urmpipe.ingest(tmp_path / "log.csv")
-    urmpipe.export(run, tmp_path / "grid.csv")
-    again = urmpipe.ingest(tmp_path / "grid.csv")
-    assert again.log.joints == run.log.joints
-    for name in ("q", "qd", "qdd", "t_ns"):
-        assert (getattr(again, name) == getattr(run, name)).all()
