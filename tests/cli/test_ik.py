@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ik_runs import answer, write_path
+from ik_runs import answer, wave, write_path
 from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import shell_quote
@@ -172,11 +172,8 @@ def test_an_iterative_arm_lists_what_restarts_collect(capsys: Captured, folder: 
 
 
 def test_a_joint_log_is_what_ingest_reads(capsys: Captured, folder: Path) -> None:
-    q = np.array([0.1, -0.9, 1.2, -0.5, 0.7, 0.2]) + 0.3 * np.sin(
-        np.outer(np.arange(60) / 60, np.arange(1, 7))
-    )
-    write_path(folder / "path.csv", "ur5e", q)
-    start = ",".join(map(str, q[0]))
+    q = wave([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], 0.3, 60)
+    start = write_path(folder / "path.csv", "ur5e", q)
     assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start, "-o", "log.csv"]) == 0
     out = capsys.readouterr().out
     assert out.splitlines()[0] == "PASS  path: ur5e reaches 60 targets (closed form: three parallel axes)"
@@ -238,11 +235,8 @@ def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
 
 
 def test_all_of_a_path_records_the_branches_that_run_beside_it(capsys: Captured, folder: Path) -> None:
-    q = np.array([0.3, 0.8, -0.6, 0.5, 0.7, 0.2]) + 0.2 * np.sin(
-        np.outer(np.arange(40) / 40, np.arange(1, 7))
-    )
-    write_path(folder / "path.csv", "arm6", q)
-    start = ",".join(map(str, q[0]))
+    q = wave([0.3, 0.8, -0.6, 0.5, 0.7, 0.2], 0.2, 40)
+    start = write_path(folder / "path.csv", "arm6", q)
     assert run(["ik", "path.csv", "--robot", "arm6", "--start", start, "--all", "-o", "path.rrd"]) == 0
     made = read_recording(folder / "path.rrd")
     assert isinstance(made, IkResult)

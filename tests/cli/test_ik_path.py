@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ik_runs import answer, write_path
+from ik_runs import answer, wave, write_path
 from urmpipe import ik
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
@@ -30,11 +30,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_path_has_a_summary_and_one_solution_a_row_in_json(capsys: Captured, folder: Path) -> None:
-    q = np.array([0.3, 0.8, -0.6, 0.5, 0.7, 0.2]) + 0.2 * np.sin(
-        np.outer(np.arange(40) / 40, np.arange(1, 7))
-    )
-    write_path(folder / "path.csv", "arm6", q)
-    start = ",".join(map(str, q[0]))
+    q = wave([0.3, 0.8, -0.6, 0.5, 0.7, 0.2], 0.2, 40)
+    start = write_path(folder / "path.csv", "arm6", q)
     assert run(["ik", "path.csv", "--robot", "arm6", "--start", start]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "PASS  path: arm6 reaches 40 targets (closed form: spherical wrist)"
@@ -66,8 +63,7 @@ def test_a_period_makes_a_path_of_targets_without_times(capsys: Captured, folder
 def test_a_joint_that_is_too_fast_fails_the_path(capsys: Captured, folder: Path) -> None:
     q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (30, 1))
     q[:, 0] += 0.05 * np.arange(30)  # 5 rad/s at 10 ms; the arm's first joint is allowed 3.14
-    write_path(folder / "path.csv", "ur5e", q)
-    start = ",".join(map(str, q[0]))
+    start = write_path(folder / "path.csv", "ur5e", q)
     found = answer(capsys, 1, "path.csv", "--robot", "ur5e", "--start", start)
     assert found["reached"] == 30
     (fast,) = found["speed_violations"]
@@ -110,11 +106,10 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
     arm = load_robot("ur5e")
     q = np.array([0.1, -0.9, 1.2, -0.5, 0.7, 0.2]) + np.linspace(0.0, 0.1, 40)[:, None] * np.eye(6)[0]
     q[:, 5] = np.linspace(arm.moving[5].upper - 0.1, arm.moving[5].upper + 0.1, 40)  # a turn back in the gap
-    write_path(folder / "path.csv", "ur5e", q)
+    start = write_path(folder / "path.csv", "ur5e", q)
     lines = (folder / "path.csv").read_text().splitlines()
     lines[17:24] = [line.replace(line.split(",")[3], "3.0") for line in lines[17:24]]  # rows 17 to 23: z
     (folder / "path.csv").write_text("\n".join(lines) + "\n")
-    start = ",".join(map(str, q[0]))
     found = answer(capsys, 1, "path.csv", "--robot", "ur5e", "--start", start)
     assert [one["row"] for one in found["targets"] if one["reason"]] == list(range(17, 24))
     (jump,) = found["jumps"]
@@ -139,9 +134,9 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
 
 def test_a_wrap_of_values_within_pi_is_no_speed(capsys: Captured, folder: Path) -> None:
     q = np.array([-3.0, -1.0, 1.2, 0.5, 0.8, 3.0]) + np.outer(0.01 * np.arange(60), [-1, 0, 0, 0, 0, 2])
-    write_path(folder / "path.csv", "urm6", q)
+    start = write_path(folder / "path.csv", "urm6", q)
     for more in ((), ("--within-pi",)):
-        assert run(["ik", "path.csv", "--robot", "urm6", "--start", ",".join(map(str, q[0])), *more]) == 0
+        assert run(["ik", "path.csv", "--robot", "urm6", "--start", start, *more]) == 0
         lines = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("phi")]
         assert [line[5] for line in lines] == ["57.30", *["0.0000"] * 4, "114.6"]  # deg/s
         assert (abs(float(lines[0][4])) < 180.0) == bool(more)  # the last value is within pi

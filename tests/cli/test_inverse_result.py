@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urmpipe
+from ik_runs import wave
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.kinematics.singularity import singularity_over_log
@@ -80,19 +81,9 @@ def test_the_table_has_every_solution_and_why_there_is_none() -> None:
     assert found.verdict == "fail"
     assert found.reached.tolist() == [True, True, False]
     frame = found.to_frame()
-    assert list(frame.columns) == [
-        "row",
-        "branch",
-        *ARM.coordinates,
-        "position_error",
-        "angle",
-        "nearest",
-        "reason",
-    ]
-    for row, count in (
-        (1, int(found.solutions.reached[0].sum())),
-        (2, int(found.solutions.reached[1].sum())),
-    ):
+    columns = ["row", "branch", *ARM.coordinates, "position_error", "angle", "nearest", "reason"]
+    assert list(frame.columns) == columns
+    for row, count in enumerate(found.solutions.reached[:2].sum(axis=1).tolist(), start=1):
         part = frame[frame["row"] == row]
         assert len(part) == count > 1
         assert part["nearest"].sum() == 1
@@ -147,7 +138,7 @@ def test_positions_take_any_orientation() -> None:
 
 
 def test_arrays_with_times_are_a_path() -> None:
-    q = Q[0] + 0.2 * np.sin(np.outer(np.arange(30) / 30, np.arange(1, 7)))
+    q = wave(Q[0], 0.2, 30)
     poses = forward_targets(ARM, q)
     with_times = urmpipe.ik(poses, ARM, t=0.01 * np.arange(30) + 5.0, start=q[0].tolist())
     by_period = urmpipe.ik(poses, ARM, tsp=0.01, start=q[0].tolist())

@@ -45,17 +45,8 @@ def test_solve_finds_both_assemblies_of_a_four_bar(urmpipe: Run) -> None:
     ran = urmpipe("network", "solve", "four-bar", "--all", "--json", "--restarts", "100")
     told = json.loads(ran.out)
     assert (ran.code, ran.err) == (0, "")
-    assert set(told) == {
-        "schema",
-        "name",
-        "assemblies",
-        "distances",
-        "restarts",
-        "reason",
-        "closure_errors",
-        "warnings",
-        "output",
-    }
+    keys = "schema name assemblies distances restarts reason closure_errors warnings output"
+    assert set(told) == set(keys.split())
     angles = [one["variables"]["theta4"] for one in told["assemblies"]]
     assert angles == pytest.approx(FOUR_BAR, abs=1e-9)
     assert told["reason"] == "at least 2: 100 random starts in a row found nothing new"
@@ -134,17 +125,9 @@ def test_what_does_not_close_fails_with_its_loop_and_gap(urmpipe: Run, tmp_path:
     assert json.loads(solved.out)["reason"] == "none of 50 random starts closed"
 
 
-def test_a_control_out_of_reach_fails(urmpipe: Run, tmp_path: Path) -> None:
-    text = (NETWORKS / "slider-crank.toml").read_text(encoding="utf-8").replace("0.8", "0.31")
-    (tmp_path / "short.toml").write_text(text, encoding="utf-8")
-    ran = urmpipe("network", "solve", "short.toml", "--set", "crank=-1.5", "--restarts", "20", "--json")
-    assert ran.code == 1
-    assert json.loads(ran.out)["assemblies"] == []
-
-
 @pytest.mark.slow
 def test_a_recording_and_a_drawing_are_written_and_replaced(urmpipe: Run, tmp_path: Path) -> None:
-    arguments = (
+    arguments = [
         "network",
         "solve",
         "rssr",
@@ -155,7 +138,7 @@ def test_a_recording_and_a_drawing_are_written_and_replaced(urmpipe: Run, tmp_pa
         "rssr.rrd",
         "--draw",
         "rssr.svg",
-    )
+    ]
     assert urmpipe(*arguments).code == 0
     ran = urmpipe(*arguments)
     assert ran.code == 0

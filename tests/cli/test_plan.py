@@ -106,14 +106,6 @@ def test_a_plan_that_fails_is_exit_1(urmpipe: RunCommand) -> None:
     ]
 
 
-def test_help_has_examples(urmpipe: RunCommand) -> None:
-    ran = urmpipe("plan", "--help")
-    assert ran.code == 0
-    examples = ran.out.partition("Examples:\n")[2].partition("\n\n")[0].splitlines()
-    assert len(examples) == 5
-    assert all(line.startswith("    urmpipe plan ") for line in examples)
-
-
 @pytest.mark.slow
 def test_start_chooses_the_branch(urmpipe: RunCommand, folder: Path) -> None:
     """The elbow of ur5e up or down at the first sample."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +27,15 @@ def answer(capsys: Captured, code: int, *arguments: str | Path) -> dict[str, Any
     return found
 
 
-def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> None:
-    """Write the poses of joint values as a path of poses."""
+def wave(middle: Sequence[float] | FloatArray, size: float, rows: int) -> FloatArray:
+    """Return joint values that swing about a middle, each joint faster than the one before."""
+    return np.array(middle) + size * np.sin(np.outer(np.arange(rows) / rows, np.arange(1, len(middle) + 1)))
+
+
+def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> str:
+    """Write the poses of joint values as a path of poses, and return the first values as a start."""
     targets = forward_targets(load_robot(robot), q)
     quat = to_quaternions(there(targets.rotation).reshape(-1, 9), "matrix")
     table = np.column_stack([period * np.arange(len(q)), targets.position, quat])
     np.savetxt(path, table, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.16g")
+    return ",".join(map(str, q[0]))
