@@ -1,4 +1,4 @@
-"""compare on the command line: tolerances, JUnit, CSV and a baseline; all numbers are the same."""
+"""What compare writes: JSON, JUnit, CSV, recording and report agree, with a baseline too; names of files."""
 
 from __future__ import annotations
 
@@ -17,13 +17,10 @@ import numpy as np
 import pytest
 from click.shell_completion import ShellComplete
 
-import urmpipe
-from four_logs import ALLOWED, Captured, compare, lay_logs, names, recorded, said, write_log
+from four_logs import Captured, compare, lay_logs, names, recorded
 from urmpipe.main import cli, run
-from urmpipe.parameters.kinds import SYNC
-from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison.baseline import format_worse_count
 from urmpipe_pipeline.comparison.deviation import Statistics
-from urmpipe_pipeline.comparison.verdict import MIN_SHARES
 
 
 @pytest.fixture(autouse=True)
@@ -88,61 +85,6 @@ def in_json_of(told: dict[str, Any], one: Statistics) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.slow
-def test_what_is_given_replaces_the_default_tolerance_whole(capsys: Captured) -> None:
-    assert compare("bad.csv", "--json") == 1
-    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.0035, **MIN_SHARES}
-    assert compare("bad.csv", "--tolerance", "angle=5deg", "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["tolerance"] == {"angle": np.radians(5.0), **MIN_SHARES}
-    assert told["runs"][0]["delta"]["x"]["verdict"] is None
-
-
-def test_all_that_is_wrong_with_a_tolerance_is_told_at_once(capsys: Captured) -> None:
-    assert compare("good.csv", "--tolerance", "axis=3 inch,roll=1deg,norm=5mm") == 2
-    assert capsys.readouterr().err.splitlines() == [
-        f"error: tolerance (--tolerance): found 'axis=3 inch', {ALLOWED}",
-        f"error: tolerance (--tolerance): found 'roll=1deg', {ALLOWED}",
-    ]
-    assert names() == set()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "tolerance"),
-    [
-        ("[compare]\ntolerance = 0.002", {"axis": 0.002}),
-        ("tolerance = '2mm,norm=3mm'", {"axis": 0.002, "norm": 0.003}),
-        ("[compare]\ntolerance = {axis = 0.002, angle = '10mrad'}", {"axis": 0.002, "angle": 0.01}),
-        ("tolerance = {x = 0.002, coverage = '40%'}", {"x": 0.002, "coverage": 0.4}),
-        ("[compare.tolerance]\npath = '1mm'", {"path": 0.001}),
-    ],
-)
-def test_a_lab_says_its_tolerance_as_text_or_as_a_table(
-    folder: Path, capsys: Captured, text: str, tolerance: dict[str, float]
-) -> None:
-    (folder / "urmpipe.toml").write_text(text)
-    compare("good.csv", "--json")
-    assert json.loads(capsys.readouterr().out)["tolerance"] == MIN_SHARES | tolerance
-
-
-def test_a_lab_says_its_noise_for_the_calls_that_have_a_baseline(folder: Path, capsys: Captured) -> None:
-    (folder / "urmpipe.toml").write_text("noise = {axis = '2um'}")
-    assert compare("good.csv", "-q", "-o", "a.rrd") == 0
-    assert run(["compare", "a.rrd", "--baseline", "a.rrd", "--json"]) == 0
-    noise = json.loads(capsys.readouterr().out)["baseline"]["noise"]
-    assert noise == {"axis": 2e-6, **dict.fromkeys(("norm", "path", "angle", "joint"), 1e-6)}
-
-
-def test_a_table_that_is_no_tolerance_is_refused(folder: Path, capsys: Captured) -> None:
-    (folder / "urmpipe.toml").write_text("tolerance = {roll = 1, axis = {x = 1}}")
-    assert compare("good.csv", "-q") == 2
-    assert capsys.readouterr().err.splitlines() == [
-        f"error: {folder}/urmpipe.toml: key tolerance: found 'roll=1', {ALLOWED}",
-        f"""error: {folder}/urmpipe.toml: key tolerance: found "axis={{'x': '1'}}", {ALLOWED}""",
-    ]
-
-
 def test_options_complete_in_the_shell() -> None:
     shell = ShellComplete(cli, {}, "urmpipe", "_URMPIPE_COMPLETE")
     for option in ("--junit", "--csv", "--baseline", "--noise", "--tolerance"):
@@ -177,88 +119,6 @@ def test_a_verdict_of_fail_writes_all_and_bad_input_nothing_but_its_error(
     assert capsys.readouterr() == ("", "")
 
 
-def test_an_output_is_no_input_and_no_other_output(capsys: Captured) -> None:
-    assert compare("good.csv", "--csv", "good.csv", "-q") == 2
-    assert said(capsys) == (
-        "error: good.csv: found an input of this command, allowed: any other name for the table of statistics"
-    )
-    assert compare("good.csv", "--csv", "a", "--junit", "./a", "-q") == 2
-    assert said(capsys) == "error: found a as junit and as statistics; allowed: a name for each"
-    assert names() == {"a"}
-    assert [one.text for one in ET.parse("a").iter("error")] == [
-        "found a as junit and as statistics; allowed: a name for each"
-    ]
-
-
-def test_errors_replace_neither_an_operand_nor_a_file_of_another(folder: Path) -> None:
-    assert compare("good.csv", "-q", "--junit", "v.xml") == 0
-    (folder / "other.xml").write_text("<testsuites/>")
-    before = {name: (folder / name).read_bytes() for name in ("v.xml", "other.xml")}
-    for wrong in (["v.xml", "--junit", "v.xml"], ["v.xml", "--junit=./v.xml"], ["--junit=other.xml"]):
-        assert run(["compare", "wanted.csv", "--nosuch", *wrong]) == 2
-    assert {name: (folder / name).read_bytes() for name in before} == before
-    (folder / "urmpipe.toml").write_text("robot = ur5e")
-    assert run(["compare", "wanted.csv", "good.csv", "-q", "--junit=v.xml"]) == 2
-    (error,) = ET.parse("v.xml").iter("error")
-    assert f"{folder / 'urmpipe.toml'}:1: not valid TOML" in str(error.text)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("flags", [("-q",), ("-q", "--json")])
-def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[str, ...]) -> None:
-    assert compare("good.csv", *flags) == 0
-    assert capsys.readouterr().err == ""
-    assert compare("bad.csv", *flags) == 1
-    out, err = capsys.readouterr()
-    assert bool(out) == ("--json" in flags)
-    said = "FAIL  bad out of tolerance against wanted, by the joints on both sides"
-    assert err.startswith(f"{said}\n      Furthest out: bad\n      Decided by: |Δ")
-    assert all(line.startswith("      ") for line in err.splitlines()[1:])
-
-
-def test_a_path_held_against_a_log_is_not_said_to_have_joints(capsys: Captured) -> None:
-    rows = "".join(f"{0.01 * k:.2f},0.3,{0.001 * k:.3f},0.4\n" for k in range(40))
-    Path("asked.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
-    assert run(["compare", "good.csv", "asked.csv", "--robot", "ur5e"]) == 1
-    first = capsys.readouterr().out.splitlines()[0]
-    said = "FAIL  asked out of tolerance against good, by the joints of the reference"
-    assert first == (
-        f"{said}; coverage 39.5 % of 90 % needed, longest unseen: 0.600 s from t = 0.395 s of the reference"
-    )
-    assert run(["compare", "asked.csv", "good.csv", "--robot", "ur5e"]) == 1
-    first = capsys.readouterr().out.splitlines()[0]
-    assert first.startswith("FAIL  good out of tolerance against asked; judged 15.1 % of 50 % needed,")
-
-
-def test_tolerances_add_up(capsys: Captured) -> None:
-    assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "norm=2mm", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002, **MIN_SHARES}
-    assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "axis=2mm") == 2
-
-
-@pytest.mark.parametrize("offset", ["0.2", "200ms", "0.2 s", "-200 ms"])
-def test_an_offset_of_clocks_may_have_its_unit(offset: str) -> None:
-    seconds = SYNC.read(offset)
-    assert abs(seconds) == 0.2
-    assert (seconds < 0.0) == offset.startswith("-")
-
-
-def test_results_are_operands_of_the_function() -> None:
-    before = urmpipe.compare("wanted.csv", ["good.csv"], robot="ur5e")
-    now = urmpipe.compare(before, baseline=before, noise=0.0, junit="v.xml", csv="v.csv")
-    assert now.verdict == "pass"
-    assert now.baseline is not None
-    assert (now.baseline.worse, now.baseline.noise["axis"]) == ((), 0.0)
-    assert names() == {"v.xml", "v.csv"}
-    with pytest.raises(OptionError) as error:
-        urmpipe.compare(before)
-    wanted = "found a comparison as the reference, allowed: with a baseline, and without logs"
-    assert str(error.value) == wanted
-    with pytest.raises(OptionError) as error:
-        urmpipe.compare(before, baseline=before, output="a.rrd")
-    assert str(error.value) == "output (--output): found a.rrd with an existing comparison, allowed: without"
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
 def test_a_log_whose_name_is_no_text_is_compared_recorded_and_reported(capsys: Captured) -> None:
@@ -270,6 +130,43 @@ def test_a_log_whose_name_is_no_text_is_compared_recorded_and_reported(capsys: C
     assert "gut?" in Path("gut.html").read_text(encoding="utf-8")
     assert run(["ingest", "gut\udcfc.csv", "--robot", "ur5e", "-q"]) == 0
     assert Path("gut\ufffd.rrd").is_file()
+
+
+@pytest.mark.slow
+def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    (folder / "good.csv").write_bytes((folder / "slack.csv").read_bytes())
+    assert compare("good.csv", "-q", "-o", "now.rrd") == 0
+    capsys.readouterr()
+    assert run(["compare", "now.rrd", "--baseline", "before.rrd", "--json", "--junit", "v.xml"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert (told["verdict"], told["recording"], told["baseline"]["verdict"]) == ("fail", "now.rrd", "fail")
+    assert told["baseline"]["recording"] == "before.rrd"
+    x = next(one for one in told["baseline"]["changes"] if one["quantity"] == "x")
+    before, now = (recorded(name).runs[0] for name in ("before.rrd", "now.rrd"))
+    assert x["max"] == {"before": before.statistics["x"].max, "now": now.statistics["x"].max}
+    assert x["largest_change"] == np.abs(now.delta[:, 0] - before.delta[:, 0]).max()
+    types = {one.get("type") for one in ET.parse("v.xml").iter("failure")}
+    assert types == {"worse-than-baseline"}
+    assert names() == {"before.rrd", "now.rrd", "v.xml"}
+    assert compare("good.csv", "--baseline", "before.rrd", "-q") == 1
+    assert recorded("now.rrd").baseline is None
+    kept = recorded("good-against-wanted.rrd").baseline
+    assert kept is not None and (kept.verdict, kept.recording) == ("fail", Path("before.rrd"))
+
+
+@pytest.mark.slow
+def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    noise = ["--noise", "50um,angle=1deg,joint=1deg"]
+    assert compare("slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd", *noise) == 1
+    assert run(["report", "now.rrd", "-q"]) == 0
+    page = Path("now.html").read_text(encoding="utf-8")
+    assert "<title>FAIL: slack-against-wanted" in page
+    assert ", by the joints on both sides, but worse than the baseline good-against-wanted" in page
+    assert "Against the baseline good-against-wanted" in page
+    held = recorded("now.rrd").baseline
+    assert held is not None and format_worse_count(held) in page
 
 
 NARROW = """
@@ -305,30 +202,3 @@ def test_no_output_is_too_narrow_for_a_name_or_a_sign() -> None:
     for told, found in (printed[:2], printed[2:]):
         assert told.startswith(rb"PASS  gut\udcfc within tolerance against wanted")
         assert json.loads(found)["runs"][0]["name"] == "gut\udcfc"
-
-
-def test_all_that_is_wrong_with_any_log_is_told_at_once(capsys: Captured) -> None:
-    assert compare("no.csv", "good.csv", "none.csv", "none.csv") == 2
-    assert capsys.readouterr().err.splitlines() == [
-        "error: no.csv: found no such file",
-        "error: none.csv: found no such file",
-    ]
-    t = 0.005 * np.arange(200)
-    for name in ("still", "rest"):
-        write_log(f"{name}.csv", t, np.full((200, 6), 0.5))
-    assert compare("still.csv", "good.csv", "rest.csv", "--sync", "auto") == 2
-    errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
-    assert [line.split(":")[1] for line in errors] == [" still.csv", " rest.csv"]
-    assert all("sync (--sync): auto: found no motion of the joints in this log" in line for line in errors)
-
-
-def test_strict_names_the_log_of_each_warning(capsys: Captured) -> None:
-    for name in ("good", "slack"):
-        lines = Path(f"{name}.csv").read_text().splitlines()
-        Path(f"{name}.csv").write_text("\n".join([lines[0].replace(" [rad]", ""), *lines[1:]]))
-    assert compare("good.csv", "slack.csv", "--strict") == 2
-    said = "no unit is given for q1, q2, q3, q4, q5, q6: the joints are taken as rad; --unit deg"
-    assert capsys.readouterr().err.splitlines() == [
-        "error: strict (--strict): found 2 warnings, allowed: none",
-        *(f"error: {name}: {said} overrides this" for name in ("good", "slack")),
-    ]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import cache
 from io import StringIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from urmpipe.main import run
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -17,37 +15,24 @@ from urmpipe_pipeline.results import read_recording
 
 Captured = pytest.CaptureFixture[str]
 
-NOISE = (
-    "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
-    " m of a joint that slides)"
-)
-"""What a noise may be."""
-
-ALLOWED = f"{NOISE}, coverage=, judged= (least shares, %)"
-"""What a tolerance may be."""
-
 
 def lay_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Enter a folder with a reference and three logs: within tolerance, a little worse, out of it."""
     monkeypatch.chdir(tmp_path)
     for name, off in (("wanted", 0.0), ("good", 0.0005), ("slack", 0.0006), ("bad", 0.02)):
-        Path(f"{name}.csv").write_text(_log(off), encoding="utf-8")
+        Path(f"{name}.csv").write_text(log_text(off), encoding="utf-8")
     return tmp_path
 
 
 @cache
-def _log(off: float) -> str:
+def log_text(off: float) -> str:
     """Return the text of a log that differs by so much from the one that is wanted."""
     t, text = 0.005 * np.arange(200), StringIO()
     q = np.cos(np.outer(t, 0.5 + 0.1 * np.arange(6)))
-    write_log(text, t, q - off * np.sin(t)[:, np.newaxis])
-    return text.getvalue()
-
-
-def write_log(name: str | StringIO, t: NDArray[Any], q: NDArray[Any]) -> None:
-    """Write a log of six joints."""
     header = "t [s]," + ",".join(f"q{i} [rad]" for i in range(1, 7))
-    np.savetxt(name, np.column_stack([t, q]), fmt="%.9f", delimiter=",", header=header, comments="")
+    table = np.column_stack([t, q - off * np.sin(t)[:, np.newaxis]])
+    np.savetxt(text, table, fmt="%.9f", delimiter=",", header=header, comments="")
+    return text.getvalue()
 
 
 def compare(*arguments: str) -> int:
@@ -60,11 +45,6 @@ def recorded(name: str) -> Comparison:
     result = read_recording(Path(name))
     assert isinstance(result, Comparison)
     return result
-
-
-def said(capsys: Captured) -> str:
-    """Return the last line on standard error."""
-    return capsys.readouterr().err.splitlines()[-1]
 
 
 def names() -> set[str]:
