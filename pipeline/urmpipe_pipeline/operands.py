@@ -37,14 +37,14 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.sources import Held, ReadOptions
+from urmpipe_pipeline.sources import MemoryTable, ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
 
 NOT_A_RUN = "found the recording of {}, allowed: one that ingest wrote"
 BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
 BASELINE_HINT = Hint("baseline", None, "compares it, alone, with an earlier one")
 
-Operand: TypeAlias = Path | Held | RunLike | Simulation
+Operand: TypeAlias = Path | MemoryTable | RunLike | Simulation
 
 MAX_VALUE = 1e12  # m or rad; larger doubles have a last digit of 0.1 mm, and powers that overflow
 
@@ -91,7 +91,7 @@ def load_runs(
         if isinstance(operand, Path) and _is_recording(operand):
             operand = _read_run_like(operand, comparison_hints)
         try:
-            if isinstance(operand, (Path, Held)):
+            if isinstance(operand, (Path, MemoryTable)):
                 run = _ingest(operand, replace(read, side=side), robot, tsp, derivative)
             elif isinstance(operand, Simulation):
                 from urmpipe_pipeline.simulations.motion import run_of_block  # few operands are simulations
@@ -129,13 +129,17 @@ def load_runs(
 
 
 def _ingest(
-    log: Path | Held, read: ReadOptions, robot: Chain | None, tsp: float | None, derivative: Method | None
+    log: Path | MemoryTable,
+    read: ReadOptions,
+    robot: Chain | None,
+    tsp: float | None,
+    derivative: Method | None,
 ) -> Run:
     """Return the run of a log, a folder, or a side of a log."""
-    files = [log] if isinstance(log, Held) else log_files(log)
+    files = [log] if isinstance(log, MemoryTable) else log_files(log)
     name = log.resolve().name if isinstance(log, Path) and log.is_dir() else None
     if read.side is not None:
-        name = f"{log.name if isinstance(log, Held) else log.resolve().stem} ({read.side[0]})"
+        name = f"{log.name if isinstance(log, MemoryTable) else log.resolve().stem} ({read.side[0]})"
     return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
 
 
@@ -269,7 +273,7 @@ def _read_run_like(path: Path, comparison_hints: Sequence[Hint]) -> RunLike | Si
 
 
 def recording_to_run(
-    files: Sequence[Path | Held], robot: Chain | None, reading: Mapping[str, object]
+    files: Sequence[Path | MemoryTable], robot: Chain | None, reading: Mapping[str, object]
 ) -> Run | None:
     """Return the run of a recording, with another arm if one is given; None for logs, which are to be read.
 
@@ -317,7 +321,7 @@ def load_comparison(operand: Path) -> Comparison | None:
 
 def is_log(operand: object) -> bool:
     """Return whether an operand is a log that is to be read."""
-    return isinstance(operand, Held) or (isinstance(operand, Path) and not _is_recording(operand))
+    return isinstance(operand, MemoryTable) or (isinstance(operand, Path) and not _is_recording(operand))
 
 
 def _is_recording(operand: Path) -> bool:

@@ -39,7 +39,7 @@ from urmpipe_pipeline.outputs import HEAD, PATH_ROW
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planning import joints_of, plan_path
-from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing, refuse_unlimited
+from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing, require_limits
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.solved_targets.request import JointValues, start_of
@@ -118,7 +118,7 @@ def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Re
         raise OptionError(Finding(parameter="robot", found="none", allowed="an arm with masses and drives"))
     parts: tuple[Callable[[], Any], ...] = (
         lambda: start_of(arm, start),
-        lambda: refuse_unlimited(timing, arm),
+        lambda: require_limits(timing, arm),
         lambda: _check_drives(arm),
     )
     begin, _, _ = map_collecting_errors(lambda make: make(), parts)

@@ -44,7 +44,7 @@ from urmpipe_pipeline.results import present, read_recording, result_kind
 from urmpipe_pipeline.runs.recorded_tcp import MISSING_TOOL
 from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.sources import Held, ReadOptions, TableLike, held_of, is_table
+from urmpipe_pipeline.sources import MemoryTable, ReadOptions, TableLike, dataframe_to_table, is_table
 from urmpipe_pipeline.tables.csv_files import write_table
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 
@@ -171,7 +171,7 @@ def normalise_operands(operands: Mapping[str, Sequence[Any]], *further: type) ->
     Raises:
         OptionError: With everything that is not an operand.
     """
-    types = (RunLike, Simulation, Held, *further)
+    types = (RunLike, Simulation, MemoryTable, *further)
     named = {name: list(_with_tables(name.removesuffix("s"), values)) for name, values in operands.items()}
     map_collecting_errors(lambda item: check_types(*item, types, OPERANDS), named.items())
     return [operand for values in named.values() for operand in values]
@@ -181,7 +181,7 @@ def _with_tables(name: str, operands: Sequence[Any]) -> Iterator[Any]:
     """Yield operands, the tables among them as logs with this name, and a number if there are several."""
     for k, operand in enumerate(operands, start=1):
         label = f"{name} {k}" if len(operands) > 1 else name
-        yield held_of(operand, label) if is_table(operand) else operand
+        yield dataframe_to_table(operand, label) if is_table(operand) else operand
 
 
 def _check_log_parameters(operands: Sequence[Any], values: Mapping[str, Any]) -> None:
@@ -192,7 +192,7 @@ def _check_log_parameters(operands: Sequence[Any], values: Mapping[str, Any]) ->
 
 
 def _compare(
-    operands: Sequence[Path | str | Held | RunLike | Simulation | Comparison],
+    operands: Sequence[Path | str | MemoryTable | RunLike | Simulation | Comparison],
     load: Callable[..., list[Run]],
     options: CompareOptions | IsoOptions,
     checked: Callable[[Comparison], Comparison],

@@ -28,7 +28,7 @@ from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.operands import load_comparison
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions, held_of_arrays
+from urmpipe_pipeline.sources import ReadOptions, arrays_to_table
 from urmpipe_pipeline.trajectories import Trajectory
 
 SAME_POSITION = 1e-9  # m; rounding of positions that the joints of a reference determine
@@ -150,7 +150,7 @@ def _reference_run(reference: Trajectory, run: Run, tcp: str) -> Run:
         assert robot is not None and reference.q is not None
         by_joints = bool(np.nanmax(np.abs(positions_over_log(robot, reference.q) - position)) < SAME_POSITION)
     poses = position if reference.quat_xyzw is None else np.hstack([position, reference.quat_xyzw])
-    table = held_of_arrays(
+    table = arrays_to_table(
         reference.t if run.timed else None,
         reference.q if by_joints else None,
         None if by_joints else poses,

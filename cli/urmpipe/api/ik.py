@@ -23,7 +23,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import check_output, safe_output
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
-from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, start_of
+from urmpipe_pipeline.solved_targets.request import Request, check_request, start_of
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
@@ -71,7 +71,7 @@ def ik(
     search = SearchOptions(*(values[name] for name in ("tolerance", "restarts", "seed")))
     start = start_of(arm, values["start"])
     request = Request(arm, rows, start, values["every"], values["within_pi"], values["method"], search)
-    refuse_unsolvable(request, recorded=kind == "recording")
+    check_request(request, recorded=kind == "recording")
 
     files = as_paths(targets) if isinstance(targets, (str, Path)) else []
     kept = [*files, *map_files(values), *values["inputs"]]

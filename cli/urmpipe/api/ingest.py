@@ -23,7 +23,7 @@ from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.presenter import audit_rows
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import Held, TableLike, held_of, held_of_arrays, is_table
+from urmpipe_pipeline.sources import MemoryTable, TableLike, arrays_to_table, dataframe_to_table, is_table
 from urmpipe_pipeline.tables.csv_files import write_table
 
 LOG_ALLOWED = "a file, several of one log, a folder of them, a DataFrame or Arrow table, or arrays by t=, q="
@@ -70,7 +70,7 @@ def ingest(
     resolved, (files, folder) = map_collecting_errors(lambda part: part(), parts)
     read = resolved.options
     if not files:
-        table = held_of_arrays(t, q, recorded_tcp, read.names, name or IN_MEMORY, resolved.arm, read.unit)
+        table = arrays_to_table(t, q, recorded_tcp, read.names, name or IN_MEMORY, resolved.arm, read.unit)
         files, read = [table], replace(read, names=())
     outputs: dict[OutputKind, PathLike | None] = {
         "recording": values["output"], "audit": values["audit"], "map": values["write_map"],
@@ -93,7 +93,7 @@ def ingest(
         return written.recorded(run, values["progress"])
 
 
-def _files_and_name(log: Any, arrays: Mapping[str, Any]) -> tuple[list[Path | Held], str | None]:
+def _files_and_name(log: Any, arrays: Mapping[str, Any]) -> tuple[list[Path | MemoryTable], str | None]:
     """Return the files of a log, or its table, and the name of its folder; no files if arrays are given."""
     names = [name for name, array in arrays.items() if array is not None]
     if log is not None and names:
@@ -101,7 +101,7 @@ def _files_and_name(log: Any, arrays: Mapping[str, Any]) -> tuple[list[Path | He
     if names:
         return [], None
     if is_table(log):
-        return [held_of(log, IN_MEMORY)], None
+        return [dataframe_to_table(log, IN_MEMORY)], None
     operands = [] if log is None else as_list(log)
     check_types("log", operands, (), LOG_ALLOWED)
     paths = [Path(operand) for operand in operands]

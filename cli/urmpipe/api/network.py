@@ -30,7 +30,7 @@ from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import TableLike, held_of
+from urmpipe_pipeline.sources import TableLike, dataframe_to_table
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
@@ -195,7 +195,7 @@ def _read_log(
         return log
     controls = [control.name for control in network.controls if control.value is None]
     names = [str(column) for column in drives.values() if is_word(column)] or controls
-    operand = Path(log) if isinstance(log, (str, Path)) else held_of(log, "log")
+    operand = Path(log) if isinstance(log, (str, Path)) else dataframe_to_table(log, "log")
     load = partial(load_runs, [operand], tsp=values["tsp"], derivative=values["derivative"])
     if names and values["joints"] is None:
         with suppress(LogError):  # the log has other joints: reading it without names reports its faults

@@ -28,7 +28,7 @@ from urmpipe_pipeline.planned_paths.request import (
     Request,
     Timing,
     checked_timing,
-    refuse_unlimited,
+    require_limits,
 )
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import write_recording
@@ -97,7 +97,7 @@ def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Re
     """Return the request; raise an `OptionError` if the arm suits neither the start nor the law."""
     parts: tuple[Callable[[], Any], ...] = (
         lambda: _start(arm, start),
-        lambda: refuse_unlimited(timing, arm),
+        lambda: require_limits(timing, arm),
     )
     start_values, _ = map_collecting_errors(lambda part: part(), parts)
     return Request(arm, start_values, timing)

@@ -44,7 +44,7 @@ def write_map_part(run: Run, part: Path, path: Path, robot: str | None) -> None:
     elif Path(robot).suffix:
         robot = os.path.relpath(robot, path.parent)
     frames = (arm.base, arm.tool) if arm else ()
-    given = run.provenance.options.get("read") or {}
-    text = map_of(run.log, robot, *(offset_of(frame) for frame in frames), given=given)
+    options = run.provenance.options.get("read") or {}
+    text = map_of(run.log, robot, *(offset_of(frame) for frame in frames), given=options)
     part.write_text(text, encoding="utf-8", newline="\n")
     read_map(part)

@@ -74,7 +74,7 @@ def checked_timing(timing: Timing) -> Timing:
     return timing
 
 
-def refuse_unlimited(timing: Timing, arm: Chain | None) -> None:
+def require_limits(timing: Timing, arm: Chain | None) -> None:
     """Raise an `OptionError` if the law of limits lacks some of them."""
     if faults := [*_without_limits(timing, arm)]:
         raise OptionError(*faults)

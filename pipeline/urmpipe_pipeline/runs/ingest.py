@@ -42,7 +42,7 @@ from urmpipe_pipeline.runs.torques import (
     mass_warnings,
     torque_warnings,
 )
-from urmpipe_pipeline.sources import Held, ReadOptions
+from urmpipe_pipeline.sources import MemoryTable, ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
 from urmpipe_pipeline.sources.read import read_numbers
 
@@ -58,7 +58,7 @@ ROBOT_WARNINGS = (  # kinds that depend on the robot
 
 @np.errstate(over="ignore", invalid="ignore")  # huge numbers in a log: their squares and steps are infinite
 def ingest_log(
-    files: Sequence[Path | Held],
+    files: Sequence[Path | MemoryTable],
     *,
     robot: Chain | None = None,
     read: ReadOptions | None = None,

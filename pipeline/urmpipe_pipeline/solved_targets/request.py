@@ -67,7 +67,7 @@ class Request:
         return options | ({} if self.start is None else {"start": self.start.tolist()})
 
 
-def refuse_unsolvable(request: Request, *, recorded: bool) -> None:
+def check_request(request: Request, *, recorded: bool) -> None:
     """Raise an `OptionError` with every option that makes no sense, alone or with a path."""
     faults = [*_bad_values(request)]
     if not faults and request.given.t_ns is not None:

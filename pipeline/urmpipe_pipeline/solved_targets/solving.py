@@ -39,7 +39,7 @@ def solve_targets(request: Request, progress: Progress = None) -> IkResult:
     """Return the solutions of targets, each for itself or along a path, with all that a person should know.
 
     Args:
-        request: What is to be solved; `refuse_unsolvable` has checked it.
+        request: What is to be solved; `check_request` has checked it.
         progress: Called with the share of solving that is done, 0..1.
     """
     t_ns = request.given.t_ns

@@ -8,18 +8,18 @@ The words by which columns, units and sources are known are in `vocabulary.toml`
 from urmpipe_pipeline.sources.log_map import LogMap, map_of, read_map
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.read import read_log
-from urmpipe_pipeline.sources.tables.frames import TableLike, held_of, is_table
-from urmpipe_pipeline.sources.tables.given_arrays import held_of_arrays
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.frames import TableLike, dataframe_to_table, is_table
+from urmpipe_pipeline.sources.tables.given_arrays import arrays_to_table
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.opening import source_names
 
 __all__ = [
-    "Held",
     "LogMap",
+    "MemoryTable",
     "ReadOptions",
     "TableLike",
-    "held_of",
-    "held_of_arrays",
+    "arrays_to_table",
+    "dataframe_to_table",
     "is_table",
     "map_of",
     "read_log",

@@ -15,7 +15,7 @@ from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
-from urmpipe_pipeline.sources.tables.held import Held, fingerprint_of
+from urmpipe_pipeline.sources.tables.held import MemoryTable, fingerprint_of
 from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
 from urmpipe_pipeline.sources.tables.own_tables import roles_of
 from urmpipe_pipeline.sources.tables.reachable import unchanged
@@ -53,7 +53,7 @@ class Reading:
 
 
 def read_numbers(
-    files: Sequence[Path | Held], options: ReadOptions | None = None, robot: Chain | None = None
+    files: Sequence[Path | MemoryTable], options: ReadOptions | None = None, robot: Chain | None = None
 ) -> Reading:
     """Return the numbers of a log; arguments and errors are those of `read_log`."""
     options = options or ReadOptions()
@@ -69,7 +69,7 @@ def read_numbers(
 
 
 def read_log(
-    files: Sequence[Path | Held], options: ReadOptions | None = None, robot: Chain | None = None
+    files: Sequence[Path | MemoryTable], options: ReadOptions | None = None, robot: Chain | None = None
 ) -> JointLog:
     """Return a log as its files have it, in SI.
 
@@ -96,12 +96,12 @@ def _with_own_clock(tables: Tables, options: ReadOptions) -> ReadOptions:
     return options if called else replace(options, time=str(times[0] + 1))
 
 
-def _fingerprint(file: Path | Held) -> SourceFile:
-    return fingerprint_of(file) if isinstance(file, Held) else fingerprint(file)
+def _fingerprint(file: Path | MemoryTable) -> SourceFile:
+    return fingerprint_of(file) if isinstance(file, MemoryTable) else fingerprint(file)
 
 
-def _name(files: Sequence[Path | Held]) -> str:
+def _name(files: Sequence[Path | MemoryTable]) -> str:
     """Return the stem of the only file, or what the stems of several share at their beginning."""
-    stems = [file.name if isinstance(file, Held) else file.stem for file in files]
+    stems = [file.name if isinstance(file, MemoryTable) else file.stem for file in files]
     shared = os.path.commonprefix(stems)  # noqa: RUF071 (stems, not paths)
     return stems[0] if len(stems) == 1 else shared.strip(" _-.,()[]#") or stems[0]

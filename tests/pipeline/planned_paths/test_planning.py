@@ -30,7 +30,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.planned_paths.planning import plan_path
-from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing, refuse_unlimited
+from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing, require_limits
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 KEPT = 1.0 + 1e-9
@@ -400,7 +400,7 @@ def test_what_is_told_of_limits() -> None:
 
 def refused(arm: Chain | None = None, **timing: Any) -> list[str]:
     with pytest.raises(OptionError) as raised:
-        refuse_unlimited(checked_timing(Timing(**timing)), arm)
+        require_limits(checked_timing(Timing(**timing)), arm)
     return [str(one) for one in raised.value.findings]
 
 

@@ -19,7 +19,7 @@ from asserting import refusal
 from urmpipe_models.errors import LogError, UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import Held, ReadOptions, held_of, held_of_arrays, read_log
+from urmpipe_pipeline.sources import MemoryTable, ReadOptions, arrays_to_table, dataframe_to_table, read_log
 
 OF_TEXT = ("encoding", "delimiter", "decimal sign", "header", "significant digits")
 """What only a text can tell."""
@@ -37,7 +37,7 @@ class Outcome:
     said: tuple[Any, ...]
 
 
-def outcome(log: Path | Held, options: ReadOptions | None = None) -> Outcome:
+def outcome(log: Path | MemoryTable, options: ReadOptions | None = None) -> Outcome:
     """Return what became of a log; of an error its findings, but for file and line."""
     try:
         run = ingest_log([log], read=options)
@@ -108,9 +108,9 @@ def test_what_python_holds_reads_as_its_csv(frame: pd.DataFrame) -> None:
         frame.to_csv(csv, index=False)
         frame.to_parquet(parquet, index=False)
         wanted = outcome(csv)
-        held: dict[str, Path | Held] = {
-            "frame": held_of(frame, "log"),
-            "Arrow": held_of(pa.Table.from_pandas(frame, preserve_index=False), "log"),
+        held: dict[str, Path | MemoryTable] = {
+            "frame": dataframe_to_table(frame, "log"),
+            "Arrow": dataframe_to_table(pa.Table.from_pandas(frame, preserve_index=False), "log"),
             "Parquet": parquet,
         }
         for what, one in held.items():
@@ -119,7 +119,7 @@ def test_what_python_holds_reads_as_its_csv(frame: pd.DataFrame) -> None:
 
 def log_of(frame: Any, **options: Any) -> JointLog:
     """Return the log that a table in Python is."""
-    return read_log([held_of(frame, "log")], ReadOptions(**options))
+    return read_log([dataframe_to_table(frame, "log")], ReadOptions(**options))
 
 
 def test_float32_is_read_as_it_is_and_its_clock_by_its_digits() -> None:
@@ -194,7 +194,9 @@ def test_lists_of_many_lengths_are_no_joints() -> None:
 
 def test_structs_are_flattened_by_points() -> None:
     state = [{"q": row, "mode": "run"} for row in Q.tolist()]
-    log = read_log([held_of(pa.table({"t": T, "state": state}), "log")], ReadOptions(unit={"": "rad"}))
+    log = read_log(
+        [dataframe_to_table(pa.table({"t": T, "state": state}), "log")], ReadOptions(unit={"": "rad"})
+    )
     assert log.joints == ("state.q_1", "state.q_2", "state.q_3")
     assert (log.q == Q).all()
 
@@ -241,7 +243,7 @@ def test_tables_without_joints_are_one_line(frame: pd.DataFrame, said: str) -> N
 def test_twins_are_asked_about_as_in_a_csv(tmp_path: Path) -> None:
     frame = pd.DataFrame(np.column_stack([T, Q]), columns=["t", "q1", "q2", "q1"])
     frame.to_csv(tmp_path / "log.csv", index=False)
-    assert outcome(held_of(frame, "log")) == outcome(tmp_path / "log.csv")
+    assert outcome(dataframe_to_table(frame, "log")) == outcome(tmp_path / "log.csv")
     assert (log_of(frame, joints=("4", "3"), unit="rad").q == Q[:, [2, 1]]).all()
 
 
@@ -275,7 +277,7 @@ ARRAYS: Sequence[tuple[str, Any, Any]] = [
 
 @pytest.mark.parametrize(("what", "t", "q"), ARRAYS)
 def test_arrays_are_a_log(what: str, t: Any, q: Any) -> None:
-    log = read_log([held_of_arrays(t, q, None, (), "log", None, ())])
+    log = read_log([arrays_to_table(t, q, None, (), "log", None, ())])
     assert (log.q == Q).all()
     assert log.t_ns.tolist() == [5_000_000 * k for k in range(300)]
     assert (log.joints, log.warnings) == (("q1", "q2", "q3"), ())
@@ -292,7 +294,7 @@ def test_arrays_read_as_their_csv(joints: int, rows: int, period: float, wraps: 
         names = ["t [s]", *(f"q{k + 1} [rad]" for k in range(joints))]
         pd.DataFrame(np.column_stack([t, q]), columns=names).to_csv(Path(name) / "log.csv", index=False)
         wanted = outcome(Path(name) / "log.csv")
-    found = outcome(held_of_arrays(t, q, None, (), "log", None, ()))
+    found = outcome(arrays_to_table(t, q, None, (), "log", None, ()))
     assert found.arrays == wanted.arrays
     assert bool(found.arrays) == (len(wanted.said) == 6)
     for one, other in zip(found.said[3:5], wanted.said[3:5], strict=True):  # audit and warnings
@@ -301,5 +303,5 @@ def test_arrays_read_as_their_csv(joints: int, rows: int, period: float, wraps: 
 
 def test_masked_samples_are_missing() -> None:
     q = np.ma.masked_array(Q, mask=np.arange(900).reshape(300, 3) == 4)
-    log = read_log([held_of_arrays(T, q, None, (), "log", None, ())])
+    log = read_log([arrays_to_table(T, q, None, (), "log", None, ())])
     assert np.argwhere(np.isnan(log.q)).tolist() == [[1, 1]]

@@ -15,7 +15,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_log, read_map
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.smoothness import flat_ways, goes_along_rows
 
 Read = Callable[..., JointLog]
@@ -136,7 +136,7 @@ def test_missing_samples_stay(read: Read) -> None:
 
 def test_a_table_in_memory() -> None:
     q = motion()
-    columns = Held("q", pa.table({str(k): column for k, column in enumerate(q)}), named=False)
+    columns = MemoryTable("q", pa.table({str(k): column for k, column in enumerate(q)}), named=False)
     assert asked(lambda: read_log([columns]))[1] == ["transposed", "table"]
     np.testing.assert_array_equal(read_log([columns], ReadOptions(layout="transposed")).q, q)
 

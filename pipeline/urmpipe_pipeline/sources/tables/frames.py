@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 
 import pyarrow as pa
 
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result, told_in
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def is_table(value: object) -> TypeGuard[TableLike]:
     return hasattr(value, "columns") and hasattr(value, "__arrow_c_stream__")
 
 
-def held_of(table: Any, name: str) -> Held:
+def dataframe_to_table(table: Any, name: str) -> MemoryTable:
     """Return a table of Python as one in memory.
 
     Of a DataFrame an index that may be a time becomes the first column: dates, lengths of time, texts,
@@ -43,12 +43,12 @@ def held_of(table: Any, name: str) -> Held:
     """
     if not _is_frame(table):
         arrow = pa.table(table)
-        return Held(name, of_result(index_first(arrow), attributes_of(arrow.schema.metadata)))
+        return MemoryTable(name, of_result(index_first(arrow), attributes_of(arrow.schema.metadata)))
     columns = [*_index(table), *((_name(column), table.iloc[:, k]) for k, column in enumerate(table.columns))]
     arrays = [_array(values) for _, values in columns]
     arrow = pa.Table.from_arrays(arrays, names=[label for label, _ in columns])
     told = table.attrs.get(MARK) or {}
-    return Held(name, of_result(arrow, told), named=not _is_numbered(table.columns))
+    return MemoryTable(name, of_result(arrow, told), named=not _is_numbered(table.columns))
 
 
 def _is_frame(table: object) -> TypeGuard[pd.DataFrame]:

@@ -15,7 +15,7 @@ from urmpipe_models.errors import Finding, OptionError, format_value, map_collec
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import ROLE, UNIT
 from urmpipe_pipeline.sources.tables.frames import is_table
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.own_tables import FORM, GIVEN
 
 TIMES = "n times in s, or datetime64 or timedelta64"
@@ -27,7 +27,7 @@ POSITION, QUATERNION = ("tcp_x", "tcp_y", "tcp_z"), ("tcp_qx", "tcp_qy", "tcp_qz
 Array = NDArray[Any]
 
 
-def held_of_arrays(
+def arrays_to_table(
     t: Any,
     q: Any,
     recorded_tcp: Any,
@@ -35,7 +35,7 @@ def held_of_arrays(
     name: str,
     robot: Chain | None,
     units: Collection[str],
-) -> Held:
+) -> MemoryTable:
     """Return arrays as a table in memory: t, the joints, and x, y, z and the orientation of the tool.
 
     Args:
@@ -78,7 +78,9 @@ def held_of_arrays(
         pa.field(label, array.type, metadata={UNIT: "" if label in units else unit, ROLE: role})
         for (label, unit, role, _), array in zip(columns, arrays, strict=True)
     ]
-    return Held(name, pa.Table.from_arrays(arrays, schema=pa.schema(fields, {GIVEN: "", FORM: "quat_xyzw"})))
+    return MemoryTable(
+        name, pa.Table.from_arrays(arrays, schema=pa.schema(fields, {GIVEN: "", FORM: "quat_xyzw"}))
+    )
 
 
 def _times(t: Any) -> Array | None:

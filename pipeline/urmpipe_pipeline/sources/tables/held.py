@@ -50,7 +50,7 @@ Number = TypeVar("Number", np.float64, np.int64, np.uint64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Held:
+class MemoryTable:
     """A table in memory.
 
     Attributes:
@@ -73,7 +73,7 @@ class Held:
         return self.path or Path(self.name)
 
 
-def layout_of(held: Held) -> Layout:
+def layout_of(held: MemoryTable) -> Layout:
     """Return a table in memory as one that is written somewhere: its first rows as a CSV file has them.
 
     Raises:
@@ -104,7 +104,7 @@ def layout_of(held: Held) -> Layout:
     )
 
 
-def _refuse_empty(held: Held, table: pa.Table) -> None:
+def _refuse_empty(held: MemoryTable, table: pa.Table) -> None:
     """Raise a `LogError` if a table has no row, or none of its columns holds a number."""
     file = str(held.place)
     if not held.columns.num_rows or not held.columns.num_columns:
@@ -115,7 +115,7 @@ def _refuse_empty(held: Held, table: pa.Table) -> None:
         raise LogError(Finding(f"found no number in {names}, allowed: one column per joint", file))
 
 
-def fingerprint_of(held: Held) -> SourceFile:
+def fingerprint_of(held: MemoryTable) -> SourceFile:
     """Return the name of a table in memory, and hash and length of its columns as Arrow streams them."""
     sink = _Hashing()
     table = held.columns.combine_chunks()

@@ -21,7 +21,7 @@ from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import UNIT
 from urmpipe_pipeline.sources.tables.exact_clock import decimals
 from urmpipe_pipeline.sources.tables.form import spread_names
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked
 from urmpipe_pipeline.sources.tables.own_tables import ORDERS, RECORDED, with_roles
 from urmpipe_pipeline.subprocess_reader import ReaderCrashError, read_in_subprocess
@@ -38,7 +38,7 @@ HEADER, COMPRESSED = 128, 15
 Arrays = Mapping[str, NDArray[Any]]
 
 
-def read_mat(path: Path, head: bytes) -> Held:
+def read_mat(path: Path, head: bytes) -> MemoryTable:
     """Return the table of a MAT file of version 5.
 
     Of variables, and of the fields of structs, those are its columns that have a value a sample: vectors, and
@@ -50,10 +50,10 @@ def read_mat(path: Path, head: bytes) -> Held:
     found = _loaded(path)
     run = found.get("run")
     if EXPORT_HEADER.encode() in head and isinstance(run, Mapping) and "rows" in run:
-        return Held(path.stem, _grid(run) if run["rows"] == "grid" else _file(run), path=path)
+        return MemoryTable(path.stem, _grid(run) if run["rows"] == "grid" else _file(run), path=path)
     simulated = found.get("simulation")
     if EXPORT_HEADER.encode() in head and isinstance(simulated, Mapping) and "values" in simulated:
-        return Held(path.stem, _signals(simulated), path=path)
+        return MemoryTable(path.stem, _signals(simulated), path=path)
     arrays = dict(_numeric(found))
     rows = _rows(arrays)
     columns = dict(_columns(arrays, rows))
@@ -66,7 +66,7 @@ def read_mat(path: Path, head: bytes) -> Held:
             f"found no numbers with one row per sample in {names}, allowed: such as t (n x 1), q (n x joints)"
         )
         raise LogError(Finding(said, str(path), hints=(hint,)))
-    return Held(path.stem, _table(columns), path=path)
+    return MemoryTable(path.stem, _table(columns), path=path)
 
 
 def _loaded(path: Path) -> dict[str, Any]:

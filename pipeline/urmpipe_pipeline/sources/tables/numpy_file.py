@@ -19,7 +19,7 @@ import pyarrow as pa
 
 from urmpipe_models.errors import Finding, Hint, LogError, python_command
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked, refuse_wide
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 from urmpipe_pipeline.sources.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
@@ -51,7 +51,7 @@ _DAMAGED = (
 Array: TypeAlias = npt.NDArray[Any]
 
 
-def read_numpy(path: Path) -> Held:
+def read_numpy(path: Path) -> MemoryTable:
     """Return the table of a .npy or .npz file. Objects are not loaded: that would run code of the file.
 
     Raises:
@@ -74,7 +74,7 @@ def read_numpy(path: Path) -> Held:
     values = dict(_columns(tables))
     times, said = _even_times(arrays, values) if named else ({}, ())
     columns = pa.table({name: column(one) for name, one in (times | values).items()})
-    return Held(path.stem, columns, named=named, path=path, inferences=said)
+    return MemoryTable(path.stem, columns, named=named, path=path, inferences=said)
 
 
 def _even_times(

@@ -14,7 +14,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
 from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
 from urmpipe_pipeline.sources.tables.conflict import refuse_among_rows, refuse_conflict
-from urmpipe_pipeline.sources.tables.held import Held, layout_of
+from urmpipe_pipeline.sources.tables.held import MemoryTable, layout_of
 from urmpipe_pipeline.sources.tables.labels import sniff_labels
 from urmpipe_pipeline.sources.tables.own_tables import in_si
 from urmpipe_pipeline.sources.tables.padding import without_end_rows
@@ -67,7 +67,9 @@ Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
 """What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
 
 
-def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
+def open_tables(
+    files: Sequence[Path | MemoryTable], options: ReadOptions, sniff_plain: Sniff = sniff
+) -> Tables:
     """Return the tables of a log's files, or of what is in memory.
 
     Raises:
@@ -114,9 +116,9 @@ def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain:
     return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, whole)
 
 
-def _opened(one: Path | Held, options: ReadOptions) -> Segment | Held:
+def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTable:
     """Return a table as it is in memory, a file of typed columns or a program read, any other as text."""
-    if isinstance(one, Held):
+    if isinstance(one, MemoryTable):
         return one
     if (typed := read_typed(one)) is not None:
         return typed
@@ -143,9 +145,9 @@ def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
         yield Inference("encoding", text.encoding, mark, hints=utf_8)
 
 
-def _layout(one: Segment | Held, options: ReadOptions, sniff_plain: Sniff) -> Layout:
+def _layout(one: Segment | MemoryTable, options: ReadOptions, sniff_plain: Sniff) -> Layout:
     """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
-    if isinstance(one, Held):
+    if isinstance(one, MemoryTable):
         return layout_of(one)
     given = options.delimiter, options.decimal
     found = None if options.delimiter else sniff_labels(one)

@@ -11,7 +11,7 @@ import pyarrow as pa
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.sources.tables.exact_clock import exact_times
 from urmpipe_pipeline.sources.tables.frames import index_first
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked
 from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result, told_in, with_roles
 
@@ -19,7 +19,7 @@ CLOCK = "clock [ns]"
 """The exact clock of our own files; their times in s, ms and us are doubles."""
 
 
-def read_parquet(path: Path, head: bytes) -> Held:
+def read_parquet(path: Path, head: bytes) -> MemoryTable:
     """Return the table of a Parquet file, of which the first bytes are given.
 
     Raises:
@@ -39,7 +39,7 @@ def read_parquet(path: Path, head: bytes) -> Held:
     return _held(path, read, "Parquet")
 
 
-def read_feather(path: Path) -> Held:
+def read_feather(path: Path) -> MemoryTable:
     """Return the table of a Feather file (Arrow IPC).
 
     Raises:
@@ -68,7 +68,7 @@ def _unpacked(about: Any) -> int:
     return sum(max(chunk.total_uncompressed_size, 8 * chunk.num_values) for chunk in chunks)
 
 
-def _held(path: Path, read: Callable[[], pa.Table], what: str) -> Held:
+def _held(path: Path, read: Callable[[], pa.Table], what: str) -> MemoryTable:
     try:
         table = read()
         table.validate()
@@ -82,8 +82,8 @@ def _held(path: Path, read: Callable[[], pa.Table], what: str) -> Held:
         raise LogError(Finding(f"{found}, allowed: as `export` wrote it", str(path)))
     if not about:
         told = attributes_of(table.schema.metadata)
-        return Held(path.stem, of_result(index_first(table), told), path=path)
-    return Held(path.stem, _ours(table, about), path=path)
+        return MemoryTable(path.stem, of_result(index_first(table), told), path=path)
+    return MemoryTable(path.stem, _ours(table, about), path=path)
 
 
 def _ours(table: pa.Table, about: Mapping[str, Any]) -> pa.Table:

@@ -17,7 +17,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_number, is_text, plain, split_line, to_float
-from urmpipe_pipeline.sources.tables.held import Held, layout_of
+from urmpipe_pipeline.sources.tables.held import MemoryTable, layout_of
 from urmpipe_pipeline.sources.tables.row_reader import data_lines
 from urmpipe_pipeline.sources.tables.smoothness import MOST_JOINTS, flat_ways, goes_along_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout, across
@@ -160,7 +160,7 @@ def _in_memory(layout: Layout, columns: Sequence[pa.Array], names: Sequence[str]
     table = pa.Table.from_arrays(list(columns), names=list(names or map(str, range(1, len(columns) + 1))))
     path = layout.segment.path
     kept = (one for one in layout.inferences if one.what != "header")
-    held = Held(path.stem, table, named=bool(names), path=path)
+    held = MemoryTable(path.stem, table, named=bool(names), path=path)
     return replace(layout_of(held), inferences=(*kept, said))
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 
 HEAD = 128
 """Bytes at the start of a file that tell what it is."""
 
 
-def read_typed(path: Path) -> Held | None:
+def read_typed(path: Path) -> MemoryTable | None:
     """Return the table of a file of typed columns; None of any other file, which may be text.
 
     Raises:

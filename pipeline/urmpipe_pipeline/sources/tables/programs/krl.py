@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.programs.program import Program, shortened
 from urmpipe_pipeline.sources.tables.programs.targets import PATH, TABLE, Kind, Target, table_of
 
@@ -34,7 +34,7 @@ _FIELD = re.compile(r"\b([A-Z]\d?)\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*
 _NO_POINTS = re.compile(r"\$|.*(?:TOOL|BASE)", re.IGNORECASE)
 
 
-def read(program: Program) -> Held:
+def read(program: Program) -> MemoryTable:
     """Return the positions of a program as a table.
 
     Raises:

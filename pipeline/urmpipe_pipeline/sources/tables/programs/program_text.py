@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.programs import krl, rapid, structured_text
 from urmpipe_pipeline.sources.tables.programs.program import Program, blanked
 from urmpipe_pipeline.sources.tables.text import Segment
@@ -29,7 +29,7 @@ class _Language:
     name: str
     known: re.Pattern[str]
     comments: re.Pattern[str] = re.compile(r"(?!)")
-    read: Callable[[Program], Held] | None = None
+    read: Callable[[Program], MemoryTable] | None = None
     block: tuple[str, str] = ("", "")
 
 
@@ -80,7 +80,7 @@ _LANGUAGES = (
 )
 
 
-def read_program(segment: Segment, options: ReadOptions) -> Held | None:
+def read_program(segment: Segment, options: ReadOptions) -> MemoryTable | None:
     """Return the table that the text of a program holds; None of any other text, by its head.
 
     Raises:

@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any, TypeAlias
 
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.programs.program import Program, shortened
 from urmpipe_pipeline.sources.tables.programs.targets import PATH, TABLE, Kind, Target, table_of
 
@@ -50,7 +50,7 @@ Lists: TypeAlias = Any
 """A number, or a list of such, nested."""
 
 
-def read(program: Program) -> Held:
+def read(program: Program) -> MemoryTable:
     """Return the positions of a program as a table.
 
     Raises:

@@ -21,7 +21,7 @@ from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 from urmpipe_pipeline.sources.tables.programs.program import Program, shortened
 from urmpipe_pipeline.sources.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
@@ -67,7 +67,7 @@ class _Scalar:
     offset: int
 
 
-def read(program: Program) -> Held:
+def read(program: Program) -> MemoryTable:
     """Return the arrays of a program as a table.
 
     Raises:
@@ -86,7 +86,7 @@ def read(program: Program) -> Held:
     found = Inference("program", "structured text", f"{format_count(len(arrays), 'array')} of {rows} values")
     clock, said = _clock(program, columns, list(scalars.values()), rows)
     table = pa.table({name: column(values) for name, values in (*clock.items(), *columns.items())})
-    return Held(program.path.stem, table, path=program.path, inferences=(found, *said))
+    return MemoryTable(program.path.stem, table, path=program.path, inferences=(found, *said))
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ import pyarrow as pa
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 from urmpipe_pipeline.sources.tables.programs.program import Program, shortened
 
@@ -86,7 +86,7 @@ class _Rows:
 
 def table_of(
     program: Program, targets: Sequence[Target], moves: Sequence[Target | str | None], kinds: Sequence[Kind]
-) -> Held:
+) -> MemoryTable:
     """Return the table of a program's positions.
 
     Args:
@@ -111,7 +111,7 @@ def table_of(
         found = [_chosen(program, found)]
     table = {name: column(np.array(values)) for rows in found for name, values in rows.columns()}
     said = (Inference("program", " and ".join(_words(rows) for rows in found), _evidence(found, targets)),)
-    return Held(program.path.stem, pa.table(table), path=program.path, inferences=said)
+    return MemoryTable(program.path.stem, pa.table(table), path=program.path, inferences=said)
 
 
 def _rows(
