@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import subprocess
 import sys
@@ -60,60 +59,6 @@ def test_ingest_json_is_all_that_stands_on_standard_output(urmpipe: RunCommand, 
     assert answer["recording"] == "run.rrd"
     assert [w["kind"] for w in answer["warnings"]] == ["rotation-not-used"]
     assert "warning:" in ran.err
-
-
-def test_quiet_prints_nothing(urmpipe: RunCommand) -> None:
-    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "-q")
-    assert (ran.code, ran.out, ran.err) == (0, "", "")
-
-
-def test_without_a_robot_it_says_so(urmpipe: RunCommand) -> None:
-    ran = urmpipe("ingest", MATLAB)
-    assert ran.code == 0
-    assert "no kinematics" in ran.out
-
-
-def test_rows_that_cannot_be_read_are_left_out_if_asked_for(urmpipe: RunCommand, tmp_path: Path) -> None:
-    lines = MATLAB.read_text().splitlines(keepends=True)
-    lines[1000] = "torn\n"
-    (tmp_path / "log.csv").write_text("".join(lines))
-    ran = urmpipe("ingest", "log.csv", "--robot", "urm6", "--json")
-    assert ran.code == 2
-    assert [error["message"] for error in json.loads(ran.out)["errors"]] == [
-        "found 1 cell ('torn'), allowed: 7",
-        "1 of 7383 rows cannot be read; --skip-bad leaves them out",
-    ]
-    ran = urmpipe("ingest", "log.csv", "--robot", "urm6", "--json", "--skip-bad")
-    assert ran.code == 0
-    answer = json.loads(ran.out)
-    assert answer["samples"] == 7382
-    skipped = [(w["row"], w["message"]) for w in answer["warnings"] if w["kind"] == "skipped-row"]
-    said = "data row 1000 of the file is left out: found 1 cell ('torn'), allowed: 7"
-    assert skipped == [(1000, said)]
-
-
-def test_strict_makes_a_warning_an_error_and_writes_nothing(urmpipe: RunCommand, tmp_path: Path) -> None:
-    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--rotation", "zyx", "--strict")
-    assert ran.code == 2
-    assert ran.err.startswith("error: strict (--strict): found 1 warning, allowed: none\n")
-    assert files_in(tmp_path) == []
-
-
-def test_an_output_that_is_not_ours_or_is_an_input_is_never_replaced(
-    urmpipe: RunCommand, tmp_path: Path
-) -> None:
-    log = tmp_path / "log.csv"
-    log.write_bytes(MATLAB.read_bytes())
-    before = hashlib.sha256(log.read_bytes()).hexdigest()
-    ran = urmpipe("ingest", log, "--robot", "urm6", "-o", log)
-    assert ran.code == 2
-    other = tmp_path / "thesis.txt"
-    other.write_text("precious")
-    assert urmpipe("ingest", log, "--robot", "urm6", "-o", other).code == 2
-    assert urmpipe("ingest", log, "--robot", "urm6", "-o", "nowhere/run.rrd").code == 2
-    assert hashlib.sha256(log.read_bytes()).hexdigest() == before
-    assert other.read_text() == "precious"
-    assert files_in(tmp_path) == ["log.csv", "thesis.txt"]
 
 
 @FEW
@@ -179,67 +124,6 @@ def test_report_is_written_beside_and_named_after_the_recording(urmpipe: RunComm
     ran = urmpipe("report", "run.rrd")
     assert ran.code == 2
     assert (tmp_path / "run.html").read_text() == "<p>somebody's own page</p>"
-
-
-def test_report_refuses_what_is_no_recording(urmpipe: RunCommand) -> None:
-    ran = urmpipe("report", MATLAB)
-    assert ran.code == 2
-    assert "found no recording of urmpipe" in ran.err
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("change", "line", "column", "found"),
-    [
-        (lambda cells: [cells[0], "abc", *cells[2:]], 6, "q1", "'abc'"),
-        (lambda cells: ["-1.0", *cells[1:]], 6, "t", ""),
-        (lambda cells: cells[:-1], 6, None, "6"),
-    ],
-)
-def test_bad_input_is_named_by_line_and_column_and_outputs_stay(
-    urmpipe: RunCommand,
-    tmp_path: Path,
-    change: Callable[[list[str]], list[str]],
-    line: int,
-    column: str | None,
-    found: str,
-) -> None:
-    lines = MATLAB.read_text().splitlines()
-    lines[5] = ",".join(change(lines[5].split(",")))
-    (tmp_path / "bad.csv").write_text("\n".join(lines) + "\n")
-    assert urmpipe("ingest", MATLAB, "--robot", "urm6", "-q", "-o", "run.rrd").code == 0
-    before = (tmp_path / "run.rrd").read_bytes()
-    ran = urmpipe("ingest", "bad.csv", "--robot", "urm6", "-o", "run.rrd", "--json")
-    assert ran.code == 2
-    assert f"bad.csv:{line}" in ran.err
-    assert found in ran.err
-    assert "allowed" in ran.err
-    error = json.loads(ran.out)["errors"][0]
-    assert (error["row"], error["column"]) == (5, column)
-    assert (tmp_path / "run.rrd").read_bytes() == before
-
-
-@FEW
-@pytest.mark.slow
-def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:
-    passing = urmpipe(*COMPARE_FEW, "--tolerance", "2.4mm", "--json", "-o", "a.rrd")
-    assert passing.code == 0
-    assert json.loads(passing.out)["tolerance"] == {"axis": 0.0024, "coverage": 0.9, "judged": 0.5}
-    assert urmpipe(*COMPARE_FEW, "--tolerance", "0.0023", "-o", "b.rrd").code == 1
-    wrong = urmpipe(*COMPARE_FEW, "--tolerance", "3 inch")
-    assert wrong.code == 2
-    assert (
-        "error: tolerance (--tolerance): found '3 inch', allowed: a length in m, or axis=, x=, y=, z="
-        in wrong.err
-    )
-
-
-def test_a_path_alone_is_nothing_to_judge(urmpipe: RunCommand) -> None:
-    ran = urmpipe("compare", PATH, "--robot", "urm6")
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err.splitlines()[-1] == (
-        "error: path.csv: a path alone, which has no joints; allowed: a log to compare with it"
-    )
 
 
 @FEW

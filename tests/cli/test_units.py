@@ -169,61 +169,6 @@ def test_a_text_with_units_does_what_its_numbers_do(
     assert with_units == in_si
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("robot show ur5e --q 0,0,0,0,0,5mm", "q: found wrist_3_joint = 5mm, allowed: an angle in rad"),
-        (
-            "network check boom.toml --set turn=5mm",
-            "controls (--controls): found turn = 5mm,"
-            " allowed: a number, or",
-        ),
-        ("iso p l --tolerance AV=1.01", "tolerance (--tolerance): found AV=1.01, allowed: a unit: AV=1.01%"),
-        ("iso p l --tolerance AT=1", "tolerance (--tolerance): found AT=1, allowed: a unit: AT=1mm or AT=1m"),
-        (
-            "ingest log.csv --interval -180:180deg",
-            "interval (--interval): found"
-            " '-180:180deg', allowed: LOW:HIGH",
-        ),
-        ("plan p --velocity 30deg/s", "velocity (--velocity): found '30deg/s', allowed: a speed in m/s"),
-    ],
-)  # fmt: skip
-def test_a_unit_that_measures_something_else_is_refused(
-    line: str, said: str, urmpipe: Any, tmp_path: Path
-) -> None:
-    (tmp_path / "boom.toml").write_text(BOOM, encoding="utf-8")
-    done = urmpipe(*line.split())
-    assert (done.code, done.err.startswith(f"error: {said}")) == (2, True), done.err
-
-
-@pytest.mark.parametrize(
-    ("tolerance", "arguments", "said"),
-    [
-        ('"3.5mm"', (), "3.5 mm"),
-        ("0.0199", (), "19.9 mm"),
-        ('"$allowed"', ("--set", "allowed=20um"), "0.02 mm"),
-        ("0.02", (), "0.02mm"),
-        ('"$allowed"', ("--set", "allowed=3.5"), "3.5mm"),
-    ],
-)
-def test_a_delta_meter_takes_a_tolerance_with_its_unit(
-    tolerance: str, arguments: tuple[str, ...], said: str, urmpipe: Any, tmp_path: Path
-) -> None:
-    text = f"""
-    system.duration = "20ms"
-    arguments.allowed = 0.001
-    [blocks.meter]
-    unit = "delta_meter"
-    start = {{tolerance = {tolerance}, reference = "5um", actual = 0.0}}
-    """
-    (tmp_path / "meter.toml").write_text(text, encoding="utf-8")
-    done = urmpipe("simulate", "meter.toml", "--backend", "python", *arguments)
-    if done.code == 2:
-        assert f'found {said[:-2]}, allowed: a unit: "{said}" or "{said[:-2]}m"' in done.err
-    else:
-        assert (done.code, f"0.005000 mm of {said} allowed" in done.out) == (0, True), done.out
-
-
 def parts(section: Section) -> Iterator[Section]:
     """Yield a section and all below it."""
     yield section
