@@ -1,12 +1,16 @@
-"""Two results of a recording held against each other."""
+"""Two results held against each other, and a result against its recording."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from urmpipe_pipeline.presentation.result import Result
+from urmpipe_pipeline.results import read_recording, write_recording
 
 
 def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
@@ -28,6 +32,16 @@ def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
         assert list(other) == list(parts), place
         for name, part in parts.items():
             assert_same(other[name], part, f"{place}.{name}")
+
+
+def assert_comes_back(result: Result, folder: Path) -> None:
+    """Write a result into an empty folder, and hold what is read back against it."""
+    path = folder / "result.rrd"
+    assert write_recording(result, path) == path
+    back = read_recording(path)
+    assert_same(back, result)
+    assert back.recording == path
+    assert list(folder.iterdir()) == [path]
 
 
 def _parts(whole: Any) -> dict[Any, Any] | None:

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asserting import there
+from asserting import refusal, there
 from diagnoses import diagnosis_of
 from recordable import build_comparison
 from recorded import columns, rows_of, static, views
-from same_results import assert_same
+from same_results import assert_comes_back, assert_same
 from urmpipe_models.errors import RecordingError
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -28,18 +28,15 @@ def diagnosed() -> Comparison:
 
 
 def test_it_reads_back_bit_for_bit(diagnosed: Comparison, tmp_path: Path) -> None:
-    found = read_recording(write_recording(diagnosed, tmp_path / "run.rrd"))
-    assert isinstance(found, Comparison)
-    assert_same(found, diagnosed)
+    assert_comes_back(diagnosed, tmp_path)
 
 
 def test_one_alone_reads_back_and_is_no_log(diagnosed: Comparison, tmp_path: Path) -> None:
     alone = there(diagnosed.runs[0].diagnosis)
-    path = write_recording(alone, tmp_path / "run.rrd")
-    assert_same(read_recording(path), alone)
-    with pytest.raises(RecordingError) as error:
-        load_runs([path])
-    assert str(error.value).endswith("found the recording of a diagnosis, allowed: one that ingest wrote")
+    assert_comes_back(alone, tmp_path)
+    path = tmp_path / "result.rrd"
+    said = f"{path}: found the recording of a diagnosis, allowed: one that ingest wrote"
+    assert refusal(RecordingError, load_runs, [path]) == said
 
 
 def test_with_its_comparison_it_is_recorded_as_that(diagnosed: Comparison, tmp_path: Path) -> None:

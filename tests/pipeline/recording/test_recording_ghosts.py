@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 
 from recordable import build_solved
 from recorded import rows_of, static
-from same_results import assert_same
+from same_results import assert_comes_back, assert_same
 from solved import solved
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
@@ -56,7 +56,7 @@ def test_solved_targets_come_back_as_they_were(timed: bool, tmp_path: Path) -> N
     one = build_solved(timed=timed)
     if timed:
         one = replace(one, motion=one.as_run())
-    assert_same(read_recording(write_recording(one, tmp_path / "solved.rrd")), one)
+    assert_comes_back(one, tmp_path)
 
 
 def test_positions_alone_and_targets_that_are_none_come_back(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_positions_alone_and_targets_that_are_none_come_back(tmp_path: Path) -> 
     position = one.targets.position.copy()
     position[5] = np.nan
     one = replace(one, targets=Targets(position), angle=None, all_solutions=False)
-    assert_same(read_recording(write_recording(one, tmp_path / "solved.rrd")), one)
+    assert_comes_back(one, tmp_path)
 
 
 def test_branches_may_be_called_anything(tmp_path: Path) -> None:

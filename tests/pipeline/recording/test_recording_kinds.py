@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from recordable import build_run
 from recorded import times_of
-from same_results import assert_same
+from same_results import assert_comes_back, assert_same
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_pipeline import results
 from urmpipe_pipeline.presentation.result import Result
@@ -81,10 +81,8 @@ def known(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("known")
 def test_a_kind_of_ones_own_comes_back_as_it_was(tmp_path: Path) -> None:
     wanted = accuracy()
-    path = write_recording(wanted, tmp_path / "toy.rrd")
-    assert_same(read_recording(path), wanted)
-    assert read_recording(path).recording == path
-    assert sorted(times_of(path, "/error")) == wanted.t_ns.tolist()
+    assert_comes_back(wanted, tmp_path)
+    assert sorted(times_of(tmp_path / "result.rrd", "/error")) == wanted.t_ns.tolist()
 
 
 @pytest.mark.usefixtures("known")
@@ -93,7 +91,7 @@ def test_times_that_do_not_rise_come_back_as_they_were(tmp_path: Path) -> None:
     t_ns = wanted.t_ns.copy()
     t_ns[[3, SLICE]] = t_ns[2], t_ns[5]
     wanted = replace(wanted, t_ns=t_ns)
-    assert_same(read_recording(write_recording(wanted, tmp_path / "toy.rrd")), wanted)
+    assert_comes_back(wanted, tmp_path)
 
 
 def everything(rows: Any) -> list[Any]:

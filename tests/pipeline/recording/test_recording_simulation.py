@@ -16,7 +16,7 @@ from hypothesis.extra.numpy import arrays
 
 from asserting import refusal
 from recorded import columns
-from same_results import assert_same
+from same_results import assert_comes_back, assert_same
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
@@ -29,40 +29,25 @@ from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBl
 MakeSimulation = Callable[..., Simulation]
 
 
-def assert_comes_back(simulation: Simulation, folder: Path) -> None:
-    path = write_recording(simulation, folder / "simulation.rrd")
-    back = read_recording(path)
-    assert_same(back, simulation)
-    assert back.recording == path
-    assert [one.name for one in folder.iterdir()] == ["simulation.rrd"]
-
-
-def test_a_simulation_comes_back_as_it_was(make_simulation: MakeSimulation, tmp_path: Path) -> None:
-    assert_comes_back(make_simulation(), tmp_path)
-
-
-def test_one_that_failed_keeps_what_was_recorded(make_simulation: MakeSimulation, tmp_path: Path) -> None:
-    assert_comes_back(make_simulation(37, failed="chain: fmi2DoStep returned fmi2Error: q is NaN"), tmp_path)
-
-
-def test_one_that_failed_before_the_first_sample_is_recorded(
-    make_simulation: MakeSimulation, tmp_path: Path
+@pytest.mark.parametrize(
+    ("samples", "failed"),
+    [
+        (600, None),
+        (37, "chain: fmi2DoStep returned fmi2Error: q is NaN"),
+        (0, "chain: crashed"),
+        (1, None),
+        # Three slices, the ends and the middle sent before the others.
+        pytest.param(2 * SLICE + 5, None, marks=pytest.mark.slow),
+    ],
+)
+def test_a_simulation_comes_back_as_it_was(
+    samples: int, failed: str | None, make_simulation: MakeSimulation, tmp_path: Path
 ) -> None:
-    assert_comes_back(make_simulation(0, failed="chain: crashed"), tmp_path)
-
-
-def test_one_of_one_sample_is_recorded(make_simulation: MakeSimulation, tmp_path: Path) -> None:
-    assert_comes_back(make_simulation(1), tmp_path)
+    assert_comes_back(make_simulation(samples, failed), tmp_path)
 
 
 def test_one_without_signals_keeps_its_times(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     assert_comes_back(replace(make_simulation(20), signals=(), verdicts=(), arms=()), tmp_path)
-
-
-@pytest.mark.slow
-def test_a_long_one_comes_back_in_the_order_of_time(make_simulation: MakeSimulation, tmp_path: Path) -> None:
-    """Three slices, the ends and the middle sent before the others."""
-    assert_comes_back(make_simulation(2 * SLICE + 5), tmp_path)
 
 
 def test_columns_of_a_wider_array_come_back_as_they_were(
