@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import made_runs
-from asserting import there
+from asserting import refusal, there
 from recordable import build_comparison, build_run
 from same_results import assert_comes_back, assert_same
 from urmpipe_models.errors import OutputError
@@ -267,10 +267,10 @@ def test_progress_is_told_up_to_one(tmp_path: Path) -> None:
 def test_an_input_is_never_replaced(tmp_path: Path) -> None:
     path = write_recording(build_run(rows=5), tmp_path / "one.rrd")
     before = path.read_bytes()
-    with pytest.raises(OutputError) as caught:
-        write_recording(build_run(rows=6), path, inputs=[tmp_path / "log.csv", path])
-    message = f"{path}: found an input of this command, allowed: any other name for the recording"
-    assert str(caught.value) == message
+    inputs = [tmp_path / "log.csv", path]
+    assert refusal(OutputError, write_recording, build_run(rows=6), path, inputs=inputs) == (
+        f"{path}: found an input of this command, allowed: any other name for the recording"
+    )
     assert path.read_bytes() == before
 
 

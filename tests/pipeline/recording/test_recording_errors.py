@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import rerun as rr
 
+from asserting import refusal
 from recordable import build_comparison, build_run
 from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_pipeline.recording import is_ours, is_recording
@@ -181,9 +182,8 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_full_disk_is_one_line_and_leaves_the_old_output(small_disk: Path) -> None:
     path = write_recording(build_run(rows=5), small_disk / "one.rrd")
     before = path.read_bytes()
-    with pytest.raises(OutputError) as error:
-        write_recording(build_run(rows=100_000), path)
-    assert str(error.value) == f"{path}: cannot be written: No space left on device"
+    said = refusal(OutputError, write_recording, build_run(rows=100_000), path)
+    assert said == f"{path}: cannot be written: No space left on device"
     assert [(one, one.read_bytes()) for one in small_disk.iterdir()] == [(path, before)]
 
 
@@ -229,9 +229,9 @@ def test_what_reads_back_otherwise_is_named(tmp_path: Path) -> None:
         elif column.path.endswith(("/qd", "/tcp/position", "/coppeliasim/delta")):
             values[next(rows), 0] += 1e-12
         altered.append(column._replace(values=values))
-    with pytest.raises(OutputError) as caught:
-        verify(path, Path("name.rrd"), found._replace(arrays=tuple(altered)), "{}")
-    assert str(caught.value).splitlines() == [
+    altered_result = found._replace(arrays=tuple(altered))
+    said = refusal(OutputError, verify, path, Path("name.rrd"), altered_result, "{}")
+    assert said.splitlines() == [
         f"name.rrd: differs when read back: {one}"
         for one in (
             "the metadata",
@@ -249,20 +249,14 @@ def test_what_cannot_be_read_back_is_named(tmp_path: Path) -> None:
     path = write_recording(run, tmp_path / "one.rrd")
     path.write_bytes(path.read_bytes()[:-20])
     found = encode(run)
-    with pytest.raises(OutputError) as caught:
-        verify(path, Path("name.rrd"), found, metadata_json("run", found.tree))
-    assert str(caught.value).startswith(
-        "name.rrd: could not be read back: found a recording that was cut off"
-    )
+    said = refusal(OutputError, verify, path, Path("name.rrd"), found, metadata_json("run", found.tree))
+    assert said.startswith("name.rrd: could not be read back: found a recording that was cut off")
 
 
 def test_what_could_not_be_read_back_is_not_written(tmp_path: Path) -> None:
     run = build_run(rows=5)
     run = replace(run, log=replace(run.log, digits="four"))  # type: ignore[arg-type]
-    with pytest.raises(OutputError) as caught:
-        write_recording(run, tmp_path / "one.rrd")
-    assert (
-        str(caught.value)
-        == f"{tmp_path / 'one.rrd'}: cannot be recorded: /log/digits: found 'four', allowed: int or None"
-    )
+    path = tmp_path / "one.rrd"
+    said = refusal(OutputError, write_recording, run, path)
+    assert said == f"{path}: cannot be recorded: /log/digits: found 'four', allowed: int or None"
     assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from rerun.chunk import RrdReader
 
 from recordable import build_solved
-from recorded import rows_of, static
+from recorded import packed, rows_of, static
 from same_results import assert_comes_back, assert_same
 from solved import solved
 from urmpipe_models.arm.chain import Chain, Joint
@@ -25,7 +25,7 @@ from urmpipe_models.math3d import to_matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.presentation.figure import Figure
-from urmpipe_pipeline.presentation.palette import GHOST_COLOURS, rgb, run_colour
+from urmpipe_pipeline.presentation.palette import GHOST_COLOURS, run_colour
 from urmpipe_pipeline.presentation.scene import Arm
 from urmpipe_pipeline.recording.layout import ROW, TIME
 from urmpipe_pipeline.recording.reader import Store
@@ -168,15 +168,10 @@ def test_the_shapes_of_the_arm_are_too_small_to_be_seen_where_it_is_gone(
     robot = read_urdf(shapes)
     robot = robot if own else replace(robot, visuals=())
     path = write_recording(build_solved(robot=robot), tmp_path / "solved.rrd")
-    root = "/".join(
-        next(
-            chunk.entity_path for chunk in RrdReader(path).store().stream() if "turn1" in chunk.entity_path
-        ).split("/")[:-1]
-    )
     for k in range(1, 7):
-        scale = rows_of(path, f"{root}/turn{k}", "Transform3D:scale")
-        assert scale == {5 * STEP_NS: [pytest.approx([1e-9] * 3)]}
-        moved = rows_of(path, f"{root}/turn{k}", "Transform3D:translation")
+        entity = f"{SCENE}/robot/joint/turn{k}"
+        assert rows_of(path, entity, "Transform3D:scale") == {5 * STEP_NS: [pytest.approx([1e-9] * 3)]}
+        moved = rows_of(path, entity, "Transform3D:translation")
         assert [at // STEP_NS for at in moved] == [*range(6), *range(9, 40)]
 
 
@@ -222,11 +217,10 @@ def test_each_branch_has_a_colour_of_its_own_and_its_name(tmp_path: Path) -> Non
     assert len(set(GHOST_COLOURS.values())) == 8
     assert run_colour(0) == list(GHOST_COLOURS.values())[-1]
     for number, (name, colour) in enumerate(zip(names, GHOST_COLOURS.values(), strict=True)):
-        red, green, blue = rgb(colour)
-        packed = red << 24 | green << 16 | blue << 8
-        assert static(path, f"{SCENE}/ghost/{number}", "Capsules3D:colors") == [packed | OPACITY]
+        faint = packed(colour) - 255 + OPACITY
+        assert static(path, f"{SCENE}/ghost/{number}", "Capsules3D:colors") == [faint]
         label = f"{SCENE}/label/{number + 1}"
-        assert static(path, label, "Points3D:colors") == [packed | 255]
+        assert static(path, label, "Points3D:colors") == [packed(colour)]
         assert static(path, label, "Points3D:show_labels") == [True]
         labels = rows_of(path, label, "Points3D:labels")
         assert {row[0] for row in labels.values() if row} == {name}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asserting import there
 from recordable import build_comparison, build_run
 from recorded import columns, entities, static, times_of, views
 from toys import STEP_NS, eye_of, recorded, shown, toy
@@ -31,18 +32,13 @@ from urmpipe_pipeline.recording.views.geometry import drawn_arm, drawn_path, ext
 from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH, bodies_over_log, own_shapes
 from urmpipe_pipeline.recording.views.tracks import DASHES, LEAST_DASH, MOST, POSE_PERIOD
 from urmpipe_pipeline.results import present, read_recording, write_recording
-from urmpipe_pipeline.runs.run import Run
 
 SCENE = "/shown/scene"
 
 
 def scene_of(result: Any) -> Scene:
     """Return the scene of a result that has one."""
-    scene = present(result).scene
-    assert scene is not None
-    found = scene()
-    assert found is not None
-    return found
+    return there(there(present(result).scene)())
 
 
 def column(path: Path, entity: str, name: str) -> Any:
@@ -60,20 +56,18 @@ def below(path: Path, root: str) -> set[str]:
 
 def test_the_arm_moves_at_50_hz_through_its_own_kinematics() -> None:
     run = build_run()
-    arm = drawn_arm(scene_of(run).arms[0])
-    assert run.robot is not None and arm is not None
+    arm = there(drawn_arm(scene_of(run).arms[0]))
     t_ns = run.t_ns[arm.moving.rows]
     assert np.unique(np.diff(t_ns[:-1])).tolist() == [round(POSE_PERIOD * 1e9)] == [20_000_000]
     assert t_ns[-1] == run.t_ns[-1]
-    np.testing.assert_array_equal(arm.skeleton, points_over_log(run.robot, run.q[arm.moving.rows]))
+    np.testing.assert_array_equal(arm.skeleton, points_over_log(there(run.robot), run.q[arm.moving.rows]))
     assert arm.colours == (*JOINT_COLOURS[:6], REFERENCE_COLOUR, run_colour(0))
 
 
 def test_what_is_long_is_thinned_out_but_for_the_last_and_what_is_kept() -> None:
     run, kept = build_run(rows=200_000), 123_457
     arm, way = scene_of(run).arms[0], scene_of(run).paths[0]
-    drawn, path = drawn_arm(replace(arm, kept=(kept,))), drawn_path(replace(way, kept=(kept,)))
-    assert drawn is not None
+    drawn, path = there(drawn_arm(replace(arm, kept=(kept,)))), drawn_path(replace(way, kept=(kept,)))
     for rows in (drawn.moving.rows, path.moving.rows):
         assert MOST - 1 <= len(rows) <= MOST + 2  # the last and the one that is kept, besides
         assert {0, kept, 199_999} <= set(rows.tolist())
@@ -89,8 +83,7 @@ def test_what_decides_is_drawn() -> None:
     one = comparison.runs[0]
     x = replace(one.statistics["x"], max=1.0, sample_max=int(one.sample[465]))
     scene = scene_of(replace(comparison, runs=(replace(one, statistics={**one.statistics, "x": x}),)))
-    arm = drawn_arm(scene.arms[0])
-    assert arm is not None and 465 in arm.moving.rows
+    assert 465 in there(drawn_arm(scene.arms[0])).moving.rows
     moving = [drawn_path(way) for way in scene.paths if way.t_ns is not None]
     assert len(moving) == 3 and all(465 in way.moving.rows for way in moving)
 
@@ -101,9 +94,8 @@ def test_what_decides_is_drawn() -> None:
 def test_balls_are_seen_through_and_in_view(tmp_path: Path) -> None:
     centre, radius = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]), np.array([0.5, 2.0])
     way = Way("one", centre, None, "#000000")
-    path = recorded(
-        shown(scene=Scene("s", paths=(way,), balls=Balls("b", centre, radius, "#21c3ff"))), tmp_path
-    )
+    scene = Scene("s", paths=(way,), balls=Balls("b", centre, radius, "#21c3ff"))
+    path = recorded(shown(scene=scene), tmp_path)
     np.testing.assert_array_equal(static(path, f"{SCENE}/balls", "Ellipsoids3D:centers"), centre)
     sizes = static(path, f"{SCENE}/balls", "Ellipsoids3D:half_sizes")
     np.testing.assert_array_equal(sizes, np.repeat(radius[:, np.newaxis], 3, axis=1))
@@ -209,8 +201,7 @@ def test_each_link_moves_with_its_frame(shapes: Path, tmp_path: Path) -> None:
     robot = read_urdf(shapes)
     run = build_run(rows=200, robot=robot)
     path = write_recording(run, tmp_path / "run.rrd")
-    arm = drawn_arm(scene_of(run).arms[0])
-    assert arm is not None
+    arm = there(drawn_arm(scene_of(run).arms[0]))
     position, rotation = frames_over_log(robot, run.q[arm.moving.rows])
     for k, joint in enumerate(robot.joints, start=1):
         entity = f"robot/joint/{joint.name}"
@@ -257,8 +248,7 @@ def test_an_arm_read_back_looks_as_it_did_and_a_solid_stands_for_a_mesh_that_is_
 ) -> None:
     robot = read_urdf(shapes)
     path = write_recording(build_run(rows=50, robot=robot), tmp_path / "run.rrd")
-    back = read_recording(path)
-    assert isinstance(back, Run)
+    back: Any = read_recording(path)
     assert back.robot == robot
     again = write_recording(back, tmp_path / "again.rrd")
     assert below(again, "robot") == below(path, "robot")
@@ -273,32 +263,27 @@ def test_an_arm_read_back_looks_as_it_did_and_a_solid_stands_for_a_mesh_that_is_
 def test_an_arm_that_shows_nothing_is_drawn_in_solids_that_its_frames_move(tmp_path: Path) -> None:
     run = build_run(rows=200)
     path = write_recording(run, tmp_path / "run.rrd")
-    assert run.robot is not None
-    solids = build_placeholder_solids(run.robot)
-    carriers = ["base", *(f"joint/{name}" for name in run.robot.coordinates)]
-    on = [sum(one.joint == joint for one in solids) for joint in (None, *run.robot.coordinates)]
+    robot = there(run.robot)
+    solids = build_placeholder_solids(robot)
+    carriers = ["base", *(f"joint/{name}" for name in robot.coordinates)]
+    on = [sum(one.joint == joint for one in solids) for joint in (None, *robot.coordinates)]
     shapes = {
         f"{at}/visual\\ {k}" for at, count in zip(carriers, on, strict=True) for k in range(1, count + 1)
     }
     assert sum(on) == len(solids) == len(shapes)
     assert below(path, "robot") == {*carriers, *shapes, "joint/phi6/tool", "tip"}
     drawn = np.searchsorted(run.t_ns, times_of(path, f"{SCENE}/robot/joint/phi4"))
-    position, _ = frames_over_log(run.robot, run.q[drawn])
+    position, _ = frames_over_log(robot, run.q[drawn])
     moved = column(path, "robot/joint/phi4", "Transform3D:translation")[:, 0]
     np.testing.assert_allclose(moved, position[:, 4], atol=1e-6)  # single precision
-    for shape in shapes:
-        assert column(path, f"robot/{shape}", "Transform3D:translation").shape == (
-            1,
-            1,
-            3,
-        )  # once, at all times
+    for shape in shapes:  # once, at all times
+        assert column(path, f"robot/{shape}", "Transform3D:translation").shape == (1, 1, 3)
 
 
 def test_solids_of_joints_have_their_colours_and_the_tool_its_axes(tmp_path: Path) -> None:
     run = build_run(rows=20)
-    assert run.robot is not None
     tool = from_offset([0.01, 0.02, 0.1, 0.3, 0.2, 0.1])
-    robot = run.robot.placed(tool=tool)
+    robot = there(run.robot).placed(tool=tool)
     path = write_recording(replace(run, robot=robot), tmp_path / "run.rrd")
     for name, colour in zip(robot.coordinates, JOINT_COLOURS, strict=False):
         (found,) = column(path, f"robot/joint/{name}/visual\\ 1", "Cylinders3D:colors").tolist()
@@ -328,8 +313,7 @@ def test_own_shapes_win_and_only_moving_links_without_any_get_solids() -> None:
 
 
 def test_a_mark_is_seen_around_the_solid_that_it_marks() -> None:
-    arm = drawn_arm(scene_of(build_run(rows=5)).arms[0])
-    assert arm is not None
+    arm = there(drawn_arm(scene_of(build_run(rows=5)).arms[0]))
     for k, joint in enumerate(arm.chain.coordinates, start=1):
         housing = build_placeholder_solids(arm.chain)
         radii = [

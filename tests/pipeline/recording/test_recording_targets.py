@@ -6,29 +6,21 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from rerun.chunk import RrdReader
 
+from asserting import there
 from recordable import build_solved
-from recorded import static
+from recorded import entities, packed, static
 from solved import solved
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.presentation import scene as presentation
-from urmpipe_pipeline.presentation.palette import AXIS_COLOURS, rgb
+from urmpipe_pipeline.presentation.palette import AXIS_COLOURS
 from urmpipe_pipeline.recording.views.geometry import NEAR, ball, drawn_arm, drawn_targets, extent
 from urmpipe_pipeline.results import present, write_recording
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.scene import scene
 
 ROOT = "/shown/scene/targets"
-
-
-def shown_targets(one: IkResult) -> presentation.Targets:
-    """Return the targets of a scene."""
-    found = scene(one).targets
-    assert found is not None
-    return found
 
 
 def test_targets_without_times_are_frames_and_no_path(tmp_path: Path) -> None:
@@ -38,25 +30,23 @@ def test_targets_without_times_are_frames_and_no_path(tmp_path: Path) -> None:
     assert strips.shape == (120, 2, 3)
     # Single precision over 1 m.
     np.testing.assert_allclose(strips[::3, 0], one.targets.position, rtol=0, atol=1e-6)
-    assert one.targets.rotation is not None
     axes = (strips[:, 1] - strips[:, 0]).reshape(40, 3, 3)
     length = np.linalg.norm(axes, axis=2)
-    expected = one.targets.rotation.transpose(0, 2, 1)
+    expected = there(one.targets.rotation).transpose(0, 2, 1)
     np.testing.assert_allclose(axes / length[..., None], expected, rtol=0, atol=1e-5)  # 1e-7 over 0.1 m
-    packed = [
-        red << 24 | green << 16 | blue << 8 | 255 for red, green, blue in map(rgb, AXIS_COLOURS.values())
-    ]
-    assert static(path, f"{ROOT}/frames", "LineStrips3D:colors") == packed[:3] * 40  # x, y, z
-    found = {chunk.entity_path for chunk in RrdReader(path).store().stream().filter(content=f"{ROOT}/**")}
-    assert found == {f"{ROOT}/{leaf}" for leaf in ("frames", "missed")}
+    colours = [packed(AXIS_COLOURS[axis]) for axis in "xyz"]
+    assert static(path, f"{ROOT}/frames", "LineStrips3D:colors") == colours * 40
+    assert entities(path, ROOT) == {f"{ROOT}/{leaf}" for leaf in ("frames", "missed")}
 
 
 def test_a_long_path_is_dashed_and_positions_are_points() -> None:
-    long = drawn_targets(shown_targets(build_solved(rows=200)))
+    long = drawn_targets(there(scene(build_solved(rows=200)).targets))
     assert (len(long.origin), len(long.points)) == (0, 0)
     assert len(long.strips) > 10
     few = build_solved(rows=20, timed=False)
-    points = drawn_targets(shown_targets(replace(few, targets=Targets(few.targets.position), angle=None)))
+    points = drawn_targets(
+        there(scene(replace(few, targets=Targets(few.targets.position), angle=None)).targets)
+    )
     np.testing.assert_array_equal(points.points, few.targets.position[few.reached])
     np.testing.assert_array_equal(points.missed, few.targets.position[~few.reached])
     assert (len(points.origin), points.strips) == (0, ())
@@ -87,7 +77,7 @@ def solved_at(position: FloatArray, missed: list[bool], why: str = "far") -> IkR
 def in_view(one: IkResult) -> FloatArray:
     """Return every point that is in view in [m], shape (n, 3)."""
     shown = scene(one)
-    return extent(drawn_arm(shown.arms[0]), (), (), drawn_targets(shown_targets(one)))
+    return extent(drawn_arm(shown.arms[0]), (), (), drawn_targets(there(scene(one)).targets))
 
 
 def test_a_target_missed_by_far_does_not_make_the_arm_small() -> None:
