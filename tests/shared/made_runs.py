@@ -16,9 +16,11 @@ from urmpipe_models.math3d import RotationForm
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
-from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.provenance import Provenance, build_provenance
 from urmpipe_pipeline.runs.derivatives import derivatives
+from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.sources import ReadOptions
 
 TSP = 0.005
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
@@ -59,6 +61,27 @@ def run_of(
     return Run(
         name, log, robot, tsp, t_ns, q, qd, qdd, tcp, recorded, (), (), Provenance("ingest", {}, (), {}, "")
     )
+
+
+def ingested(
+    t: FloatArray,
+    q: FloatArray | None = None,
+    robot: Chain | None = None,
+    *,
+    position: FloatArray | None = None,
+    quaternions: FloatArray | None = None,
+    name: str = "log",
+    tsp: float | None = None,
+) -> Run:
+    """The run that `ingest` makes of joints, or of a path of poses (x, y, z, w), at these times in [s]."""
+    q = np.empty((len(t), 0)) if q is None else q
+    names = tuple(f"q{k + 1}" for k in range(q.shape[1]))
+    log = JointLog(
+        name, "table", (), np.rint(t * 1e9).astype(np.int64), names, q,
+        tcp_position=position, tcp_rotation=quaternions,
+        rotation_form=None if quaternions is None else "quat_xyzw",
+    )  # fmt: skip
+    return log_to_run(log, robot, ReadOptions(), provenance=build_provenance("ingest", {}, ()), tsp=tsp)
 
 
 def off(x: float, samples: int = 100) -> FloatArray:

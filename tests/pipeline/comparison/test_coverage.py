@@ -15,15 +15,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import urmpipe
+from made_runs import ingested
 from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import rotation_angle, to_quaternions
 from urmpipe_pipeline.comparison.compare import compare_runs
-from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.provenance import build_provenance
-from urmpipe_pipeline.runs.ingest import log_to_run
-from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions
 
 AXES = ["x [m]", "y [m]", "z [m]"]
 TOLERANCE = 0.0035
@@ -33,13 +29,6 @@ def path_of(t: FloatArray, rest: float = 0.0) -> FloatArray:
     """A motion through space in [m] that begins and ends at rest, shape (n, 3)."""
     moved = np.clip(t - rest, 0.0, None)
     return 0.3 * np.column_stack([np.sin(1.3 * moved), np.cos(0.9 * moved), 0.5 * np.sin(2.1 * moved)])
-
-
-def path_at(t: FloatArray, position: FloatArray) -> Run:
-    """The run of a path, as `ingest` makes it."""
-    t_ns = np.rint(t * 1e9).astype(np.int64)
-    log = JointLog("path", "path", (), t_ns, (), np.empty((len(t), 0)), tcp_position=position)
-    return log_to_run(log, None, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
 
 
 def table(t: FloatArray, position: FloatArray) -> pd.DataFrame:
@@ -170,7 +159,7 @@ def test_no_well_made_pair_fails_by_its_shares() -> None:
             t[1:] += period * rng.uniform(-1 / 3, 1 / 3, len(t) - 1)
             kept = rng.random(len(t)) >= rng.uniform(0.0, 0.02)
             kept[[0, -1]] = True
-            sides.append(path_at(t[kept], path_of(t[kept], rest)))
+            sides.append(ingested(t[kept], position=path_of(t[kept], rest)))
         shares = compare_runs(sides[0], sides[1:]).runs[0].shares
         assert all(one.verdict == "pass" for one in shares.values()), (periods, shares)
 

@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from asserting import refusal, there
+from asserting import there
 from diagnoses import LENGTH, SIGN, diagnosis_of
-from made_runs import arms, off, path_run, paths, run_of
+from made_runs import arms, off, paths
 from presented import cells, facts, figures, scene_of
-from urmpipe_models.errors import Hint, OptionError
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.figures import cause_marks
 from urmpipe_pipeline.comparison.presenter import decisive_facts
@@ -153,13 +152,3 @@ def test_without_a_cause_nothing_is_mended() -> None:
     result = replace(result, runs=(replace(one, diagnosis=nothing),))
     assert not any(figure.beside for figure in figures(present(result).body.sections[0]))
     assert not any(path.name == "without the causes" for path in scene_of(present(result)).paths)
-
-
-ALIGNED = "align (--align): found rigid, allowed: none with a diagnosis: base and tool are possible causes"
-
-
-def test_an_alignment_is_refused_with_a_diagnosis() -> None:
-    options = CompareOptions(align="rigid", diagnose=True)
-    path, arm = path_run(off(0.1)), run_of(np.zeros((100, 6)), recorded=off(0.1))
-    assert refusal(OptionError, compare_runs, path, [path], options) == ALIGNED
-    assert refusal(OptionError, compare_with_recorded_tcp, arm, options) == ALIGNED

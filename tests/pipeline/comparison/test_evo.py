@@ -15,15 +15,13 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from asserting import there
 from exported import export_result
-from made_runs import path_run
+from made_runs import ingested, path_run
 from thinned_logs import lay_thinned_logs
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.provenance import build_provenance
-from urmpipe_pipeline.runs.ingest import ingest_log, log_to_run
+from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
@@ -103,14 +101,9 @@ def test_errors_of_irregular_logs_are_those_of_evo_at_their_rows(seed: int) -> N
 
 def path_at(t: FloatArray, rng: np.random.Generator, name: str) -> Run:
     """Return the run of a path with an orientation, at these times in [s]."""
-    t_ns = np.rint((t - t[0]) * 1e9).astype(np.int64)
     turn = np.column_stack([np.sin(t), 0.5 * np.cos(t), t]) + rng.normal(0, 0.01, (len(t), 3))
-    quat = Rotation.from_rotvec(turn)
-    log = JointLog(
-        name, "path", (), t_ns, (), np.empty((len(t), 0)),
-        tcp_position=rng.uniform(-1, 1, (len(t), 3)), tcp_rotation=quat.as_quat(), rotation_form="quat_xyzw",
-    )  # fmt: skip
-    return log_to_run(log, None, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
+    quat, position = Rotation.from_rotvec(turn).as_quat(), rng.uniform(-1, 1, (len(t), 3))
+    return ingested(t - t[0], position=position, quaternions=quat, name=name)
 
 
 @pytest.mark.slow

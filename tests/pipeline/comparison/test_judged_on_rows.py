@@ -11,16 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urmpipe
+from made_runs import ingested
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, tcp_trajectory
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.provenance import build_provenance
-from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions
 
 UR5E = load_robot("ur5e")
 
@@ -36,18 +33,8 @@ def motion(t: FloatArray) -> FloatArray:
     return np.column_stack([0.4 * np.sin(0.7 * t + k) + 0.3 * k - 0.8 for k in range(6)])
 
 
-def joint_log(t: FloatArray, q: FloatArray, name: str = "log", position: FloatArray | None = None) -> Run:
-    """Return the run of a log at these times."""
-    t_ns = np.rint(t * 1e9).astype(np.int64)
-    log = JointLog(name, "table", (), t_ns, tuple(f"q{k + 1}" for k in range(6)), q, tcp_position=position)
-    return log_to_run(log, UR5E, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
-
-
 def path(t: FloatArray, position: FloatArray) -> Run:
-    """Return the run of a path."""
-    t_ns = np.rint(t * 1e9).astype(np.int64)
-    log = JointLog("path", "path", (), t_ns, (), np.empty((len(t), 0)), tcp_position=position)
-    return log_to_run(log, None, ReadOptions(), provenance=build_provenance("ingest", {}, ()))
+    return ingested(t, position=position, name="path")
 
 
 @pytest.mark.slow
@@ -62,8 +49,7 @@ def test_a_spike_of_one_row_keeps_its_height_to_the_bit(
     q = motion(t)
     wanted = positions_over_log(UR5E, q)
     wanted[row, 2] += height  # the reference has the spike at a row of the log: nothing is interpolated
-    log = JointLog("log", "table", (), np.rint(t * 1e9).astype(np.int64), tuple("abcdef"), q)
-    run = log_to_run(log, UR5E, ReadOptions(), provenance=build_provenance("ingest", {}, ()), tsp=tsp)
+    run = ingested(t, q, UR5E, tsp=tsp)
     assert run.resampled
     one = compare_runs(path(t, wanted), [run]).runs[0]
     exact = np.abs(wanted - tcp_trajectory(run).position)
@@ -79,7 +65,7 @@ def test_the_log_s_own_spike_fails_where_the_grid_would_lose_half_of_it() -> Non
     true = motion(t)
     done = true.copy()
     done[250, 1] += 0.01  # about 6 mm at the tool
-    result = compare_runs(joint_log(t, true, "asked"), [joint_log(t, done)])
+    result = compare_runs(ingested(t, true, UR5E, name="asked"), [ingested(t, done, UR5E)])
     one = result.runs[0]
     assert one.verdict == "fail" and int(np.count_nonzero(one.out_of_tolerance)) == 1
     there = np.linalg.norm(positions_over_log(UR5E, true[[250]]) - positions_over_log(UR5E, done[[250]]))
@@ -114,9 +100,9 @@ def test_nothing_is_interpolated_across_gaps_and_steps_of_the_reference() -> Non
     q = motion(t)
     q[50:] += np.pi / 2 + 0.2  # a step that no motion explains
     kept = np.delete(np.arange(100), np.arange(20, 30))
-    reference = joint_log(t[kept], q[kept], "asked")
+    reference = ingested(t[kept], q[kept], UR5E, name="asked")
     between = t[:-1] + 0.005
-    log = joint_log(between, motion(between))
+    log = ingested(between, motion(between), UR5E)
     one = compare_runs(reference, [log], CompareOptions({"axis": 9.0})).runs[0]
     lost = np.setdiff1d(np.arange(99), one.sample)
     np.testing.assert_array_equal(lost, [*range(19, 30), 49])
@@ -137,7 +123,7 @@ def test_rows_count_alike_however_far_apart_they_are() -> None:
     q = motion(t)
     wanted = positions_over_log(UR5E, q)
     wanted[90:, 0] += 0.002
-    one = compare_runs(path(t, wanted), [joint_log(t, q)]).runs[0]
+    one = compare_runs(path(t, wanted), [ingested(t, q, UR5E)]).runs[0]
     assert one.statistics["x"].mean == pytest.approx(0.1 * 0.002, rel=1e-9)  # rounding of the sums
 
 
@@ -146,7 +132,7 @@ def test_a_baseline_made_on_the_grid_is_listed_as_made_otherwise_and_not_as_wors
     q = motion(t)
     wanted = positions_over_log(UR5E, q)
     wanted[70, 0] += 0.02
-    now = compare_runs(path(t, wanted), [joint_log(t, q)])
+    now = compare_runs(path(t, wanted), [ingested(t, q, UR5E)])
     before = before_rows(now)
     found = urmpipe.compare(now, baseline=before).baseline
     assert found is not None
@@ -157,15 +143,15 @@ def test_a_baseline_made_on_the_grid_is_listed_as_made_otherwise_and_not_as_wors
     regular = np.linspace(0.0, 0.995, 200)
     q = motion(regular)
     wanted = positions_over_log(UR5E, q)
-    now = compare_runs(path(regular, wanted + 0.001), [joint_log(regular, q)])
-    earlier = before_rows(compare_runs(path(regular, wanted), [joint_log(regular, q)]))
+    now = compare_runs(path(regular, wanted + 0.001), [ingested(regular, q, UR5E)])
+    earlier = before_rows(compare_runs(path(regular, wanted), [ingested(regular, q, UR5E)]))
     found = urmpipe.compare(now, baseline=earlier).baseline
     assert found is not None and found.verdict == "fail"  # a regular log's rows were its grid
 
 
 def test_a_recording_that_was_judged_on_the_grid_names_the_row_of_the_log() -> None:
     t = uneven(200, 11)
-    run = joint_log(t, motion(t))
+    run = ingested(t, motion(t), UR5E)
     on_grid = replace(run, rows=None, warnings=())
     wanted = positions_over_log(UR5E, on_grid.q)
     wanted[150, 0] += 0.02

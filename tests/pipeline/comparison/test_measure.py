@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from asserting import there
 from made_runs import path_run, run_of
+from orientation_columns import orientation_columns
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import RotationForm
+from urmpipe_models.math3d import FORMS, RotationForm
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, tcp_trajectory
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -45,30 +46,13 @@ def poses(count: int) -> tuple[FloatArray, Rotation]:
     return rng.uniform(-1, 1, (count, 3)), Rotation.random(count, rng=rng)
 
 
-FORMS: list[tuple[RotationForm, str]] = [
-    ("vector", "rotvec"), ("rpy", "xyz"), ("zyx", "ZYX"), ("xyz", "XYZ"), ("zyz", "ZYZ"), ("zxz", "ZXZ"),
-    ("quat_xyzw", "quat"), ("matrix", "matrix"),
-]  # fmt: skip
-
-
-def recorded(rotation: Rotation, way: str) -> FloatArray:
-    """SciPy's columns of an orientation."""
-    if way == "rotvec":
-        return rotation.as_rotvec()
-    if way == "quat":
-        return rotation.as_quat()
-    if way == "matrix":
-        return rotation.as_matrix().reshape(-1, 9)
-    return rotation.as_euler(way)  # type: ignore[call-overload,no-any-return]
-
-
-@pytest.mark.parametrize(("form", "way"), FORMS)
-def test_the_angle_is_that_between_recorded_orientations_of_any_form(form: RotationForm, way: str) -> None:
+@pytest.mark.parametrize("form", FORMS)
+def test_the_angle_is_that_between_recorded_orientations_of_any_form(form: RotationForm) -> None:
     position, rotation = poses(50)
     turned = rotation * Rotation.from_rotvec([0.0, 0.3, 0.4])
     found = held(
         path_run(position, rotation.as_quat(), "quat_xyzw"),
-        path_run(position, recorded(turned, way), form, name="log"),
+        path_run(position, orientation_columns(turned, form), form, name="log"),
     )
     np.testing.assert_allclose(there(found.angle), 0.5, atol=1e-14)  # some tens of rounding errors
     assert (found.statistics["angle"].unit, found.statistics["angle"].kind) == ("rad", "angle")
