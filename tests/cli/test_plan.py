@@ -64,7 +64,8 @@ def answer(urmpipe: RunCommand, code: int, *arguments: str | Path) -> dict[str, 
 # --- the answer --------------------------------------------------------------------------------------
 
 
-def test_json_of_a_file_is_that_of_the_cube(urmpipe: RunCommand) -> None:
+def test_json_is_that_of_python_and_of_a_file_that_of_the_cube(urmpipe: RunCommand) -> None:
+    assert answer(urmpipe, 0, CUBE, "--robot", "irb60") == package.plan(CUBE, "irb60").to_dict()
     file, cube = answer(urmpipe, 0, "path.csv"), answer(urmpipe, 0, CUBE)
     assert (file.pop("name"), cube.pop("name")) == ("path", "cube wall xy")
     for ours, theirs in zip(file.pop("segments"), cube.pop("segments"), strict=True):

@@ -29,7 +29,8 @@ def answer(capsys: Captured, code: int, *arguments: str | Path) -> dict[str, Any
 
 def wave(middle: Sequence[float] | FloatArray, size: float, rows: int) -> FloatArray:
     """Return joint values that swing about a middle, each joint faster than the one before."""
-    return np.array(middle) + size * np.sin(np.outer(np.arange(rows) / rows, np.arange(1, len(middle) + 1)))
+    phase = np.outer(np.arange(rows) / rows, np.arange(1, len(middle) + 1))
+    return np.asarray(np.array(middle) + size * np.sin(phase))
 
 
 def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> str:
