@@ -145,46 +145,6 @@ def test_nothing_is_known_of_joints_alone_within_a_step_of_the_reference(tmp_pat
     np.testing.assert_array_equal(np.setdiff1d(np.arange(249), found.runs[0].sample), [99])
 
 
-def test_a_place_is_asked_for_where_it_is_judged(tmp_path: Path) -> None:
-    asked, done = motions()
-    for name, q in (("asked", asked), ("done", done)):
-        written(tmp_path / f"{name}.csv", ["t", *six("q{} [rad]")], T, q)
-    said = refusal(LogError, urmpipe.compare, tmp_path / "asked.csv", tmp_path / "done.csv")
-    lacks = "no robot, so no forward kinematics; --robot NAME|FILE sets one;"
-    lacks += " --tolerance joint=0.1deg compares the joints only"
-    assert said == f"asked.csv: {lacks}\ndone.csv: {lacks}"
-    log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
-    said = refusal(  # no tolerance of joints is a way out where the log is to be moved
-        LogError, urmpipe.compare, log, sides=("target", "actual"), tolerance="joint=1deg", align="start"
-    )
-    assert said == "log.csv: no robot, so no forward kinematics; --robot NAME|FILE sets one"
-
-
-def test_sides_that_are_not_there_are_refused(tmp_path: Path) -> None:
-    asked, done = motions()
-    log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
-    said = refusal(LogError, urmpipe.compare, log, sides=("desired", "actual"))
-    assert said == (
-        f"{log}: sides (--sides): found no column with the word desired and without actual in its name,"
-        " allowed: a word"
-        " of them, such as q, target, actual"
-    )
-    said = refusal(LogError, urmpipe.compare, log, sides=("q", "rest"))
-    assert said == (
-        f"{log}: sides (--sides): found no column without q in its name, allowed: a word of them, such as"
-        " q, target,"
-        " actual"
-    )
-    with pytest.raises(LogError):  # the columns of target have both words: of which side are they?
-        urmpipe.compare(log, sides=("target", "q"), tolerance="joint=9rad")
-    allowed = "allowed: two words for two sides of one log that is yet to be read"
-    said = refusal(OptionError, urmpipe.compare, log, log, sides=("target", "actual"))
-    assert said == f"sides (--sides): found target,actual with several logs, {allowed}"
-    for words in (("q", "q"), ("target", "Target")):
-        said = refusal(OptionError, urmpipe.compare, log, sides=words)
-        assert said == f"sides (--sides): found {','.join(words)}, {allowed}"
-
-
 def test_a_name_never_stands_against_itself(tmp_path: Path) -> None:
     asked, done = motions()
     for name, q in (("asked", asked), ("done", done)):
