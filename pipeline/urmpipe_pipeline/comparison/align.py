@@ -116,13 +116,13 @@ def _rigid(matched: Matched, run: Run) -> Alignment:
     (size, breadth), (other_size, other_breadth) = (side[:2] / np.sqrt(len(actual)) for side in rms)
     related = covariance[1] + covariance[2] > MIN_COVARIANCE * breadth * other_breadth
     if min(breadth, other_breadth) < MIN_BREADTH or not related:
-        found = "two motions without anything in common"
+        fault = "two motions without anything in common"
         if min(size, other_size) < MIN_BREADTH:
-            found = f"compared positions in one point (within {min(size, other_size) * 1e3:.4f} mm rms)"
+            fault = f"compared positions in one point (within {min(size, other_size) * 1e3:.4f} mm rms)"
         elif min(breadth, other_breadth) < MIN_BREADTH:
-            found = f"compared positions on one line (within {min(breadth, other_breadth) * 1e3:.4f} mm rms)"
+            fault = f"compared positions on one line (within {min(breadth, other_breadth) * 1e3:.4f} mm rms)"
         allowed = "which leaves the rotation open, allowed: start, tool, none"
-        raise LogError(run_finding(run, f"rigid: found {found}, {allowed}", parameter="align"))
+        raise LogError(run_finding(run, f"rigid: found {fault}, {allowed}", parameter="align"))
     shift = matched.reference.mean(axis=0) - rotation @ matched.actual.mean(axis=0)
     return _build_alignment("rigid", rotation, shift)
 
@@ -150,9 +150,9 @@ def _align_tool(matched: Matched, run: Run) -> Matched:
     posed, quat = _with_orientation(matched, "tool", run)
     turn = float(rotation_angle(quat, np.broadcast_to(quat[0], quat.shape)).max())
     if turn < MIN_TURN:
-        found = f"tool: found a tool that turns by {np.degrees(turn):.4f} deg in all"
+        fault = f"tool: found a tool that turns by {np.degrees(turn):.4f} deg in all"
         allowed = "which an offset of the base explains as well, allowed: a log that turns it; start, none"
-        raise LogError(run_finding(run, f"{found}, {allowed}", parameter="align"))
+        raise LogError(run_finding(run, f"{fault}, {allowed}", parameter="align"))
     rotation = to_matrices(quat)
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()
     actual = posed.actual + rotation @ np.array((x, y, z))
@@ -198,9 +198,9 @@ def _with_orientation(matched: Matched, mode: AlignMode, run: Run) -> tuple[Matc
     return matched if len(known) == len(quat) else matched.at(known), quat[known]
 
 
-def format_alignment(one: Deviation) -> tuple[str, str]:
-    """Return how a log was moved in space, and by which rule."""
-    alignment = one.alignment
+def format_alignment(deviation: Deviation) -> tuple[str, str]:
+    """Return the motion of the alignment of a log, and its rule."""
+    alignment = deviation.alignment
     match alignment.mode:
         case "none":
             return "none", "both sides as recorded"
@@ -209,17 +209,17 @@ def format_alignment(one: Deviation) -> tuple[str, str]:
             by = f"{_vector(alignment.tool)} mm in the tool's frame"
             return f"tool centre point moved by {moved}", f"the best constant offset: {by}"
         case "base+tool":
-            return _base_and_tool_words(alignment)
+            return _format_base_and_tool(alignment)
     turned = text.format_quantity(alignment.angle, "rad")
-    moved = text.format_quantity(float(alignment.moved(one.actual).max()), "m")
+    moved = text.format_quantity(float(alignment.moved(deviation.actual).max()), "m")
     first = alignment.mode == "start"
     rule = "the first compared poses agree" if first else "the best rigid motion"
     about = f"rotated about the origin, then translated by {_vector(alignment.translation)} mm"
     return f"{alignment.mode}: moved by up to {moved}, turned by {turned}", f"{rule}: {about}"
 
 
-def _base_and_tool_words(alignment: Alignment) -> tuple[str, str]:
-    """Return how base and tool were moved, by how much and to where."""
+def _format_base_and_tool(alignment: Alignment) -> tuple[str, str]:
+    """Return the motion of base and tool, and where they are after it."""
     sides = (
         ("base", alignment.translation, alignment.angle),
         ("tool", alignment.tool, alignment.tool_angle),

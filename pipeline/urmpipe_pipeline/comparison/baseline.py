@@ -103,8 +103,8 @@ def compare_with_baseline(
         return _compare_tests(now, before, (before.iso, now.iso), level)
     if now.iso is not None or before.iso is not None:
         sides = ("a test after ISO 9283", "a comparison log by log")
-        found, allowed = sides if now.iso is None else sides[::-1]
-        raise OptionError(Finding(parameter="baseline", found=found, allowed=allowed))
+        baseline, allowed = sides if now.iso is None else sides[::-1]
+        raise OptionError(Finding(parameter="baseline", found=baseline, allowed=allowed))
     pairs = _pair_logs(now, before)
     failed = [UnmatchedQuantity(log.name) for log in now.failed_logs]
     gone = _iter_absent(before, {old.name: (run, old) for run, old in pairs})
@@ -175,12 +175,12 @@ def _by_key(run: Deviation) -> dict[Key, Statistics]:
     return {(of.kind, of.quantity, of.unit): of for of in run.all_statistics}
 
 
-def _iter_absent(result: Comparison, pairs: Mapping[str, Pair]) -> Iterator[UnmatchedQuantity]:
+def _iter_absent(comparison: Comparison, pairs: Mapping[str, Pair]) -> Iterator[UnmatchedQuantity]:
     """Yield the logs of a comparison that the other lacks, and the quantities that the log of a pair lacks.
 
     A quantity is that of the log now, whatever the log was called before.
     """
-    for run in result.runs:
+    for run in comparison.runs:
         if run.name not in pairs:
             yield UnmatchedQuantity(run.name)
             continue
@@ -260,17 +260,17 @@ def _differing(
             yield SettingDifference(f"{name}{of}", before.get(name), now.get(name))
 
 
-def _settings(result: Comparison) -> dict[str, Any]:
+def _settings(comparison: Comparison) -> dict[str, Any]:
     """Return how a comparison was made: reference, tolerance, options, versions."""
-    reference = result.reference
+    reference = comparison.reference
     not_listed = ("tolerance", "diagnose")  # the one has an entry, the other changes no figure
-    options = {name: value for name, value in result.provenance.options.items() if name not in not_listed}
-    versions = {f"version of {name}": value for name, value in result.provenance.versions.items()}
+    options = {name: value for name, value in comparison.provenance.options.items() if name not in not_listed}
+    versions = {f"version of {name}": value for name, value in comparison.provenance.versions.items()}
     return {
         "reference": reference.name,
         "files of the reference": [f"{file.name} {file.sha256[:12]}" for file in reference.files],
         "tolerance": {
-            kind: value for kind, value in result.tolerance.items() if value != MIN_SHARES.get(kind)
+            kind: value for kind, value in comparison.tolerance.items() if value != MIN_SHARES.get(kind)
         },
         **options,
         **versions,
@@ -299,59 +299,58 @@ def _to_option(frame: Transform) -> list[float]:
     return [float(value) + 0.0 for value in values]  # + 0.0: no -0.0
 
 
-NAMED = 30
-"""Quantities and logs that a fact names; more are counted."""
+MAX_NAMED = 30  # quantities and logs that a fact names; more are counted
 
-WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "out_fraction": "out", "samples": "samples"}
-"""What people call what may be worse."""
+# The names of the statistics that may be worse.
+STATISTIC_NAMES: dict[Worse, str] = {"max": "max", "rms": "rms", "out_fraction": "out", "samples": "samples"}
 
 
-def baseline_section(found: BaselineComparison, rank: int) -> Section:
-    """Return what changed since an earlier comparison."""
-    said = "a log of the baseline, not compared any more"
+def baseline_section(baseline: BaselineComparison, rank: int) -> Section:
+    """Return the section of the changes since an earlier comparison."""
+    message = "a log of the baseline, not compared any more"
     gone = [
-        Section(one.run, "fail", checks=(_check(one.run, "log is there", f"{one.run}: {said}"),))
-        for one in found.missing
-        if one.quantity is None
+        Section(log.run, "fail", checks=(_check(log.run, "log is there", f"{log.run}: {message}"),))
+        for log in baseline.missing
+        if log.quantity is None
     ]
     return Section(
-        f"Against the baseline {found.name}",
-        found.verdict,
-        tuple(_facts(found)),
-        tuple(_tables(found)),
+        f"Against the baseline {baseline.name}",
+        baseline.verdict,
+        tuple(_facts(baseline)),
+        tuple(_tables(baseline)),
         sections=tuple(gone),
         rank=rank,
     )
 
 
-def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
+def baseline_checks(baseline: BaselineComparison, run: str) -> Iterator[Check]:
     """Yield a check for each quantity of a log that was compared then."""
-    for one in found.changes:
-        if one.run == run:
-            noise = text.format_stated(one.noise, one.now.unit)
-            said = f"{absolute_symbol(one.now)}: {format_worse(one)} (noise {noise})" if one.worse else ""
-            yield _check(run, quantity_name(one.now), said)
-    for lost in found.missing:
+    for change in baseline.changes:
+        if change.run == run:
+            noise = text.format_stated(change.noise, change.now.unit)
+            message = f"{absolute_symbol(change.now)}: {format_worse(change)} (noise {noise})"
+            yield _check(run, quantity_name(change.now), message if change.worse else "")
+    for lost in baseline.missing:
         if lost.run == run:
-            said = f"{lost.quantity}: in the baseline, not compared any more"
-            yield _check(run, f"{lost.quantity} is there", said)
+            message = f"{lost.quantity}: in the baseline, not compared any more"
+            yield _check(run, f"{lost.quantity} is there", message)
 
 
-def criterion_checks(found: BaselineComparison) -> Iterator[Check]:
+def criterion_checks(baseline: BaselineComparison) -> Iterator[Check]:
     """Yield a check for each criterion after ISO 9283 that was compared then."""
-    for one in found.criteria:
-        noise = f" (noise {written(Value(one.noise, _shown(one.now.unit), given=True), unit=True)})"
-        said = f"{one.now.name}: {format_criterion_change(one)}{noise}" if one.worse else ""
-        yield _check("criteria", one.now.name, said)
-    for lost in found.missing:
-        said = f"{lost.quantity}: in the baseline, without a value now"
-        yield _check("criteria", f"{lost.quantity} is there", said)
+    for change in baseline.criteria:
+        noise = f" (noise {written(Value(change.noise, _shown(change.now.unit), given=True), unit=True)})"
+        message = f"{change.now.name}: {format_criterion_change(change)}{noise}" if change.worse else ""
+        yield _check("criteria", change.now.name, message)
+    for lost in baseline.missing:
+        message = f"{lost.quantity}: in the baseline, without a value now"
+        yield _check("criteria", f"{lost.quantity} is there", message)
 
 
-def format_criterion_change(one: CriterionChange) -> str:
+def format_criterion_change(change: CriterionChange) -> str:
     """Return a criterion before and now: "0.1000 → 0.2000 mm"."""
-    unit = _shown(one.now.unit)
-    before, now = abs(one.before.value or 0.0), abs(one.now.value or 0.0)
+    unit = _shown(change.now.unit)
+    before, now = abs(change.before.value or 0.0), abs(change.now.value or 0.0)
     return f"{written(Value(before, unit, now))} → {written(Value(now, unit, before), unit=True)}"
 
 
@@ -360,19 +359,19 @@ def _shown(unit: str) -> str:
     return "%" if unit == "1" else unit
 
 
-def _check(run: str, name: str, said: str) -> Check:
-    """Return a check that fails if there is something to say."""
+def _check(run: str, name: str, message: str) -> Check:
+    """Return a check that fails if it has a message."""
     about = f"{run} against baseline"
-    return Check(name, "fail" if said else "pass", said, about, kind="worse-than-baseline")
+    return Check(name, "fail" if message else "pass", message, about, kind="worse-than-baseline")
 
 
-def format_worse_count(found: BaselineComparison) -> str:
-    """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
-    said = [f"{count_quantities(len(found.worse))} worse"] if found.worse else []
-    criteria = text.join_list([one.now.name for one in found.worse_criteria])
-    said += [f"{criteria} worse"] if criteria else []
-    said += [f"{len(found.missing)} gone"] if found.missing else []
-    return ", ".join(said) or "nothing worse"
+def format_worse_count(baseline: BaselineComparison) -> str:
+    """Return how many quantities are worse: "5 quantities worse, 1 gone", "nothing worse"."""
+    counts = [f"{count_quantities(len(baseline.worse))} worse"] if baseline.worse else []
+    criteria = text.join_list([change.now.name for change in baseline.worse_criteria])
+    counts += [f"{criteria} worse"] if criteria else []
+    counts += [f"{len(baseline.missing)} gone"] if baseline.missing else []
+    return ", ".join(counts) or "nothing worse"
 
 
 def count_quantities(count: int) -> str:
@@ -380,108 +379,117 @@ def count_quantities(count: int) -> str:
     return f"{count} {'quantity' if count == 1 else 'quantities'}"
 
 
-def format_worse(one: QuantityChange) -> str:
-    """Return what of a quantity is worse, before and now: "max 1.0000 → 2.0000 mm, out 1.0 % → 3.0 %"."""
-    pairs = {name: _pair(one, name) for name in one.worse}
+def format_worse(change: QuantityChange) -> str:
+    """Return the worse statistics, before and now: "max 1.0000 → 2.0000 mm, out 1.0 % → 3.0 %"."""
+    pairs = {name: _pair(change, name) for name in change.worse}
     return ", ".join(
-        f"{WORDS[name]} {written(before)} → {written(now, unit=True)}"
+        f"{STATISTIC_NAMES[name]} {written(before)} → {written(now, unit=True)}"
         for name, (before, now) in pairs.items()
     )
 
 
-def _pair(one: QuantityChange, name: Worse) -> tuple[Value, Value]:
-    """Return a statistic before and now, with digits that tell them apart if it changed."""
-    before, now = getattr(one.before, name), getattr(one.now, name)
-    unit = {"out_fraction": "%", "samples": ""}.get(name, one.now.unit)
-    told = name in (*one.worse, *one.better)
-    return Value(before, unit, now if told else None), Value(now, unit, before if told else None)
+def _pair(change: QuantityChange, name: Worse) -> tuple[Value, Value]:
+    """Return a statistic before and now, with digits that distinguish them if it changed."""
+    before, now = getattr(change.before, name), getattr(change.now, name)
+    unit = {"out_fraction": "%", "samples": ""}.get(name, change.now.unit)
+    is_changed = name in (*change.worse, *change.better)
+    return Value(before, unit, now if is_changed else None), Value(now, unit, before if is_changed else None)
 
 
-def worse_facts(found: BaselineComparison) -> Iterator[Fact]:
-    """Yield what decides against a baseline: how much is worse, and what."""
-    yield Fact("Since the baseline", format_worse_count(found))
-    worse = [f"{symbol(one.now)} of {one.run} ({_words(one.worse)})" for one in found.worse]
+def worse_facts(baseline: BaselineComparison) -> Iterator[Fact]:
+    """Yield the number of quantities that are worse than a baseline, and their names."""
+    yield Fact("Since the baseline", format_worse_count(baseline))
+    worse = [
+        f"{symbol(change.now)} of {change.run} ({_join_names(change.worse)})" for change in baseline.worse
+    ]
     yield Fact("Worse", _listed(worse))
-    yield Fact("Gone", _listed(list(map(str, found.missing))))
+    yield Fact("Gone", _listed(list(map(str, baseline.missing))))
 
 
-def _facts(found: BaselineComparison) -> Iterator[Fact]:
-    yield from worse_facts(found)
-    yield Fact("New", _listed(list(map(str, found.new))))
-    noise = (f"{kind} {text.format_stated(value, UNITS[kind])}" for kind, value in found.noise.items())
+def _facts(baseline: BaselineComparison) -> Iterator[Fact]:
+    yield from worse_facts(baseline)
+    yield Fact("New", _listed(list(map(str, baseline.new))))
+    noise = (f"{kind} {text.format_stated(value, UNITS[kind])}" for kind, value in baseline.noise.items())
     yield Fact("Noise", ", ".join(noise), "smaller changes are not listed")
-    yield Fact("Recording of the baseline", str(found.recording or ""), brief=False)
+    yield Fact("Recording of the baseline", str(baseline.recording or ""), brief=False)
 
 
-def _tables(found: BaselineComparison) -> Iterator[Table]:
-    """Yield the quantities that changed by more than the noise, and what was made differently."""
-    changed = sorted((one for one in found.changes if one.changed), key=lambda one: not one.worse)
+def _tables(baseline: BaselineComparison) -> Iterator[Table]:
+    """Yield the quantities that changed by more than the noise, and the settings that differ."""
+    changed = sorted(
+        (change for change in baseline.changes if change.changed), key=lambda change: not change.worse
+    )
     if changed:
-        yield Table(f"Changed since {found.name} by more than the noise", columns_of(changed, _HEADS))
+        yield Table(
+            f"Changed since {baseline.name} by more than the noise", columns_of(changed, _QUANTITY_COLUMNS)
+        )
     criteria = sorted(
-        (one for one in found.criteria if one.worse or one.better), key=lambda one: not one.worse
+        (change for change in baseline.criteria if change.worse or change.better),
+        key=lambda change: not change.worse,
     )
     if criteria:
         yield Table(
-            f"Criteria changed since {found.name} by more than the noise", columns_of(criteria, _CRITERIA)
+            f"Criteria changed since {baseline.name} by more than the noise",
+            columns_of(criteria, _CRITERION_COLUMNS),
         )
-    if found.differences:
+    if baseline.differences:
         rows = [
-            (one.what, *(option_words(one.what, value, UNITS) for value in (one.before, one.now)))
-            for one in found.differences
+            (
+                setting.what,
+                *(option_words(setting.what, value, UNITS) for value in (setting.before, setting.now)),
+            )
+            for setting in baseline.differences
         ]
         heads = {"what": "What", "before": "before", "now": "now"}
         yield table_of("Made differently", heads, rows, brief=True)
 
 
 def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
+    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
+    return ", ".join(names[:MAX_NAMED]) + more
 
 
-def _words(found: Sequence[Worse]) -> str:
-    return ", ".join(WORDS[name] for name in found)
+def _join_names(statistics: Sequence[Worse]) -> str:
+    return ", ".join(STATISTIC_NAMES[name] for name in statistics)
 
 
 def _columns(name: Worse) -> dict[str, tuple[str, Callable[[QuantityChange], Cell]]]:
     """Return a statistic before and now; a share or a count only where it changed."""
 
-    def cells(one: QuantityChange) -> tuple[Cell, Cell]:
-        shown = name in ("max", "rms", *one.worse, *one.better)
-        return _pair(one, name) if shown else (None, None)
+    def cells(change: QuantityChange) -> tuple[Cell, Cell]:
+        shown = name in ("max", "rms", *change.worse, *change.better)
+        return _pair(change, name) if shown else (None, None)
 
-    word = WORDS[name]
+    word = STATISTIC_NAMES[name]
     return {
-        f"{word}_before": (f"{word} before", lambda one: cells(one)[0]),
-        f"{word}_now": (f"{word} now", lambda one: cells(one)[1]),
+        f"{word}_before": (f"{word} before", lambda change: cells(change)[0]),
+        f"{word}_now": (f"{word} now", lambda change: cells(change)[1]),
     }
 
 
-def _verdict(one: QuantityChange, verdict: Verdict | None) -> Judged:
+def _verdict(change: QuantityChange, verdict: Verdict | None) -> Judged:
     """Return a verdict where it changed."""
-    return Judged(verdict if one.before.verdict != one.now.verdict else None)
+    return Judged(verdict if change.before.verdict != change.now.verdict else None)
 
 
-_CRITERIA: Heads[CriterionChange] = {
-    "name": ("Criterion", lambda one: one.now.name),
-    "worse": ("worse", lambda one: "worse" if one.worse else "better"),
-    "before": ("before", lambda one: Value(one.before.value, _shown(one.now.unit))),
-    "now": ("now", lambda one: Value(one.now.value, _shown(one.now.unit))),
+_CRITERION_COLUMNS: Heads[CriterionChange] = {
+    "name": ("Criterion", lambda change: change.now.name),
+    "worse": ("worse", lambda change: "worse" if change.worse else "better"),
+    "before": ("before", lambda change: Value(change.before.value, _shown(change.now.unit))),
+    "now": ("now", lambda change: Value(change.now.value, _shown(change.now.unit))),
 }
-"""The columns of criteria that changed, by their keys."""
 
-_HEADS: Heads[QuantityChange] = {
-    "run": ("Log", lambda one: Ref(one.run)),
-    "quantity": ("Quantity", lambda one: symbol(one.now)),
-    "worse": ("worse", lambda one: _words(one.worse)),
-    "better": ("better", lambda one: _words(one.better)),
+_QUANTITY_COLUMNS: Heads[QuantityChange] = {
+    "run": ("Log", lambda change: Ref(change.run)),
+    "quantity": ("Quantity", lambda change: symbol(change.now)),
+    "worse": ("worse", lambda change: _join_names(change.worse)),
+    "better": ("better", lambda change: _join_names(change.better)),
     **_columns("max"),
     **_columns("rms"),
     **_columns("out_fraction"),
     **_columns("samples"),
-    "largest_change": ("most at one sample", lambda one: Value(one.largest_change, one.now.unit)),
-    "t_largest_change": ("at t", lambda one: Value(one.t_largest_change, "s")),
-    "verdict_before": ("verdict before", lambda one: _verdict(one, one.before.verdict)),
-    "verdict_now": ("verdict now", lambda one: _verdict(one, one.now.verdict)),
+    "largest_change": ("most at one sample", lambda change: Value(change.largest_change, change.now.unit)),
+    "t_largest_change": ("at t", lambda change: Value(change.t_largest_change, "s")),
+    "verdict_before": ("verdict before", lambda change: _verdict(change, change.before.verdict)),
+    "verdict_now": ("verdict now", lambda change: _verdict(change, change.now.verdict)),
 }
-"""The columns of what changed, by their keys."""

@@ -265,8 +265,8 @@ def check_static_poses(reference: Run, runs: Sequence[Run], options: CompareOpti
             *(run_finding(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in unequal)
         )
     if options.sync not in (None, "start"):
-        found = f"{options.sync} of still poses"
-        raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
+        refused = f"{options.sync} of still poses"
+        raise OptionError(Finding(parameter="sync", found=refused, allowed="start, row by row"))
 
 
 def _no_motion(run: Run) -> Finding:
@@ -298,9 +298,9 @@ def _join_frames(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> 
     hint, errors = Hint("align", "base+tool", "finds the frames of base and tool"), []
     for run in measured:
         names = ", ".join(column.name for column in run.log.columns if column.role == "position")
-        found = f"a tool that was measured in a frame of its own ({names})"
+        side = f"a tool that was measured in a frame of its own ({names})"  # plain: ok
         error = run_finding(run, "", hint, parameter="align")
-        errors.append(replace(error, found=found, allowed="base+tool, rigid, start"))
+        errors.append(replace(error, found=side, allowed="base+tool, rigid, start"))
     raise LogError(*errors)
 
 

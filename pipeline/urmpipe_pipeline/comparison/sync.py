@@ -241,9 +241,9 @@ def synchronise(
     return Sync("auto", best.offset, by, best.precision, best.similarity)
 
 
-def _undetermined(log: Trajectory, option: str, found: str, allowed: str, *hints: Hint) -> Finding:
+def _undetermined(log: Trajectory, option: str, motion: str, allowed: str, *hints: Hint) -> Finding:
     file = log.files[0].name if log.files else log.name
-    return Finding(option, file, parameter="sync", found=found, allowed=allowed, hints=hints)
+    return Finding(option, file, parameter="sync", found=motion, allowed=allowed, hints=hints)
 
 
 def iter_channels(reference: Trajectory, log: Trajectory, align: AlignMode) -> Iterator[Channels]:

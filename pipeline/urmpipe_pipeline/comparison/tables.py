@@ -35,32 +35,35 @@ from urmpipe_pipeline.runs.exports import clock_stamps, export_metadata
 from urmpipe_pipeline.text import drop_surrogates
 from urmpipe_pipeline.trajectories import joint_order
 
+# What a share is of.
 MEANING = {"coverage": "of the reference, shown by the log", "judged": "of the log's motion, judged"}
-"""What a share is of."""
-
+# The subjects of the kinds of deviation.
 ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
-"""What the kinds of deviation are about."""
 
 
-def ranking_tables(result: Comparison) -> tuple[Table, ...]:
-    """Return the logs from best to worst: how far off, then when, where and how compared; none of one log."""
-    if len(result.runs) < 2:
+def ranking_tables(comparison: Comparison) -> tuple[Table, ...]:
+    """Return the deviations of the logs, best first, and when, where and how compared; empty for one log."""
+    if len(comparison.runs) < 2:
         return ()
-    names: Heads[Deviation] = {"run": ("Log", lambda one: reference_of(result, one))}
+    names: Heads[Deviation] = {"run": ("Log", lambda deviation: reference_of(comparison, deviation))}
     far: Heads[Deviation] = {
         **names,
-        "verdict": ("Verdict", lambda one: Judged(one.verdict)),
-        "decided_by": ("Decided by", lambda one: absolute_symbol(one.decisive)),
-        **_sizes(result),
+        "verdict": ("Verdict", lambda deviation: Judged(deviation.verdict)),
+        "decided_by": ("Decided by", lambda deviation: absolute_symbol(deviation.decisive)),
+        **_sizes(comparison),
     }
     note = "The logs are ranked by the largest share of a tolerance that each uses."
     left_out = "Left out: samples of the log without a counterpart or without a value."
-    partly = {share.quantity for one in result.runs for share in one.incomplete_shares}
+    partly = {share.quantity for deviation in comparison.runs for share in deviation.incomplete_shares}
     note += "".join(f" {name.capitalize()}: share {MEANING[name]}." for name in MEANING if name in partly)
     hidden = set(MEANING) - partly
     columns = (
-        replace(one, brief=one.key not in hidden, page=one.key not in hidden and _leads(result, one.key))
-        for one in columns_of(result.ranking, far)
+        replace(
+            column,
+            brief=column.key not in hidden,
+            page=column.key not in hidden and _is_on_page(comparison, column.key),
+        )
+        for column in columns_of(comparison.ranking, far)
     )
     return (
         Table(
@@ -69,222 +72,243 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
             note,
             page_title="Largest deviations, from worst to best",
         ),
-        Table("When, where and how compared", tuple(_conditions(result, names)), left_out, page=False),
+        Table("When, where and how compared", tuple(_conditions(comparison, names)), left_out, page=False),
     )
 
 
-def _leads(result: Comparison, key: str) -> bool:
-    """Tell whether a page shows a column of the largest deviations here, not in the statistics of each log.
+def _is_on_page(comparison: Comparison, key: str) -> bool:
+    """Return whether a page shows a column of the largest deviations here, not in the logs' statistics.
 
     Where joints of a unit are compared, the statistics have the largest values of all in that unit.
     """
-    joints = {held.unit for one in result.runs for held in one.joint_statistics.values()}
+    joints = {
+        statistics.unit for deviation in comparison.runs for statistics in deviation.joint_statistics.values()
+    }
     if key in ("max_angle", "max_joint", "max_slide"):
         return "rad" not in joints and key == "max_angle"
     return not (key.startswith("max_") and "m" in joints)
 
 
-def reference_of(result: Comparison, one: Deviation) -> Ref:
+def reference_of(comparison: Comparison, deviation: Deviation) -> Ref:
     """Return the name of a log, as a reference to its section, in its colour."""
-    return Ref(one.name, run_colour(result.runs.index(one)))
+    return Ref(deviation.name, run_colour(comparison.runs.index(deviation)))
 
 
-def _sizes(result: Comparison) -> Heads[Deviation]:
-    """Return the columns of the largest deviations, and of how much was out and seen."""
+def _sizes(comparison: Comparison) -> Heads[Deviation]:
+    """Return the columns of the largest deviations, and of the fractions out of tolerance and seen."""
 
     def seen(quantity: ShareKind) -> Callable[[Deviation], Cell]:
-        return lambda one: share_value(one.shares.get(quantity))
+        return lambda deviation: share_value(deviation.shares.get(quantity))
 
     return {
-        "max_x": ("max |Δx|", lambda one: max_value(one.statistics.get("x"))),
-        "max_y": ("max |Δy|", lambda one: max_value(one.statistics.get("y"))),
-        "max_z": ("max |Δz|", lambda one: max_value(one.statistics.get("z"))),
-        "max_norm": ("max ‖Δ‖", lambda one: max_value(one.statistics.get("norm"))),
-        "max_path": ("max path", lambda one: max_value(one.statistics.get("path"))),
-        "max_angle": ("max angle", lambda one: max_value(one.statistics.get("angle"))),
-        "max_joint": ("max joint", lambda one: max_value(one.worst_joint("rad"))),
-        "max_slide": ("max slide", lambda one: max_value(one.worst_joint("m"))),
-        "out_fraction": ("out", lambda one: Value(one.out_fraction, "%")),
+        "max_x": ("max |Δx|", lambda deviation: max_value(deviation.statistics.get("x"))),
+        "max_y": ("max |Δy|", lambda deviation: max_value(deviation.statistics.get("y"))),
+        "max_z": ("max |Δz|", lambda deviation: max_value(deviation.statistics.get("z"))),
+        "max_norm": ("max ‖Δ‖", lambda deviation: max_value(deviation.statistics.get("norm"))),
+        "max_path": ("max path", lambda deviation: max_value(deviation.statistics.get("path"))),
+        "max_angle": ("max angle", lambda deviation: max_value(deviation.statistics.get("angle"))),
+        "max_joint": ("max joint", lambda deviation: max_value(deviation.worst_joint("rad"))),
+        "max_slide": ("max slide", lambda deviation: max_value(deviation.worst_joint("m"))),
+        "out_fraction": ("out", lambda deviation: Value(deviation.out_fraction, "%")),
         "coverage": ("coverage", seen("coverage")),
         "judged": ("judged", seen("judged")),
     }
 
 
-def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]:
-    """Yield the columns of when and where each log is worst, and how it was compared."""
-    runs = result.ranking
+def _conditions(comparison: Comparison, names: Heads[Deviation]) -> Iterator[Column]:
+    """Yield the columns of the time and place of the worst sample of each log, and how it was compared."""
+    runs = comparison.ranking
     heads: Heads[Deviation] = {
         **names,
-        "t": ("decided at t", lambda one: Value(_decided_t(one), "s")),
+        "t": ("decided at t", lambda deviation: Value(_decided_t(deviation), "s")),
         "place": ("log there at x, y, z", _decided_place),
-        "longest_out_interval": ("longest out", lambda one: _stretch(one, "duration")),
-        "longest_out_interval_t": ("longest out from t", lambda one: _stretch(one, "t")),
-        "sync_offset": ("offset", lambda one: Value(one.sync.offset, "s", signed=True)),
-        "speed_correlation": ("r(‖Δ‖, speed)", lambda one: Value(one.speed_correlation, "1", signed=True)),
-        "left_out": ("left out", lambda one: Value(one.left_out)),
-        "warnings": ("warnings", lambda one: Value(len(result.warnings_of(one)))),
-        "alignment": ("alignment", lambda one: format_alignment(one)[0]),
+        "longest_out_interval": ("longest out", lambda deviation: _longest_out(deviation, "duration")),
+        "longest_out_interval_t": ("longest out from t", lambda deviation: _longest_out(deviation, "t")),
+        "sync_offset": ("offset", lambda deviation: Value(deviation.sync.offset, "s", signed=True)),
+        "speed_correlation": (
+            "r(‖Δ‖, speed)",
+            lambda deviation: Value(deviation.speed_correlation, "1", signed=True),
+        ),
+        "left_out": ("left out", lambda deviation: Value(deviation.left_out)),
+        "warnings": ("warnings", lambda deviation: Value(len(comparison.warnings_of(deviation)))),
+        "alignment": ("alignment", lambda deviation: format_alignment(deviation)[0]),
     }
-    if not all(one.run.timed for one in runs):
-        row = ("decided in row", lambda one: Value(_decided_row(one)))
+    if not all(deviation.run.timed for deviation in runs):
+        row = ("decided in row", lambda deviation: Value(_decided_row(deviation)))
         heads = {
             **names,
             "t": row,
             **{key: heads[key] for key in ("place", "left_out", "warnings", "alignment")},
         }
     brief = {"run", "t", "longest_out_interval", "longest_out_interval_t", "speed_correlation"}
-    brief |= {"sync_offset"} if any(one.sync.offset for one in runs) else set()
-    brief |= {"left_out"} if any(one.left_out for one in runs) else set()
+    brief |= {"sync_offset"} if any(deviation.sync.offset for deviation in runs) else set()
+    brief |= {"left_out"} if any(deviation.left_out for deviation in runs) else set()
     for column in columns_of(runs, heads):
         yield replace(column, brief=column.key in brief)
 
 
-def _decided_t(one: Deviation) -> float | None:
-    """Return when the verdict was decided in [s]: of a share where most was unseen."""
-    held = one.decisive
-    return (
-        held.t_max if isinstance(held, Statistics) else held.longest_unseen.t if held.longest_unseen else None
-    )
+def _decided_t(deviation: Deviation) -> float | None:
+    """Return the time in [s] that decided the verdict: of a share when its longest unseen part starts."""
+    decisive = deviation.decisive
+    if isinstance(decisive, Statistics):
+        return decisive.t_max
+    return decisive.longest_unseen.t if decisive.longest_unseen else None
 
 
-def _decided_place(one: Deviation) -> Place | None:
-    return max_place(one, one.worst_statistics) if one.decisive is one.worst_statistics else None
+def _decided_place(deviation: Deviation) -> Place | None:
+    worst = deviation.worst_statistics
+    return max_place(deviation, worst) if deviation.decisive is worst else None
 
 
-def _decided_row(one: Deviation) -> int | None:
-    """Return the row, from 1, in which the verdict was decided: of a share the first of those unseen."""
-    held = one.decisive
-    if isinstance(held, Statistics):
-        return one.row(held)
-    return held.longest_unseen.sample + 1 if held.longest_unseen else None
+def _decided_row(deviation: Deviation) -> int | None:
+    """Return the row, from 1, that decided the verdict: of a share the first of its longest unseen rows."""
+    decisive = deviation.decisive
+    if isinstance(decisive, Statistics):
+        return deviation.row(decisive)
+    return decisive.longest_unseen.sample + 1 if decisive.longest_unseen else None
 
 
-def _stretch(one: Deviation, name: str) -> Value | None:
-    longest = one.longest_out_interval
+def _longest_out(deviation: Deviation, name: str) -> Value | None:
+    longest = deviation.longest_out_interval
     return None if longest is None else Value(getattr(longest, name), "s")
 
 
-def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
-    """Yield the lines of a comparison among several: one a log, from best to worst."""
+def comparison_lines(comparison: Comparison) -> Iterator[dict[str, Cell]]:
+    """Yield the lines of a comparison among several: one per log, from best to worst."""
     lost: list[str] = []
-    if result.baseline:
-        lost = [*(one.run for one in result.baseline.worse), *(one.run for one in result.baseline.missing)]
-    for one in result.ranking:
-        worse = lost.count(one.name)
+    if comparison.baseline:
+        lost += [change.run for change in comparison.baseline.worse]
+        lost += [quantity.run for quantity in comparison.baseline.missing]
+    for deviation in comparison.ranking:
+        worse = lost.count(deviation.name)
         yield {
-            "Log": reference_of(result, one),
-            "Recording": result.recording.name if result.recording else "",
-            "Robot": one.run.robot.name if one.run.robot else "",
-            "Verdict": Judged(one.verdict),
+            "Log": reference_of(comparison, deviation),
+            "Recording": comparison.recording.name if comparison.recording else "",
+            "Robot": deviation.run.robot.name if deviation.run.robot else "",
+            "Verdict": Judged(deviation.verdict),
             "Worse than its baseline": f"in {count_quantities(worse)}" if worse else "",
-            **{title: cell(one) for title, cell in _sizes(result).values()},
-            "Reference": result.reference.name,
-            "Assuming": "; ".join(result.assumptions),
-            "Made [UTC]": minute_of(result.provenance.created),
+            **{title: cell(deviation) for title, cell in _sizes(comparison).values()},
+            "Reference": comparison.reference.name,
+            "Assuming": "; ".join(comparison.assumptions),
+            "Made [UTC]": minute_of(comparison.provenance.created),
         }
 
 
-def statistics_tables(one: Deviation, *, ranked: bool = False) -> Iterator[Table]:
+def statistics_tables(deviation: Deviation, *, ranked: bool = False) -> Iterator[Table]:
     """Yield the statistics of every quantity of a log: those in m, then those in rad, then the shares.
 
     Args:
-        one: The log.
+        deviation: The log.
         ranked: Whether a table of all logs has their largest deviations.
     """
-    starts = dict(zip(map(id, one.all_statistics), (float(values[0]) for values in one.values), strict=True))
+    starts = dict(
+        zip(map(id, deviation.all_statistics), (float(values[0]) for values in deviation.values), strict=True)
+    )
     for unit in text.SHOWN:
-        own = [held for held in one.all_statistics if held.unit == unit]
-        if own:
-            about = text.join_list(list(dict.fromkeys(ABOUT[held.kind] for held in own)))
+        same_unit = [statistics for statistics in deviation.all_statistics if statistics.unit == unit]
+        if same_unit:
+            about = text.join_list(list(dict.fromkeys(ABOUT[statistics.kind] for statistics in same_unit)))
             start = (
-                f"t = {text.format_seconds(float(one.t_ns[0]) / 1e9)} s" if one.run.timed else "the first row"
+                f"t = {text.format_seconds(float(deviation.t_ns[0]) / 1e9)} s"
+                if deviation.run.timed
+                else "the first row"
             )
             note = (
                 "max, rms and p95 are of absolute values, mean and std signed. At start: the difference of"
                 f" the start poses (mutual calibration) at {start}."
             )
             known = {"tolerance"} | (
-                {"max"} if ranked and all(held.kind != "joint" for held in own) else set()
+                {"max"} if ranked and all(statistics.kind != "joint" for statistics in same_unit) else set()
             )
             columns = (
-                replace(column, page=column.key not in known) for column in _statistics(one, own, starts)
+                replace(column, page=column.key not in known)
+                for column in _statistics(deviation, same_unit, starts)
             )
             yield Table(f"Statistics of {about}", tuple(columns), note)
-    if one.shares:
-        note = " ".join(f"{name.capitalize()}: share {MEANING[name]}." for name in one.shares)
-        yield Table("How much was judged", _shares(one), note, brief=False)
+    if deviation.shares:
+        note = " ".join(f"{name.capitalize()}: share {MEANING[name]}." for name in deviation.shares)
+        yield Table("How much was judged", _shares(deviation), note, brief=False)
 
 
-def _shares(one: Deviation) -> tuple[Column, ...]:
+def _shares(deviation: Deviation) -> tuple[Column, ...]:
     """Return the columns of the shares of a log."""
 
     def unseen(name: str, unit: str = "") -> Callable[[Share], Cell]:
-        return lambda held: (
-            None if held.longest_unseen is None else Value(getattr(held.longest_unseen, name), unit)
+        return lambda share: (
+            None if share.longest_unseen is None else Value(getattr(share.longest_unseen, name), unit)
         )
 
     heads: Heads[Share] = {
-        "quantity": ("Quantity", lambda held: held.quantity),
-        "verdict": ("Verdict", lambda held: Judged(held.verdict)),
-        "tolerance": ("at least", lambda held: Value(held.tolerance, "%", given=True)),
+        "quantity": ("Quantity", lambda share: share.quantity),
+        "verdict": ("Verdict", lambda share: Judged(share.verdict)),
+        "tolerance": ("at least", lambda share: Value(share.tolerance, "%", given=True)),
         "value": ("share", share_value),
-        "samples": ("samples", lambda held: Value(held.samples)),
-        "total": ("total", lambda held: Value(held.total)),
+        "samples": ("samples", lambda share: Value(share.samples)),
+        "total": ("total", lambda share: Value(share.total)),
         "unseen_t": ("longest unseen from t", unseen("t", "s")),
         "longest_unseen": ("unseen for", unseen("duration", "s")),
         "unseen_samples": ("unseen samples", unseen("samples")),
     }
-    return columns_of(list(one.shares.values()), heads)
+    return columns_of(list(deviation.shares.values()), heads)
 
 
-def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, float]) -> tuple[Column, ...]:
+def _statistics(
+    deviation: Deviation, same_unit: list[Statistics], starts: Mapping[int, float]
+) -> tuple[Column, ...]:
     """Return the columns of the statistics of some quantities in one unit."""
-    joint = one.worst_joint(own[0].unit)
+    worst_joint = deviation.worst_joint(same_unit[0].unit)
 
     def number(key: str) -> tuple[str, Callable[[Statistics], Cell]]:
-        return key, lambda held: Value(getattr(held, key), held.unit)
+        return key, lambda statistics: Value(getattr(statistics, key), statistics.unit)
 
     heads: Heads[Statistics] = {
         "quantity": ("Quantity", symbol),
-        "verdict": ("Verdict", lambda held: Judged(held.verdict)),
-        "tolerance": ("tolerance", lambda held: Value(held.tolerance, held.unit, given=True)),
-        "max": ("max", lambda held: max_value(held, most=held is joint and held.max > 0.0)),
-        "t_max": ("at t", lambda held: Value(held.t_max, "s"))
-        if one.run.timed
-        else ("in row", lambda held: Value(one.row(held))),
+        "verdict": ("Verdict", lambda statistics: Judged(statistics.verdict)),
+        "tolerance": (
+            "tolerance",
+            lambda statistics: Value(statistics.tolerance, statistics.unit, given=True),
+        ),
+        "max": (
+            "max",
+            lambda statistics: max_value(statistics, most=statistics is worst_joint and statistics.max > 0.0),
+        ),
+        "t_max": ("at t", lambda statistics: Value(statistics.t_max, "s"))
+        if deviation.run.timed
+        else ("in row", lambda statistics: Value(deviation.row(statistics))),
         **{key: number(key) for key in ("rms", "p95", "mean", "std")},
-        "start": ("at start", lambda held: Value(starts[id(held)], held.unit)),
-        "out_of_tolerance": ("samples out", lambda held: Value(held.out_of_tolerance)),
-        "out_fraction": ("out", lambda held: Value(held.out_fraction, "%")),
-        "missing": ("no value", lambda held: Value(held.missing or None)),
+        "start": ("at start", lambda statistics: Value(starts[id(statistics)], statistics.unit)),
+        "out_of_tolerance": ("samples out", lambda statistics: Value(statistics.out_of_tolerance)),
+        "out_fraction": ("out", lambda statistics: Value(statistics.out_fraction, "%")),
+        "missing": ("no value", lambda statistics: Value(statistics.missing or None)),
     }
-    return columns_of(own, heads)
+    return columns_of(same_unit, heads)
 
 
-def statistics_rows(result: Comparison) -> Table:
-    """Return what --csv writes: a row a log and quantity; lengths in [m], angles in [rad], times in [s]."""
-    return rows_table("Statistics", ROW, result.rows())
+def statistics_rows(comparison: Comparison) -> Table:
+    """Return what --csv writes: one row per log and quantity, in [m], [rad] and [s]."""
+    return rows_table("Statistics", ROW, comparison.rows())
 
 
-def max_place(one: Deviation, held: Statistics) -> Place | None:
-    """Return where a log was when a quantity of it was largest; None where joints alone are compared."""
-    place = one.place(held)
+def max_place(deviation: Deviation, statistics: Statistics) -> Place | None:
+    """Return the position of a log at the largest value of a quantity; None if joints alone are compared."""
+    place = deviation.place(statistics)
     return None if place is None else Place(place)
 
 
-def max_value(one: Statistics | None, *, most: bool = False) -> Value | None:
-    """Return the largest absolute value of a quantity, with what is allowed of it; None without one."""
-    if one is None:
+def max_value(statistics: Statistics | None, *, most: bool = False) -> Value | None:
+    """Return the largest absolute value of a quantity, with its tolerance; None without a quantity."""
+    if statistics is None:
         return None
-    return Value(one.max, one.unit, one.tolerance, one.verdict, one.utilisation, most=most)
+    value, used = statistics.max, statistics.utilisation
+    return Value(value, statistics.unit, statistics.tolerance, statistics.verdict, used, most=most)
 
 
-def share_value(one: Share | None) -> Value | None:
-    """Return a share with what is needed of it; None without one."""
-    if one is None:
+def share_value(share: Share | None) -> Value | None:
+    """Return a share with its least value; None without a share."""
+    if share is None:
         return None
-    used = math.inf if one.verdict == "fail" else one.utilisation
-    return Value(one.value, "%", one.tolerance, one.verdict, used, least=True)
+    used = math.inf if share.verdict == "fail" else share.utilisation
+    return Value(share.value, "%", share.tolerance, share.verdict, used, least=True)
 
 
 NO_ORIENTATION = LogWarning(
@@ -294,7 +318,7 @@ NO_ORIENTATION = LogWarning(
 
 
 def exports(comparison: Comparison) -> Exports:
-    """Return what can leave of a comparison."""
+    """Return the exports of a comparison: its samples, its criteria and its poses."""
     about = export_metadata(comparison.name, comparison.provenance) | {
         "reference": comparison.reference.name,
         "tolerance": dict(comparison.tolerance),
@@ -337,9 +361,9 @@ def delta_table(comparison: Comparison) -> ExportTable:
 
 
 def criteria_table(test: IsoTest) -> ExportTable:
-    """Return a row a criterion and place of a test after ISO 9283, then a failed cycle, in SI.
+    """Return one row per criterion and place of a test after ISO 9283, then per failed cycle, in SI.
 
-    What is not there is NaN or empty. Each row has its own unit: 1 of a share.
+    A missing value is NaN or empty. Each row has its own unit: 1 of a share.
     """
     rows = list(test.rows())
     texts = {
@@ -356,7 +380,7 @@ def criteria_table(test: IsoTest) -> ExportTable:
 
 def _criteria(comparison: Comparison, table: ExportTable) -> dict[str, Any]:
     """Return the fields of a table of criteria: its texts as cells, its numbers as arrays."""
-    columns = {one.name: np.asarray(one.values) for one in table.columns}
+    columns = {column.name: np.asarray(column.values) for column in table.columns}
     return {
         "comparison": drop_surrogates(comparison.name),
         "reference": drop_surrogates(comparison.reference.name),
@@ -371,7 +395,7 @@ def _joint_delta(comparison: Comparison, run: Deviation) -> FloatArray:
 
 
 def _fields(comparison: Comparison) -> dict[str, Any]:
-    """Return the fields of a comparison in SI, with a struct a log in the cell `runs`."""
+    """Return the fields of a comparison in SI, with one struct per log in the cell `runs`."""
     return {
         "name": drop_surrogates(comparison.name),
         "reference": drop_surrogates(comparison.reference.name),
@@ -406,11 +430,11 @@ def _poses(comparison: Comparison) -> list[Poses]:
     if not comparison.worst.statistics:
         where = str(comparison.recording or comparison.name)
         raise RecordingError(Finding("a comparison of joints alone, so no pose", where))
-    found = []
-    for one in comparison.runs:
-        clock = clock_stamps(one.run, one.t_ns)
+    poses = []
+    for deviation in comparison.runs:
+        clock = clock_stamps(deviation.run, deviation.t_ns)
         upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(clock), 1))
-        prefix = "" if len(comparison.runs) == 1 else f"{one.name}-"
-        found.append(Poses(f"{prefix}reference", clock, one.reference, upright))
-        found.append(Poses(f"{prefix}actual", clock, one.actual, upright))
-    return found
+        prefix = "" if len(comparison.runs) == 1 else f"{deviation.name}-"
+        poses.append(Poses(f"{prefix}reference", clock, deviation.reference, upright))
+        poses.append(Poses(f"{prefix}actual", clock, deviation.actual, upright))
+    return poses

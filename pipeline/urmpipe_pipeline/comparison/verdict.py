@@ -108,11 +108,11 @@ def parse_tolerance(
         twice = " twice" if fits and not tolerance.keys().isdisjoint(kinds) else ""
         if twice or not (fits or ambiguous):
             angle = not (sign or twice) and _is_in_range("angle", quantity_to_si(value, WRITTEN["rad"]), zero)
-            meant = ("angle", "joint") if angle else ()
-            hints = tuple(Hint(parameter, f"{kind}={part}", "specifies the kind") for kind in meant)
+            likely = ("angle", "joint") if angle else ()
+            hints = tuple(Hint(parameter, f"{kind}={part}", "specifies the kind") for kind in likely)
             allowed = (ALLOWED_CRITERIA if iso else ALLOWED) + ("" if zero else ALLOWED_SHARES)
-            found = f"{format_value(part)}{twice}"
-            errors.append(Finding(parameter=parameter, found=found, allowed=allowed, hints=hints))
+            quoted = f"{format_value(part)}{twice}"
+            errors.append(Finding(parameter=parameter, found=quoted, allowed=allowed, hints=hints))
         else:
             tolerance |= dict.fromkeys(kinds, number)
     if errors:
@@ -304,53 +304,55 @@ def _utilisation(sizes: FloatArray, allowed: FloatArray) -> FloatArray:
         return np.where(sizes > 0.0, sizes / allowed, 0.0)
 
 
+# The symbols of the quantities of a deviation.
 SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
-"""The quantities of a deviation as people read them."""
 
-NAMED = 3
-"""Logs out of tolerance that a verdict names; more are only counted."""
+MAX_NAMED = 3  # logs out of tolerance that a verdict names; more are only counted
 
 
-def format_verdict(one: Comparison) -> str:
-    """Return which logs are out of tolerance against what, or that all are within, and what that rests on."""
-    failed = [run for run in one.runs if run.verdict == "fail"]
-    total = len(one.runs) + len(one.failed_logs)
-    said = f"{_who(failed or one.runs, total)} {'out of' if failed else 'within'} tolerance"
-    said += f" against {one.reference.name}{_points(one)}{_part(one)}{_clocks(one)}"
-    if one.baseline and one.baseline.verdict == "fail":
-        said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
-    lost = f"; not judged: {text.join_list([log.name for log in one.failed_logs])}" if one.failed_logs else ""
-    return said + format_assumptions(one.assumptions) + format_defaults(one.provenance) + lost
+def format_verdict(comparison: Comparison) -> str:
+    """Return the logs out of tolerance, or that all are within, the reference, and the assumptions."""
+    failed = [run for run in comparison.runs if run.verdict == "fail"]
+    total = len(comparison.runs) + len(comparison.failed_logs)
+    message = f"{_who(failed or comparison.runs, total)} {'out of' if failed else 'within'} tolerance"
+    message += f" against {comparison.reference.name}"
+    message += f"{_points(comparison)}{_part(comparison)}{_clocks(comparison)}"
+    if comparison.baseline and comparison.baseline.verdict == "fail":
+        message += f", {'and' if failed else 'but'} worse than the baseline {comparison.baseline.name}"
+    message += format_assumptions(comparison.assumptions) + format_defaults(comparison.provenance)
+    if comparison.failed_logs:
+        message += f"; not judged: {text.join_list([log.name for log in comparison.failed_logs])}"
+    return message
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:
-    """Return some of so many logs: the only one by name, else how many, and which if they are few."""
+    """Return a single log by name, else the number of logs out of the total, with their names if few."""
     if total == 1:
         return runs[0].name
     if len(runs) == total:
         return "both logs" if total == 2 else f"all {total} logs"
-    names = f" ({', '.join(run.name for run in runs)})" if len(runs) <= NAMED else ""
+    names = f" ({', '.join(run.name for run in runs)})" if len(runs) <= MAX_NAMED else ""
     return f"{len(runs)} of {total} logs{names}"
 
 
-def _points(one: Comparison) -> str:
-    """Return by which tool centre points a log is held against others; nothing if a path is the reference."""
-    if not one.reference.joints:
+def _points(comparison: Comparison) -> str:
+    """Return the tool centre points that are compared; empty if a path is the reference."""
+    if not comparison.reference.joints:
         return ""
-    if one.provenance.options.get("tcp") == "recorded":
+    if comparison.provenance.options.get("tcp") == "recorded":
         return ", as recorded on both sides"
-    if not one.worst.statistics:
+    if not comparison.worst.statistics:
         return ", by the joints alone"
-    every = all(run.run.log.joints for run in one.runs)
-    return f", by the joints {'on both sides' if every else 'of the reference'}"
+    all_computed = all(run.run.log.joints for run in comparison.runs)
+    return f", by the joints {'on both sides' if all_computed else 'of the reference'}"
 
 
-def _part(one: Comparison) -> str:
-    """Return what a verdict does not rest on, as "; coverage 0.5 % of 90 % needed, ..."; else nothing."""
-    partly = [run for run in one.runs if run.incomplete_shares]
-    if len(partly) > NAMED:
+def _part(comparison: Comparison) -> str:
+    """Return the shares that are too small, as "; coverage 0.5 % of 90 % needed, ..."; empty without any."""
+    partly = [run for run in comparison.runs if run.incomplete_shares]
+    if len(partly) > MAX_NAMED:
         return f"; coverage or judged below 99 % in {len(partly)} logs"
-    several = len(one.runs) > 1
+    several = len(comparison.runs) > 1
     return "".join(
         f"; {format_share(share, run.name if several else '')}"
         for run in partly
@@ -358,139 +360,137 @@ def _part(one: Comparison) -> str:
     )
 
 
-def _clocks(one: Comparison) -> str:
-    """Return which clocks were put together by absolute stamps, the offset of a single log; else nothing."""
-    stamped = [run.sync for run in one.runs if run.sync.mode == "stamps"]
+def _clocks(comparison: Comparison) -> str:
+    """Return the clocks that absolute stamps synchronise, with the offset of a single log; else empty."""
+    stamped = [run.sync for run in comparison.runs if run.sync.mode == "stamps"]
     if not stamped:
         return ""
-    if len(one.runs) == 1:
+    if len(comparison.runs) == 1:
         return f"; clocks by their stamps (offset {text.format_seconds(stamped[0].offset)} s)"
-    some = "" if len(stamped) == len(one.runs) else f" of {format_count(len(stamped), 'log')}"
+    some = "" if len(stamped) == len(comparison.runs) else f" of {format_count(len(stamped), 'log')}"
     return f"; clocks{some} by their stamps"
 
 
-def format_share(one: Share, whose: str = "") -> str:
-    """Return a share, of one of several logs with its name, and if it is too small what was not seen.
+def format_share(share: Share, whose: str = "") -> str:
+    """Return a share, with the name of the log if there are several, and the unseen part if too small.
 
     As in "coverage 0.5 % of 90 % needed, longest unseen: 3.970 s from t = 0.010 s of the reference".
     """
-    of = f" of {whose}" if whose else ""
-    if one.verdict != "fail":
-        return f"{one.quantity}{of} {text.format_percent(one.value)}"
-    said = f"{one.quantity}{of} {held(Value(one.value, '%', one.tolerance, least=True))}"
-    return said if whose else f"{said}{format_unseen(one)}"
+    of_log = f" of {whose}" if whose else ""
+    if share.verdict != "fail":
+        return f"{share.quantity}{of_log} {text.format_percent(share.value)}"
+    message = f"{share.quantity}{of_log} {held(Value(share.value, '%', share.tolerance, least=True))}"
+    return message if whose else f"{message}{format_unseen(share)}"
 
 
-def format_unseen(one: Share) -> str:
-    """Return where most was unseen, as ", longest unseen: 3.970 s from t = 0.010 s of the reference"."""
-    side = "reference" if one.quantity == "coverage" else "log"
-    return (
-        ""
-        if one.longest_unseen is None
-        else f", longest unseen: {format_interval(one.longest_unseen)} of the {side}"
-    )
+def format_unseen(share: Share) -> str:
+    """Return the longest unseen part, as ", longest unseen: 3.970 s from t = 0.010 s of the reference"."""
+    side = "reference" if share.quantity == "coverage" else "log"
+    longest = share.longest_unseen
+    return "" if longest is None else f", longest unseen: {format_interval(longest)} of the {side}"
 
 
-def symbol(one: Statistics | Share | DeltaMeterResult) -> str:
-    """Return what a quantity is called: Δx, ‖Δ‖, path, angle, coverage, or a joint by its name."""
-    return SYMBOLS[one.quantity] if one.kind in ("axis", "norm") else one.quantity
+def symbol(quantity: Statistics | Share | DeltaMeterResult) -> str:
+    """Return the symbol of a quantity: Δx, ‖Δ‖, path, angle, coverage, or a joint by its name."""
+    return SYMBOLS[quantity.quantity] if quantity.kind in ("axis", "norm") else quantity.quantity
 
 
-def absolute_symbol(one: Statistics | Share | DeltaMeterResult) -> str:
-    """Return what the absolute value of a quantity is called: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
-    if one.kind == "joint":
-        return f"|Δ {one.quantity}|"
-    return f"|{symbol(one)}|" if one.kind == "axis" else symbol(one)
+def absolute_symbol(quantity: Statistics | Share | DeltaMeterResult) -> str:
+    """Return the symbol of the absolute value of a quantity: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
+    if quantity.kind == "joint":
+        return f"|Δ {quantity.quantity}|"
+    return f"|{symbol(quantity)}|" if quantity.kind == "axis" else symbol(quantity)
 
 
-def quantity_name(one: Statistics | Share) -> str:
+def quantity_name(quantity: Statistics | Share) -> str:
     """Return the name of a quantity, unique in its log: a joint may be called x."""
-    return f"joint {one.quantity}" if one.kind == "joint" else one.quantity
+    return f"joint {quantity.quantity}" if quantity.kind == "joint" else quantity.quantity
 
 
-def format_utilisation(one: Statistics | Share | DeltaMeterResult) -> str:
-    """Return how much of its tolerance a deviation uses up: "71.0 % of the tolerance"; else nothing."""
-    if one.utilisation is None or isinstance(one, Share):
+def format_utilisation(quantity: Statistics | Share | DeltaMeterResult) -> str:
+    """Return the utilisation of the tolerance: "71.0 % of the tolerance"; empty without one."""
+    if quantity.utilisation is None or isinstance(quantity, Share):
         return ""
-    if isinstance(one, Statistics) and one.missing:
-        return f"no value at {one.missing} of {(one.samples or 0) + one.missing} samples"
-    return "" if math.isinf(one.utilisation) else f"{text.format_portion(one.utilisation)} the tolerance"
+    if isinstance(quantity, Statistics) and quantity.missing:
+        return f"no value at {quantity.missing} of {(quantity.samples or 0) + quantity.missing} samples"
+    if math.isinf(quantity.utilisation):
+        return ""
+    return f"{text.format_portion(quantity.utilisation)} the tolerance"
 
 
-def format_amount(one: Statistics | Share) -> str:
-    """Return how far a quantity goes, and of how much: "|Δx| = 4.2000 mm of 3.5 mm allowed".
+def format_amount(quantity: Statistics | Share) -> str:
+    """Return the largest value of a quantity and its tolerance: "|Δx| = 4.2000 mm of 3.5 mm allowed".
 
-    Where a quantity with a tolerance lacks values, that: "angle has no value at 3 of 40 samples".
+    Where a quantity with a tolerance lacks values, their number: "angle has no value at 3 of 40 samples".
     """
-    if isinstance(one, Share):
-        return f"{one.quantity} = {held(Value(one.value, '%', one.tolerance, least=True))}"
-    if one.tolerance is not None and one.missing:
-        return f"{absolute_symbol(one)} has {format_utilisation(one)}"
-    return f"{absolute_symbol(one)} = {held(Value(one.max, one.unit, one.tolerance))}"
+    if isinstance(quantity, Share):
+        return f"{quantity.quantity} = {held(Value(quantity.value, '%', quantity.tolerance, least=True))}"
+    if quantity.tolerance is not None and quantity.missing:
+        return f"{absolute_symbol(quantity)} has {format_utilisation(quantity)}"
+    return f"{absolute_symbol(quantity)} = {held(Value(quantity.max, quantity.unit, quantity.tolerance))}"
 
 
-def format_decisive(one: Statistics | Share) -> str:
-    """Return how much of how much a quantity is, and when; of a share what was not seen.
+def format_decisive(quantity: Statistics | Share) -> str:
+    """Return the largest value of a quantity, its tolerance and its time; of a share the unseen part.
 
     As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
     """
-    if isinstance(one, Share):
-        return (
-            f"{format_amount(one)} ({one.samples} of {format_count(one.total, 'sample')}){format_unseen(one)}"
-        )
-    lacks = one.tolerance is not None and one.missing
-    used = format_utilisation(one)
-    return (
-        format_amount(one)
-        if lacks
-        else f"{format_amount(one)}{f' ({used})' if used else ''} {format_time_of_max(one)}"
+    if isinstance(quantity, Share):
+        counts = f"{quantity.samples} of {format_count(quantity.total, 'sample')}"
+        return f"{format_amount(quantity)} ({counts}){format_unseen(quantity)}"
+    amount = format_amount(quantity)
+    if quantity.tolerance is not None and quantity.missing:
+        return amount
+    used = format_utilisation(quantity)
+    return f"{amount}{f' ({used})' if used else ''} {format_time_of_max(quantity)}"
+
+
+def format_peak(deviation: Deviation) -> str:
+    """Return the caption of the largest value of the worst quantity: it decides, if no share does."""
+    return "decides" if isinstance(deviation.decisive, Statistics) else "deviates most"
+
+
+def format_time_of_max(statistics: Statistics) -> str:
+    """Return the time of the largest value: "at t = 1.250 s"; of static poses its row: "in row 3"."""
+    if math.isnan(statistics.t_max):
+        return f"in row {statistics.sample_max + 1}"
+    return f"at t = {text.format_seconds(statistics.t_max)} s"
+
+
+def format_delta_meter(meter: DeltaMeterResult) -> str:
+    """Return the largest value of a delta meter, its tolerance and time, the samples out, and the caveats."""
+    amount = (
+        "has no value" if meter.utilisation is None else f"= {held(Value(meter.worst, 'm', meter.allowed))}"
     )
-
-
-def format_peak(one: Deviation) -> str:
-    """Return what the furthest quantity of a log does where it is largest: it decides, if no share does."""
-    return "decides" if isinstance(one.decisive, Statistics) else "deviates most"
-
-
-def format_time_of_max(one: Statistics) -> str:
-    """Return when a quantity was largest: "at t = 1.250 s"; of still poses in which row: "in row 3"."""
-    timed = not math.isnan(one.t_max)
-    return f"at t = {text.format_seconds(one.t_max)} s" if timed else f"in row {one.sample_max + 1}"
-
-
-def format_delta_meter(one: DeltaMeterResult) -> str:
-    """Return what a delta meter found: how much of how much, when, how often it was too much; its doubts."""
-    amount = "has no value" if one.utilisation is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
-    used = format_utilisation(one)
-    said = (
-        f"{absolute_symbol(one)} {amount}{f' ({used})' if used else ''} at t = {text.format_seconds(one.t)} s"
-    )
-    out = f"out of tolerance: {format_out_of_tolerance(one.out_of_tolerance, one.samples)}"
-    lacks = (
-        f"coverage {text.format_percent(one.coverage)}: {one.missing} without a value" if one.missing else ""
-    )
-    return "; ".join(filter(None, (said, out, lacks, *one.caveats)))
+    used = format_utilisation(meter)
+    time = f"at t = {text.format_seconds(meter.t)} s"
+    message = f"{absolute_symbol(meter)} {amount}{f' ({used})' if used else ''} {time}"
+    out = f"out of tolerance: {format_out_of_tolerance(meter.out_of_tolerance, meter.samples)}"
+    parts = [message, out]
+    if meter.missing:
+        parts.append(f"coverage {text.format_percent(meter.coverage)}: {meter.missing} without a value")
+    return "; ".join([*parts, *filter(None, meter.caveats)])
 
 
 def format_out_of_tolerance(out: int, of: int) -> str:
-    """Return how many samples are out of tolerance: "13 of 100 samples (13.0 %)"."""
+    """Return the number of samples out of tolerance: "13 of 100 samples (13.0 %)"."""
     return f"{out} of {format_count(of, 'sample')} ({text.format_percent(out / of)})"
 
 
-def format_interval(found: SampleInterval) -> str:
-    """Return how long and from when a log was out of tolerance or unseen: "0.500 s from t = 1.250 s"."""
-    if found.t is None or found.duration is None:
-        return f"{format_count(found.samples, 'row')} from row {found.sample + 1}"
-    lasts = "1 sample at" if found.samples == 1 else f"{text.format_seconds(found.duration)} s from"
-    return f"{lasts} t = {text.format_seconds(found.t)} s"
+def format_interval(interval: SampleInterval) -> str:
+    """Return the duration and start of an interval out of tolerance or unseen: "0.500 s from t = 1.250 s"."""
+    if interval.t is None or interval.duration is None:
+        return f"{format_count(interval.samples, 'row')} from row {interval.sample + 1}"
+    lasts = "1 sample at" if interval.samples == 1 else f"{text.format_seconds(interval.duration)} s from"
+    return f"{lasts} t = {text.format_seconds(interval.t)} s"
 
 
 def format_tolerance(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:
-    """Return a comparison's tolerance as people read it: "±3.5 mm per axis, 0.5 deg of orientation".
+    """Return a comparison's tolerance as text: "±3.5 mm per axis, 0.5 deg of orientation".
 
     Args:
         allowed: In [m] or [rad], by kind or coordinate; least shares, named if they are not the default.
-        joint_units: The units of the joints that are held to a tolerance, rad or m.
+        joint_units: The units of the joints that have a tolerance, rad or m.
     """
     words = {
         "axis": "±{} per axis",

@@ -246,9 +246,9 @@ def recorded_tcp_mismatch(runs: Sequence[Run], allowed: float) -> Iterator[LogWa
         allowed: The distance that is allowed, in [m].
     """
     distances = ((run, float(distances_from_recorded(run).max(initial=0.0))) for run in runs)
-    apart = [(run, distance) for run, distance in distances if distance > allowed]
+    distant = [(run, distance) for run, distance in distances if distance > allowed]
     for calibrated in (True, False):
-        group = [(run, distance) for run, distance in apart if (distance <= MAX_CALIBRATION) == calibrated]
+        group = [(run, distance) for run, distance in distant if (distance <= MAX_CALIBRATION) == calibrated]
         if not group:
             continue
         run, distance = group[0]
