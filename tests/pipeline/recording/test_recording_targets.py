@@ -77,7 +77,7 @@ def solved_at(position: FloatArray, missed: list[bool], why: str = "far") -> IkR
 def in_view(one: IkResult) -> FloatArray:
     """Return every point that is in view in [m], shape (n, 3)."""
     shown = scene(one)
-    return extent(drawn_arm(shown.arms[0]), (), (), drawn_targets(there(scene(one)).targets))
+    return extent(drawn_arm(shown.arms[0]), (), (), drawn_targets(there(shown.targets)))
 
 
 def test_a_target_missed_by_far_does_not_make_the_arm_small() -> None:
