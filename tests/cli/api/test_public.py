@@ -85,22 +85,6 @@ def test_an_input_alone_is_never_replaced(folder: Path, run: urmpipe.Run, tmp_pa
         urmpipe.ingest(folder / "log.csv", "urm6", write_map=file, inputs=file)
 
 
-def test_what_is_no_log_is_told_what_is() -> None:
-    ingested = "arrays are ingested first: urmpipe.ingest(t=t, q=q)"
-    given: dict[str, Any] = {"an array": np.zeros((9, 2)), "{'t': []}": {"t": []}, "''": ""}
-    for one in given.values():
-        with pytest.raises(urmpipe.OptionError) as error:
-            urmpipe.ingest(one)
-        allowed = (
-            "a file, several of one log, a folder of them, a DataFrame or Arrow table, or arrays by t=, q="
-        )
-        assert str(error.value).endswith(f", allowed: {allowed}")
-        with pytest.raises(urmpipe.OptionError) as error:
-            urmpipe.compare("path.csv", one)
-        assert str(error.value).startswith("logs: found ")
-        assert str(error.value).endswith(ingested)
-
-
 @pytest.mark.parametrize(
     "given", [(0.1, 0.2, 0.3), [0.1, 0.2, 0.3, 0.4, -0.5, 0.6], np.array([0.1, 0.2, 0.3, 3.0, 0.0, 0.0])]
 )
@@ -109,61 +93,6 @@ def test_a_frame_is_numbers_a_matrix_or_a_transform(given: Any) -> None:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = wanted.rotation, wanted.translation
     assert parse_frame("tool", given) == parse_frame("tool", wanted) == parse_frame("tool", matrix) == wanted
-
-
-@pytest.mark.parametrize(
-    ("given", "found"),
-    [
-        ("0,0,0.15kg", "found '0,0,0.15kg'"),
-        ([0.0, 0.0], "found [0.0, 0.0] of shape (2,)"),
-        (2.0 * np.eye(4), "found a matrix that is not a rigid motion"),
-        ([0.0, 0.0, float("nan")], "found [0.0, 0.0, nan] of shape (3,)"),
-    ],
-)
-def test_what_is_no_frame_is_refused(given: Any, found: str) -> None:
-    with pytest.raises(urmpipe.OptionError, match="tool") as error:
-        urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=given)
-    assert str(error.value).startswith(f"tool (--tool): {found}")
-
-
-@pytest.mark.parametrize(("length", "times"), [(150.0, 130), (11.5, 10)])
-def test_a_tool_in_mm_is_refused(length: float, times: int) -> None:
-    with pytest.raises(urmpipe.OptionError) as error:
-        urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=(0.0, 0.0, length))
-    assert str(error.value) == (
-        f"tool (--tool): found {length:g} m from the tip, {times} times the length of ur5e, allowed: up to"
-        " 10 times"
-        " it; a number without a unit is in m"
-    )
-
-
-@pytest.mark.slow
-def test_a_tool_much_longer_than_its_arm_is_allowed() -> None:
-    found = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=(0.0, 0.0, 11.4))
-    assert found.reasons == ["no solution in 20 restarts; nearest: 10.3 m away"]  # taken, and out of reach
-
-
-def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
-    wrong: dict[str, Any] = {
-        "robot": 6,
-        "tsp": "5 kg",
-        "skip_bad": 1,
-        "map": {},
-        "strict": 1,
-        "output": "",
-    }
-    with pytest.raises(urmpipe.OptionError) as error:
-        urmpipe.ingest("log.csv", progress=True, **wrong)  # type: ignore[arg-type]
-    assert str(error.value).splitlines() == [
-        "robot (--robot): found 6, allowed: a name, a TOML or URDF file, or a Chain,"
-        " such as urmpipe.load_robot(NAME)",
-        "map (--map): found {}, allowed: a map (TOML), or what `read_map` returned",
-        "skip_bad (--skip-bad): found 1, allowed: true or false",
-        "tsp (--tsp): found '5 kg', allowed: a positive time in s, such as 0.005 or 5ms",
-        "strict (--strict): found 1, allowed: true or false",
-        "output (--output): found '', allowed: a path: text or a Path, not empty",
-        "progress: found True, allowed: a function of the completed share, 0 to 1, such as print",
-    ]
 
 
 def test_numbers_and_flags_of_numpy_are_taken(folder: Path, run: urmpipe.Run) -> None:
@@ -185,30 +114,6 @@ def test_a_warning_is_shown_once(tmp_path: Path) -> None:
         report = urmpipe.report([compared, run], tmp_path / "report.html")
     assert {one.kind for one in run.warnings} == {"assumed-unit", "period-not-used"}
     assert report.results == (compared, run)
-
-
-def test_robot_and_log_are_told_together() -> None:
-    with pytest.raises(urmpipe.UrmpipeError) as error:
-        urmpipe.ingest(3, "urm66")  # type: ignore[arg-type]
-    assert [str(one).split(";")[0].split(",")[0] for one in error.value.findings] == [
-        "unknown robot 'urm66' (did you mean urm6?)",
-        "log: found 3",
-    ]
-
-
-def test_an_unknown_backend_is_refused() -> None:
-    with pytest.raises(
-        urmpipe.OptionError, match=r"^backend \(--backend\): found 'cc', allowed: native, python$"
-    ):
-        urmpipe.build_fmu("dc_drive", backend="cc")  # type: ignore[arg-type]
-
-
-def test_what_shows_nothing_of_itself_is_refused(tmp_path: Path) -> None:
-    arm = urmpipe.load_robot("ur5e")
-    with pytest.raises(urmpipe.OptionError, match=r"^results: found a Chain, allowed: a rec"):
-        urmpipe.report([arm], tmp_path / "report.html")  # type: ignore[list-item]
-    with pytest.raises(urmpipe.OptionError, match=r"^result: found a Chain, allowed: a result"):
-        urmpipe.write_recording(arm, tmp_path / "solved.rrd")  # type: ignore[arg-type]
 
 
 def test_files_may_be_text(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:
