@@ -269,20 +269,30 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _parse_leniently(arguments: Sequence[str]) -> tuple[Mapping[str, Any], Sequence[str]]:
-    """Return the options of a line as texts and its other words, also of a faulty one."""
+    """Return the options of a line as texts and its other words, also of a faulty one.
+
+    --json and --debug count, too, where no command is named, or one that does not have them: a program that
+    asks for JSON gets an error as JSON.
+    """
+    settings: Mapping[str, Any] = {
+        "resilient_parsing": True,
+        "ignore_unknown_options": True,
+        "allow_extra_args": True,
+    }
+    flags: list[click.Parameter] = [click.Option([flag], is_flag=True) for flag in ("--json", "--debug")]
+    words = list(arguments)
+    options = click.Command("urmpipe", params=flags).make_context("urmpipe", words.copy(), **settings).params
     command: click.Command = cli
     ctx = click.Context(cli, resilient_parsing=True, **cli.context_settings)
-    words = list(arguments)
     while isinstance(command, click.Group) and words:
         name = words.pop(0)
         subcommand = command.get_command(ctx, name)
         if subcommand is None:
-            return {}, arguments
+            return options, arguments
         command = subcommand
-    settings = {"resilient_parsing": True, "ignore_unknown_options": True, "allow_extra_args": True}
     ctx = command.make_context(command.name, words, ctx, **settings)
     operands = [
         ctx.params.get(param.name or "") for param in command.params if isinstance(param, click.Argument)
     ]
     listed = [value if isinstance(value, tuple) else (value,) for value in operands]
-    return ctx.params, [*(str(word) for value in listed for word in value if word), *ctx.args]
+    return options | ctx.params, [*(str(word) for value in listed for word in value if word), *ctx.args]
