@@ -168,7 +168,7 @@ def compose(parts: Iterable[Transform | Step]) -> Transform:
 
 
 def compose_steps(*parts: Transform | Step) -> Transform:
-    """Return the product of constants and elementary motions, with these as `made_of`."""
+    """Return the product of constants and elementary motions, with these as `steps`."""
     frame = compose(parts)
     return Transform(frame.rotation, frame.translation, parts)
 
