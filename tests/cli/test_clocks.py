@@ -121,7 +121,7 @@ def test_each_log_decides_for_itself_and_coarse_stamps_do_not(
     assert isinstance(made, Comparison)
     assert [run.sync.mode for run in made.runs] == ["stamps", "start", "start"]
     assert refusal(OptionError, api.iso, wanted, early, "ur5e", sync="stamps").startswith(
-        "sync (--sync): found stamps, allowed: auto, start or an offset with iso"
+        "sync (--sync): found stamps, allowed: auto, start or an offset: each cycle has the same reference"
     )
 
 

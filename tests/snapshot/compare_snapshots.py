@@ -42,73 +42,12 @@ JUDGED = re.compile(r"^exits$|verdict|warnings\[\]\.kind|reached|failure|failed|
 DRAWN = ("scene", "traces", "looks")
 RELATIVE, ABSOLUTE = 1e-9, 1e-12
 
-# Keys of JSON, fields and stored arrays renamed after net.json was recorded, some only below another one.
-RENAMED = {
-    "asks": "blocks_verdict",
-    "baseline.gone": "baseline.missing",
-    "breaks_tolerance": "exceeds_tolerance",
-    "changes[].largest": "changes[].largest_change",
-    "coverage.of": "coverage.total",
-    "decides": "limited_error",
-    "energy.in": "energy.supplied",
-    "energy.lost": "energy.dissipated",
-    "gaps": "closure_errors",
-    "half_period": "time_uncertainty",
-    "hints[].does": "hints[].effect",
-    "inferences[].otherwise": "inferences[].alternatives",
-    "judged.of": "judged.total",
-    "longest_out": "longest_out_interval",
-    "mended": "residual",
-    "not_looked_for": "untested",
-    "obstacles": "infeasibilities",
-    "outside": "out_of_tolerance",
-    "own_tcp": "recorded_tcp",
-    "own_tcp[].largest": "recorded_tcp[].max",
-    "refused": "unidentifiable",
-    "remainder": "unexplained",
-    "remainder.different": "unexplained.is_unrelated_motion",
-    "remainder.words": "unexplained.interpretation",
-    "saturated": "saturated_share",
-    "seen.coverage": "shares.coverage",
-    "seen.judged": "shares.judged",
-    "share_out": "out_fraction",
-    "path/shortfall": "path/position_residual",
-    "solutions/shortfall": "solutions/position_residual",
-    "too_fast": "speed_violations",
-    "twins": "equivalents",
-    "undecided[].needs": "undecided[].discriminating_joint",
-    "unjudged": "failed_logs",
-    "untold": "unobservable",
-    "unseen": "longest_unseen",
-    "verdicts[].doubts": "verdicts[].caveats",
-    **{f"{audit}[].from": f"{audit}[].turns_before" for audit in ("audit", "repolarizations")},
-    **{f"{audit}[].to": f"{audit}[].turns_after" for audit in ("audit", "repolarizations")},
-    **{f"audit/{when}": f"audit/turns_{when}" for when in ("before", "after")},
-    **{f"{network}.tried": f"{network}.start_count" for network in ("checked", "found")},
-    **{f"{plan}.scaled": f"{plan}.speed_factor" for plan in ("", "planned", "bare")},
-    **{f"{command}.tried": f"{command}.probed" for command in ("", "driven")},
-    **{f"{check}.idle": f"{check}.passive" for check in ("", "mobility")},
-    **{f"{ik}miss": f"{ik}position_error" for ik in ("solutions[].", "to_frame.", "/")},
-    **{f"{ik}.miss": f"{ik}.position_error" for ik in ("targets", "path", "solved", "moved")},
-}
-_RENAMED = re.compile(rf"(?<!\w)(?:{'|'.join(map(re.escape, sorted(RENAMED, key=len, reverse=True)))})(?!\w)")
-
 
 def load(path: Path) -> dict[str, Case]:
     """Return the cases of a snapshot by name."""
     if path.is_file():
-        cases = unpack(json.loads(path.read_bytes()))
-    else:
-        cases = {file.stem: json.loads(file.read_bytes()) for file in sorted((path / "cases").glob("*.json"))}
-    return {
-        case: {_renamed_key(name): one for name, one in columns.items()} for case, columns in cases.items()
-    }
-
-
-def _renamed_key(name: str) -> str:
-    """Return the name of a column with the keys that its file has now."""
-    file, separator, key = name.rpartition("|")
-    return file + separator + _RENAMED.sub(lambda old: RENAMED[old[0]], key)
+        return unpack(json.loads(path.read_bytes()))
+    return {file.stem: json.loads(file.read_bytes()) for file in sorted((path / "cases").glob("*.json"))}
 
 
 def pack(cases: dict[str, Case]) -> str:

@@ -198,7 +198,7 @@ class Explanations:
         return null_state(self.model.groups)
 
     def spread(self, count: int) -> IntArray:
-        """Return the indices of at most `count` rows, evenly spaced over all."""
+        """Return the indices [-] of at most `count` rows, evenly spaced over all, shape (m,)."""
         return spread_rows(self.model.rows, count)
 
     def _first_tau(self, state: State, rows: WeightedRows) -> float:

@@ -137,7 +137,7 @@ class Model(Protocol):
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the residual, shape (c, n), and the Jacobian of the model, shape (p, c, n).
+        """Return the residual in [m] and [rad], shape (c, n), and the model's Jacobian, shape (p, c, n).
 
         Args:
             state: The explanation.

@@ -106,7 +106,7 @@ class PositionModel:
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the residual and the Jacobian of the model (`Model.linear`)."""
+        """Return residual and Jacobian in [m] and [rad], shapes (c, n), (p, c, n), of rows, shape (n,)."""
 
     def _residual(self, pose: Transform, edits: Edits, rows: IntArray, inside: BoolArray) -> FloatArray:
         """Return data - model of poses on a base that is not mirrored; NaN outside the time of the model."""
@@ -230,7 +230,7 @@ class ArmModel(PositionModel):
         return self._residual(tip_pose(self.arm(state)[0], list(joints.q)), state.edits, rows, joints.inside)
 
     def residuals(self, edits: Sequence[Edits], rows: IntArray) -> FloatArray:
-        """Return `residual` of each explanation without parameters, shape (len(edits), c, n).
+        """Return `residual` of explanations without parameters in [m] and [rad], shape (len(edits), c, n).
 
         The joints of all edits of a robot go through its kinematics at once.
         """
@@ -296,7 +296,7 @@ class ArmModel(PositionModel):
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the residual and the Jacobian of the model (`Model.linear`)."""
+        """Return residual and Jacobian in [m] and [rad], shapes (c, n), (p, c, n), of rows, shape (n,)."""
         return self._linear(state, rows, self.groups if groups is None else groups, len(self.blocks))
 
     def _linear(
@@ -356,7 +356,7 @@ class TcpModel(PositionModel):
         return np.nan_to_num(np.pad(turned, ((0, 0), (1, 1)), mode="edge"))
 
     def residuals(self, edits: Sequence[Edits], rows: IntArray) -> FloatArray:
-        """Return `residual` of each explanation without parameters, shape (len(edits), c, n)."""
+        """Return `residual` of explanations without parameters in [m] and [rad], shape (len(edits), c, n)."""
         null = null_state(self.groups)
         residuals = [self.residual(null._replace(edits=each), rows) for each in edits]
         return np.array(residuals).reshape(-1, len(self.blocks), len(rows))
@@ -364,7 +364,7 @@ class TcpModel(PositionModel):
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the residual and the Jacobian of the model (`Model.linear`)."""
+        """Return residual and Jacobian in [m] and [rad], shapes (c, n), (p, c, n), of rows, shape (n,)."""
         groups = self.groups if groups is None else groups
         pose, velocity, angular_velocity, inside = self._look_up(state, rows)
         ordered = ordered_twists(self.groups)
@@ -456,7 +456,7 @@ class JointModel:
         return np.asarray(np.where(joints.inside, self.q[:, rows] - joints.q, np.nan))
 
     def residuals(self, edits: Sequence[Edits], rows: IntArray) -> FloatArray:
-        """Return `residual` of each explanation without parameters, shape (len(edits), joints, n)."""
+        """Return each `residual` without parameters in [rad] or [m], shape (len(edits), joints, n)."""
         joints = self._joints(null_state(self.groups), rows)
         left = [self.q[:, rows] - edit_joints(each, self.sample[rows], joints.q) for each in edits]
         return np.where(joints.inside, np.array(left).reshape(-1, *joints.q.shape), np.nan)
@@ -467,7 +467,7 @@ class JointModel:
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the residual and the Jacobian of the joints (`Model.linear`)."""
+        """Return residual and Jacobian in [m] and [rad], shapes (joints, n), (p, joints, n), rows (n,)."""
         groups = self.groups if groups is None else groups
         joints = self._joints(state, rows)
         columns = np.zeros((len(groups), *joints.q.shape))

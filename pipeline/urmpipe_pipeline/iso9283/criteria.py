@@ -208,6 +208,6 @@ def angle_values(
 
 
 def values_at(name: str, places: Sequence[str], values: FloatArray | None) -> Iterator[Value]:
-    """Yield a criterion at each of k places; its values have the shape (k,), or are None."""
+    """Yield a criterion at each of k places; its values in [m] or [rad], shape (k,), or None."""
     for k, place in enumerate(places):
         yield name, place, None if values is None else float(values[k])

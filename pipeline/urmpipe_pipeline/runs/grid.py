@@ -68,7 +68,9 @@ class Grid(NamedTuple):
     def resample_joints(
         self, values: FloatArray, unresolved: IntArray
     ) -> tuple[FloatArray, tuple[LogWarning, ...]]:
-        """Return joint values on the grid, NaN inside gaps and unresolved steps, and a warning.
+        """Return joint values on the grid in [rad] or [m], shape (g, joints), and a warning.
+
+        They are NaN inside gaps and unresolved steps.
 
         Args:
             values: Repolarized joint values in [rad] or [m], shape (n, joints); on the grid (g, joints).

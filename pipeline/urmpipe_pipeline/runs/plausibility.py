@@ -267,7 +267,11 @@ def _limit_warnings(motion: JointMotion, robot: Chain) -> list[LogWarning]:
             message = f"{motion.names[j]} is beyond {limits} in {len(rows)} of {len(q)} rows"
             message += f", at worst {q[worst, j]:.6g} in row {worst + 1}"
             excesses.append(_Excess(motion.names[j], rows, float(beyond[worst]), message))
-    return _join_excesses(JOINT_LIMIT, excesses, "row", "check robot, unit, sign and zero")
+    return (
+        [LogWarning(JOINT_LIMIT, *_join_excesses(excesses, "row", "check robot, unit, sign and zero"))]
+        if excesses
+        else []
+    )
 
 
 def speed_limits(robot: Chain | None, revolute: BoolArray) -> FloatArray:
@@ -314,7 +318,11 @@ def speed_warning(
             message += f" in {len(rows)} of {len(steps)} steps"
             message += f", at worst at {speeds.max():.4g} {unit} to row {rows[np.argmax(speeds)] + 2}"
             excesses.append(_Excess(motion.names[j], rows + 1, float(speeds.max() / limits[j]), message))
-    return _join_excesses(SPEED_LIMIT, excesses, "step", "check robot, unit and clock")
+    return (
+        [LogWarning(SPEED_LIMIT, *_join_excesses(excesses, "step", "check robot, unit and clock"))]
+        if excesses
+        else []
+    )
 
 
 class _Excess(NamedTuple):
@@ -326,10 +334,8 @@ class _Excess(NamedTuple):
     message: str
 
 
-def _join_excesses(kind: str, excesses: list[_Excess], noun: str, advice: str) -> list[LogWarning]:
-    """Return one warning at the first row, with the description of the worst joint."""
-    if not excesses:
-        return []
+def _join_excesses(excesses: list[_Excess], noun: str, advice: str) -> tuple[str, int]:
+    """Return the message of a warning, with the description of the worst joint, and its row, the first."""
     worst = max(excesses, key=lambda excess: excess.largest)
     joints = [
         f"{excess.name} ({format_count(len(excess.rows), noun)})"
@@ -338,4 +344,4 @@ def _join_excesses(kind: str, excesses: list[_Excess], noun: str, advice: str) -
     ]
     message = f"{worst.message}; also {text.join_list(joints)}" if joints else worst.message
     row = min(int(excess.rows[0]) for excess in excesses) + 1
-    return [LogWarning(kind, f"{message}: {advice}", row)]
+    return f"{message}: {advice}", row
