@@ -135,7 +135,7 @@ class Answer(NamedTuple):
 
     Attributes:
         result: The result; its verdict decides the exit code.
-        lines: Lines about what was written, after the result.
+        lines: Lines that name the files written, after the result.
         warnings: Warnings; None for those of the result and of its logs.
         errors: Why parts of it have no verdict.
         is_incomplete: Whether whole logs have none, or a run ended early: a "fail" of the others is not all.

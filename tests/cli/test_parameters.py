@@ -220,7 +220,7 @@ class Toy(Processing, total=False):
     gain: Annotated[float | str | None, Param(kinds.number("m"), "Gain of the toy.")]
 
 
-def test_a_new_option_is_one_field(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_option_is_one_field(tmp_path: Path) -> None:
     @public_function(Toy)
     def toy(**options: Any) -> Any:
         return options

@@ -1,8 +1,8 @@
 """`urmpipe.diagnose`: why logs deviate from their reference.
 
 Logs are compared as by `compare`, with a diagnosis of each. The logs of a finished comparison are diagnosed
-as they were compared: it has their runs and the trajectory of its reference, of which a run is made. Its
-statistics and its verdict stay.
+as they were compared: the comparison contains their runs, and its reference becomes a run again. Statistics
+and verdict stay.
 """
 
 from __future__ import annotations

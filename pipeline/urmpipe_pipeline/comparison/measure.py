@@ -4,8 +4,8 @@
 2. `compute_statistics`: max, rms, mean, standard deviation, 95th percentile of a quantity, and its verdict.
 3. `measure_shares`: how much of both motions the verdict is based on, in two shares judged like a deviation.
 
-Rows are measured in blocks, whose size changes no bit of a result: what is summed is summed in parts of a
-fixed size, and the parts exactly.
+Rows are measured in blocks. Their size changes no bit of a result: sums are taken over parts of a fixed size,
+and then over the sums of the parts.
 
 `coverage` is the share of the reference's samples that the log shows, `judged` the share of the log's
 motion that lies in judged samples. Samples are the rows of a side that have a value; a judged sample is a row
