@@ -22,9 +22,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import Displayable
-from urmpipe_pipeline.presentation.result import Result
-
 if TYPE_CHECKING:
     from urmpipe.api.accuracy import accuracy as accuracy
     from urmpipe.api.build_fmu import build_fmu as build_fmu
@@ -158,25 +155,6 @@ _HOME = {
 }
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604 - the names are those of _HOME
-
-
-def _page(result: Any) -> str | None:
-    """Return what a notebook shows of a result."""
-    from urmpipe.printing.results import notebook_page
-
-    return notebook_page(result)
-
-
-def _draw(result: Result, title: str | None, width: str | float, font: float) -> Any:
-    """Return a figure of a result."""
-    from urmpipe_pipeline.figures.plot import plot
-    from urmpipe_pipeline.results import enclosing_result, present
-
-    return plot(present(enclosing_result(result)), title, width, font)
-
-
-Displayable.page = staticmethod(_page)
-Result.draw = staticmethod(_draw)
 
 
 def __getattr__(name: str) -> Any:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import Any
 
 from urmpipe_models.errors import escape_html, escape_line
 
@@ -16,9 +16,6 @@ class Displayable(ABC):
     """A result with a headline, a table, and notes for the user."""
 
     __slots__ = ()
-
-    page: ClassVar[Callable[[Any], str | None]] = staticmethod(lambda result: None)
-    """Returns the notebook page of a result that has a presentation; set by the renderer of presentations."""
 
     @abstractmethod
     def _headline(self) -> str:
@@ -42,8 +39,6 @@ class Displayable(ABC):
         return f"{line if len(line) <= room else line[: room - 3] + '...'}{ending}"
 
     def _repr_html_(self) -> str:
-        if (page := Displayable.page(self)) is not None:
-            return page
         notes = "".join(f"<li>{escape_html(note)}</li>" for note in self._notes())
         headline = f"<p><b>{type(self).__name__}</b> {escape_html(self._headline())}</p>"
         return f"{headline}{notes and f'<ul>{notes}</ul>'}{self._table()}"

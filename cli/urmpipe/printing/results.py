@@ -1,30 +1,27 @@
-"""Any result in a terminal or a notebook: its verdict, and the facts and tables that are brief.
+"""Any result in a terminal: its verdict, and the facts and tables that are brief.
 
 1. Result: the verdict with its facts, the body, then the sections: of many judged ones those that fail.
 2. Columns: a table that does not fit the terminal continues below, each part with its key columns.
-3. Notebook: the same content as HTML; every public result shows itself with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from urmpipe.printing.terminal import LISTED, format_verdict, join_lines, new_console
-from urmpipe_models.display import HEAD_ROWS, format_count
-from urmpipe_models.errors import escape_html, escape_line
+from urmpipe_models.display import format_count
+from urmpipe_models.errors import escape_line
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.brief import (
     brief_columns,
     brief_facts,
     brief_tables,
-    head,
     head_lines,
     rows_within,
 )
 from urmpipe_pipeline.presentation.digits import units_differ, written
 from urmpipe_pipeline.presentation.section import Advice, Cell, Fact, Judged, Presentation, Ref, Section
-from urmpipe_pipeline.presentation.section import Table as SectionTable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -172,51 +169,3 @@ def _build_table(columns: Sequence[TerminalColumn]) -> Table:
     for row in zip(*(column.cells for column in columns), strict=True):
         table.add_row(*(text.NOTHING if cell is None else cell for cell in row))
     return table
-
-
-def notebook_page(result: Any) -> str | None:
-    """Return a result as HTML for a notebook; None if it is not a result."""
-    from urmpipe_pipeline.results import is_result, present
-
-    if not is_result(result):
-        return None
-    presentation = present(result)
-    word = (presentation.verdict or presentation.word).upper()
-    headline = escape_html(presentation.headline)
-    title = f"<p><b>{type(result).__name__}</b> {escape_html(word)} {headline}</p>"
-    return title + _facts_html(presentation.facts) + "".join(_iter_section_html(presentation.body))
-
-
-def _iter_section_html(section: Section) -> Iterator[str]:
-    yield from map(_table_html, brief_tables(section))
-    yield _facts_html(section.facts)
-    if section.warnings:
-        items = (f"<li>{escape_html(str(warning))}</li>" for warning in section.warnings)
-        yield f"<ul>{''.join(items)}</ul>"
-    for subsection in section.sections:
-        if subsection.facts or subsection.tables or subsection.warnings:
-            yield f"<p><b>{escape_html(subsection.title)}</b></p>"
-            yield from _iter_section_html(subsection)
-
-
-def _facts_html(facts: tuple[Fact, ...]) -> str:
-    rows = [
-        f"<tr><th>{escape_html(fact.name)}</th><td>{escape_html(written(fact.value, unit=True))}</td></tr>"
-        for fact in brief_facts(facts)
-    ]
-    return f"<table>{''.join(rows)}</table>" if rows else ""
-
-
-def _table_html(table: SectionTable) -> str:
-    columns, rows = list(brief_columns(table)), rows_within(table, HEAD_ROWS)
-    count = len(columns[0].cells)
-    heads = "".join(f"<th>{escape_html(head(column))}</th>" for column in columns)
-    cells = (
-        [written(cell, unit=units_differ(column.cells)) for cell in column.cells[rows]] for column in columns
-    )
-    lines = (
-        f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>"
-        for row in zip(*cells, strict=True)
-    )
-    more = f"<p>{HEAD_ROWS} of {count} rows</p>" if count > HEAD_ROWS else ""
-    return f"<p>{escape_html(table.title)}</p><table><tr>{heads}</tr>{''.join(lines)}</table>{more}"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Displayable
 
@@ -27,9 +27,6 @@ class Result(Displayable):
     name: str
     recording: Path | None
 
-    draw: ClassVar[Callable[[Any, str | None, str | float, float], Any]]
-    """Returns a figure of a result by its title, a width and a font; set by who renders presentations."""
-
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
         """Return its numbers as a table."""
@@ -49,9 +46,19 @@ class Result(Displayable):
             OptionError: If there is no such figure, with those that there are; if a size is out of range.
             OutputError: If matplotlib is missing.
         """
-        figure: Figure = Result.draw(self, title, width, font)
+        # By names, as in the registry of kinds: it and the figures import this module.
+        registry = import_module("urmpipe_pipeline.results")
+        presentation = registry.present(registry.enclosing_result(self))
+        figure: Figure = import_module("urmpipe_pipeline.figures.plot").plot(presentation, title, width, font)
         return figure
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return the object that `--json` prints, its messages in somebody's words."""
+        """Return the object that `--json` prints."""
+
+    def _repr_html_(self) -> str:
+        presentation = import_module("urmpipe_pipeline.results").present(self)
+        page: str = import_module("urmpipe_pipeline.presentation.notebook").notebook_page(
+            type(self).__name__, presentation
+        )
+        return page
