@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ class Form:
     Attributes:
         name: What it is called.
         unit: The unit of its column: DATE, TIME_OF_DAY or LENGTH.
-        pattern: What a whole cell looks like.
+        pattern: What a whole cell looks like, without blanks around it.
         timed: Whether a cell holds a time, not the date alone.
         keys: The units that ask for it where its cells may be of another form as well.
         tail: What the digits behind a third colon count: s (decimals), ms or us; ns behind whole seconds.
@@ -90,11 +91,15 @@ class Form:
 
     name: str
     unit: str
-    pattern: re.Pattern[str]
+    pattern: str
     timed: bool = True
     keys: tuple[str, ...] = ()
     tail: str = "s"
     last: bool = False
+
+    def match(self, cell: str) -> re.Match[str] | None:
+        """Return the match of a whole cell."""
+        return _compiled(self.pattern).match(cell)
 
     @property
     def dated(self) -> bool:
@@ -108,7 +113,7 @@ class Form:
 
     def has_zone(self, cell: str) -> bool:
         """Return whether a cell says how far its clock is ahead of UTC."""
-        match = self.pattern.match(cell)
+        match = self.match(cell)
         return match is not None and bool(match.groupdict().get("zone"))
 
     def nanoseconds(self, parts: Parts) -> tuple[IntArray, Flags]:
@@ -207,35 +212,35 @@ def _dates() -> Iterator[Form]:
     between = r"(?:t|_|,? +)"
     for style, (date, key) in dates.items():
         keys = (key,) if key else ()
-        yield Form(f"date, {style}", DATE, _compiled(date), timed=False, keys=keys)
-        whole = _compiled(f"{date}{between}(?:{_CLOCK}){_HALF_DAY}{zone}")
+        yield Form(f"date, {style}", DATE, date, timed=False, keys=keys)
+        whole = f"{date}{between}(?:{_CLOCK}){_HALF_DAY}{zone}"
         yield Form(f"date and time, {style}", DATE, whole, keys=keys)
-        name, loose = f"date and time, {style}, {_UNPADDED}", _compiled(date + between + _WITHOUT_ZEROS)
+        name, loose = f"date and time, {style}, {_UNPADDED}", date + between + _WITHOUT_ZEROS
         yield Form(name, DATE, loose, True, keys, "us", last=True)
         for tail, what in _TAILS.items():
             name = f"date and time, {style}, {what} behind the last colon"
-            yield Form(name, DATE, _compiled(date + between + _COUNTED), True, (*keys, tail), tail)
-    iso = _compiled(f"{dates['without signs'][0]}{between}{dense}{zone}")
+            yield Form(name, DATE, date + between + _COUNTED, True, (*keys, tail), tail)
+    iso = f"{dates['without signs'][0]}{between}{dense}{zone}"
     yield Form("date and time, without signs", DATE, iso)
 
 
 def _times() -> Iterator[Form]:
     """Yield the forms of times of day and of lengths of time."""
-    yield Form("time of day", TIME_OF_DAY, _compiled(rf"(?P<sign>[+-]?){_CLOCK}{_HALF_DAY}"))
-    loose = _compiled(_WITHOUT_ZEROS)
-    yield Form(f"time of day, {_UNPADDED}", TIME_OF_DAY, loose, tail="us", last=True)
+    yield Form("time of day", TIME_OF_DAY, rf"(?P<sign>[+-]?){_CLOCK}{_HALF_DAY}")
+    yield Form(f"time of day, {_UNPADDED}", TIME_OF_DAY, _WITHOUT_ZEROS, tail="us", last=True)
     for tail, what in _TAILS.items():
         name = f"time of day, {what} behind the last colon"
-        yield Form(name, TIME_OF_DAY, _compiled(_COUNTED), True, (tail,), tail)
+        yield Form(name, TIME_OF_DAY, _COUNTED, True, (tail,), tail)
     days = rf"(?P<days_sign>[+-]?)(?P<days>\d{{1,6}}) days?(?: \+?{_CLOCK})?"
-    yield Form("days, hours, minutes and seconds", LENGTH, _compiled(days))
+    yield Form("days, hours, minutes and seconds", LENGTH, days)
     short = rf"{_MINUTES}:(?P<second>\d\d)[.,](?P<decimals>\d{{1,9}})"
-    yield Form("minutes and seconds", LENGTH, _compiled(short))
+    yield Form("minutes and seconds", LENGTH, short)
     words = "|".join(_WORDS_NS)
     number = rf"(?P<sign>[+-]?)(?P<whole>\d{{1,15}}){_DECIMALS} ?(?P<word>{words})"
-    yield Form("a number with its unit", LENGTH, _compiled(number))
+    yield Form("a number with its unit", LENGTH, number)
 
 
+@cache  # not at import: thirty patterns take 50 ms, and few logs have a clock of text
 def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(rf" *{pattern} *\Z", re.IGNORECASE | re.ASCII)
 
@@ -251,17 +256,15 @@ _DENSE_TAIL = r"(?:[.,](?P<decimals>\d{1,9})|(?P<count>\d{3}|\d{6}))?"
 DENSE_DATE = Form(
     "date and time, digits alone",
     DATE,
-    _compiled(
-        r"(?P<year>(?:19[7-9]|20\d)\d)(?P<month>\d\d)(?P<day>\d\d)"
-        rf"(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DENSE_TAIL}"
-    ),
+    r"(?P<year>(?:19[7-9]|20\d)\d)(?P<month>\d\d)(?P<day>\d\d)"
+    rf"(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DENSE_TAIL}",
 )
 """The form of a number that is a date, YYYYMMDDhhmmss: taken where a whole column holds nothing else."""
 
 DENSE_DAY = Form(
     "date, digits alone",
     DATE,
-    _compiled(r"(?P<year>(?:19[7-9]|20\d)\d)(?P<month>\d\d)(?P<day>\d\d)(?:\.0*)?"),
+    r"(?P<year>(?:19[7-9]|20\d)\d)(?P<month>\d\d)(?P<day>\d\d)(?:\.0*)?",
     timed=False,
 )
 """The form of a number that is a day, YYYYMMDD, beside a time of day."""
@@ -269,17 +272,15 @@ DENSE_DAY = Form(
 DENSE_TIME = Form(
     "time of day, digits alone",
     TIME_OF_DAY,
-    _compiled(
-        r"(?P<hour>\d{0,2}?)(?P<minute>\d{0,2}?)(?P<second>\d{1,2})"
-        r"(?:[.,](?P<decimals>\d{1,9})|(?<=\d{6})(?P<count>\d{3}|\d{6}))?"
-    ),
+    r"(?P<hour>\d{0,2}?)(?P<minute>\d{0,2}?)(?P<second>\d{1,2})"
+    r"(?:[.,](?P<decimals>\d{1,9})|(?<=\d{6})(?P<count>\d{3}|\d{6}))?",
 )
 """The form of a number that is a time of day, hhmmss, beside a day; zeros before it may be missing."""
 
 UNPADDED_NS = Form(
     "seconds, and nanoseconds not zero-padded behind the point",
     LENGTH,
-    _compiled(r"(?P<whole>\d{1,10})[.,](?P<count>0|[1-9]\d{0,8})"),
+    r"(?P<whole>\d{1,10})[.,](?P<count>0|[1-9]\d{0,8})",
     tail="ns",
 )
 """The form of a number that is seconds and nanoseconds: 7.5000000 is 7 s and 5 ms."""
@@ -302,4 +303,4 @@ def looks_like_a_clock(cell: str) -> bool:
         return False
     if any(is_number(cell, decimal) for decimal in DECIMALS):
         return False
-    return any(pattern.match(cell) for pattern in _PATTERNS)
+    return any(_compiled(pattern).match(cell) for pattern in _PATTERNS)

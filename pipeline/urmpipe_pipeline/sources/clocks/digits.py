@@ -45,7 +45,7 @@ def all_are(form: Form, column: Column, layout: Layout) -> bool:
     else:
         written = (cell for cell in layout.cells(column.index) if not is_missing(cell))
     first = next(written, None)
-    if first is None or not form.pattern.match(first):
+    if first is None or not form.match(first):
         return False
     return bool((read_cells(TextCells.of([first, *written]), form) > UNREADABLE).all())
 

@@ -244,7 +244,7 @@ def _shapes(block: Bytes) -> Iterator[IntArray | slice]:
 def _read_shape(cells: Bytes, form: Form) -> IntArray | int:
     """Return the times of cells of one shape."""
     text = cells[0].tobytes().decode("latin-1")
-    match = form.pattern.match(text)
+    match = form.match(text)
     if match is None:
         return NO_TIME if is_missing(text.strip()) else UNREADABLE
     times, valid = form.nanoseconds(Parts(match, cells))
