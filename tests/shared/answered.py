@@ -26,7 +26,7 @@ def json_answer(line: str, *keys: str) -> dict[str, Any]:
 
 
 def full_answer(line: str, *keys: str) -> tuple[int, dict[str, Any], list[str]]:
-    """Return the exit code of `urmpipe LINE --json`, these keys, and its errors and warnings, without notes."""
+    """Return the exit code of `urmpipe LINE --json`, these keys, and its errors and warnings."""
     code, out, err = ran(f"{line} --json")
     answer = json.loads(out)
     errors = [one for one in err.splitlines() if not one.startswith("note: ")]
