@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from dataclasses import replace
-from inspect import Parameter, signature
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,6 @@ from urmpipe.arm_placing import parse_frame
 from urmpipe.main import cli
 from urmpipe_models.errors import Finding
 from urmpipe_models.math3d import Transform, from_offset
-
-COMMANDS = ("ingest", "compare", "ik", "report", "export", "simulate", "build_fmu", "view")
 
 
 @pytest.fixture(scope="module")
@@ -55,34 +53,12 @@ def test_a_run_is_held_as_its_log_is_with_another_tool(folder: Path, run: urmpip
     assert urmpipe.compare(folder / "path.csv", run).verdict == "pass"
 
 
-def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.Run) -> None:
-    with pytest.raises(urmpipe.OptionError) as error:
-        urmpipe.compare(run, run, time="none", tsp=0.01, derivative="savgol")
-    assert str(error.value) == (
-        "time (--time): found with an ingested log, allowed: with a log; a run or a recording is"
-        " used as ingested\ntsp (--tsp): found with an ingested log, allowed: with a log; a run or"
-        " a recording is used as ingested\nderivative (--derivative): found with an ingested log,"
-        " allowed: with a log; a run or a recording is used as ingested"
-    )
-    with pytest.raises(urmpipe.UrmpipeError, match="allowed: 7"):
-        urmpipe.compare(folder / "path.csv", run, "panda")
-
-
 def test_one_is_a_list_of_one(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:
     path, log = folder / "path.csv", folder / "log.csv"
     given: list[Any] = [str(log), log, run, [run], (log,), (one for one in [run])]
     names = [urmpipe.compare(path, logs, "urm6").name for logs in given]
     assert names == ["log-against-path"] * 6
     assert urmpipe.report(run, tmp_path / "one.html").results == (run,)
-
-
-def test_an_input_alone_is_never_replaced(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:
-    file = str(urmpipe.write_map(run, tmp_path / "log.toml"))
-    told = "found an input of this command"
-    with pytest.raises(urmpipe.OutputError, match=told):
-        urmpipe.write_map(run, file, inputs=file)
-    with pytest.raises(urmpipe.OutputError, match=told):
-        urmpipe.ingest(folder / "log.csv", "urm6", write_map=file, inputs=file)
 
 
 @pytest.mark.parametrize(
@@ -127,19 +103,6 @@ def test_files_may_be_text(folder: Path, run: urmpipe.Run, tmp_path: Path) -> No
 def test_what_was_solved_and_written_is_json(tmp_path: Path) -> None:
     solved = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", output=tmp_path / "joints.csv")
     assert json.loads(json.dumps(solved.to_dict()))["output"] == str(tmp_path / "joints.csv")
-
-
-SHARED = ("base", "tool", "strict", "inputs", "progress")
-
-
-def test_shared_keywords_have_one_name_and_one_order() -> None:
-    for name in COMMANDS:
-        parameters = signature(getattr(urmpipe, name)).parameters
-        shared = [one for one in parameters if one in SHARED]
-        assert shared == [one for one in SHARED if one in shared], name
-        if "robot" in parameters:
-            assert list(parameters).index("robot") == (2 if name == "compare" else 1)
-            assert parameters["robot"].kind == Parameter.POSITIONAL_OR_KEYWORD
 
 
 def options_of(command: click.Command) -> set[str]:
