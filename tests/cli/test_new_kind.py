@@ -150,15 +150,8 @@ def test_a_report_has_its_section_beside_those_of_other_results() -> None:
     report = urmpipe.report([swing(), swing("other")], "page.html")
     largest = float(np.abs(swing().angle).max())
     page = report.path.read_text(encoding="utf-8")
-    for words in (
-        "it swings too far",
-        "Swing pendulum",
-        "Swing other",
-        "Angle over time",
-        "Turns",
-        format_number(largest, "rad", LIMIT),
-    ):
-        assert words in page
+    words = ["it swings too far", "Swing pendulum", "Swing other", "Angle over time", "Turns"]
+    assert all(word in page for word in [*words, format_number(largest, "rad", LIMIT)])
     assert [one["verdict"] for one in report.to_dict()["recordings"]] == ["fail", "fail"]
 
 

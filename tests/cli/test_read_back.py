@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,11 @@ import numpy as np
 import pytest
 
 import urmpipe
-from asserting import refusal, there
+from asserting import there
 from same_results import assert_same
 from urmpipe_datasets import LOGS
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import LogError, OptionError, RecordingError
+from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.runs.run import Run
@@ -26,8 +25,7 @@ from urmpipe_pipeline.simulations.simulation import Simulation
 ROWS = 120
 CUBE = "cube:wall,a=0.2,r=0.02,x=1.7,y=0,z=1"
 
-ROBOTS = [None, "ur5e", "iiwa14"]
-"""Robots that a path is read with, of 6 and 7 joints: it has none, whatever is given."""
+ROBOTS = [None, "ur5e", "iiwa14"]  # of 6 and 7 joints: a path has none, whatever is given
 
 
 def write_log(path: Path, t: FloatArray) -> Path:
@@ -102,38 +100,6 @@ def test_a_recording_gives_the_run_that_it_holds(run: Run, tmp_path: Path) -> No
     np.testing.assert_array_equal(other.q, run.q)
 
 
-def test_options_of_reading_are_refused_with_a_recording(run: Run, urmpipe: Callable[..., Any]) -> None:
-    import urmpipe as api
-
-    found = "found with an ingested log, allowed: with a log; a run or a recording is used"
-    assert refusal(OptionError, api.ingest, run.recording, unit="deg", tsp=0.01).splitlines() == [
-        f"unit (--unit): {found} as ingested", f"tsp (--tsp): {found} as ingested",
-    ]  # fmt: skip
-    ran = urmpipe("ingest", there(run.recording), "--unit", "deg")
-    assert ran.code == 2
-    assert "--unit: found with recordings only" in ran.err
-    ran = urmpipe("ingest", there(run.recording), "-q")
-    assert (ran.code, ran.err) == (0, "")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("run", ["even"], indirect=True)
-def test_a_recording_among_files_or_without_a_run_is_refused(run: Run, tmp_path: Path) -> None:
-    path, log = there(run.recording), there(run.recording).with_suffix(".csv")
-    assert refusal(RecordingError, urmpipe.ingest, [path, log]) == (
-        f"{path}: found a recording among files of one log, allowed: it alone, or the files"
-    )
-    urmpipe.compare(log, robot="urm6", output=tmp_path / "c.rrd")
-    assert refusal(RecordingError, urmpipe.ingest, tmp_path / "c.rrd") == (
-        f"{tmp_path / 'c.rrd'}: found the recording of a comparison, allowed: one that ingest wrote"
-    )
-    urmpipe.simulate("one-drive", duration=0.02, output=tmp_path / "s.rrd")
-    assert refusal(RecordingError, urmpipe.ingest, tmp_path / "s.rrd") == (
-        f"{tmp_path / 's.rrd'}: found the recording of a simulation, allowed: one that ingest wrote;"
-        " urmpipe compare --block BLOCK takes the motion of a block"
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("timed", [True, False])
 def test_solved_targets_come_back(timed: bool, tmp_path: Path) -> None:
@@ -176,8 +142,7 @@ SYSTEMS = {
         for block, name in (("set_point", "theta"), ("drive", "theta1"), ("load", "theta"))
     ],
     "driven-arm": [],
-}
-"""The signals of each system that may be the joints of an arm; none where it has only one such array."""
+}  # the signals of each system that may be the joints of an arm; none where it has only one such array
 
 
 @pytest.fixture(scope="module", params=SYSTEMS)
@@ -228,15 +193,15 @@ def test_names_that_a_spreadsheet_would_run_leave_behind_an_apostrophe_and_come_
     with Path("=log.csv").open("w", encoding="utf-8", newline="") as file:
         csv.writer(file).writerow(["t", *names])
         file.write("\n".join(lines) + "\n")
-    told: Any = {"robot": "urm6", "unit": "rad"}
-    log = urmpipe.ingest("=log.csv", joints=names, output="log.rrd", audit="audit.csv", **told)
+    options: Any = {"robot": "urm6", "unit": "rad"}
+    log = urmpipe.ingest("=log.csv", joints=names, output="log.rrd", audit="audit.csv", **options)
     assert log.q.min() < 0.0  # whose signs are none of a text
-    urmpipe.compare("=log.csv", log, joints=names, csv="statistics.csv", **told)
+    urmpipe.compare("=log.csv", log, joints=names, csv="statistics.csv", **options)
     urmpipe.export("log.rrd", "file.csv", rows="file")
     urmpipe.export("log.rrd", "grid.csv")
     for path in Path().glob("[!=]*.csv"):
         for cell in (cell for row in csv.reader(path.open(encoding="utf-8", newline="")) for cell in row):
             assert cell[:1] not in tuple("=+-@") or re.fullmatch(r"-[0-9.e-]+", cell), (path, cell)
-    again = urmpipe.ingest("file.csv", joints=names, **told)
+    again = urmpipe.ingest("file.csv", joints=names, **options)
     np.testing.assert_array_equal(again.q, log.q)
     assert again.log.joints == log.log.joints == urmpipe.ingest("grid.csv", "urm6").log.joints

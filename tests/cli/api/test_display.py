@@ -22,9 +22,15 @@ from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
 OTHERS = {
-    "LogMap", "LogReading", "PathRows", "ReadOptions", "Reading", "TableReading", "Targets", "Transform",
-}  # fmt: skip
-"""Public classes that are no results: what they hold is what they show."""
+    "LogMap",
+    "LogReading",
+    "PathRows",
+    "ReadOptions",
+    "Reading",
+    "TableReading",
+    "Targets",
+    "Transform",
+}  # fmt: skip - public classes that are no results
 
 
 def pendulum() -> Chain:
@@ -70,39 +76,19 @@ def test_each_public_class_is_a_result_or_named_as_another(results: dict[str, An
 
 
 @pytest.mark.slow
-def test_each_result_is_one_line_at_a_prompt(results: dict[str, Any]) -> None:
+def test_each_result_is_a_line_a_page_a_dictionary_and_a_frame(results: dict[str, Any]) -> None:
     for name, one in results.items():
-        shown = repr(one)
-        assert shown.startswith(f"<{name} ")
-        assert shown.endswith(">")
-        assert shown.isprintable()
-        assert len(shown) <= 120
-
-
-@pytest.mark.slow
-def test_each_result_shows_its_headline_and_escapes_names_in_a_notebook(results: dict[str, Any]) -> None:
-    for name, one in results.items():
-        html = one._repr_html_()
-        assert html.startswith(f"<p><b>{name}</b> ")
-        assert "<table" in html
-        assert "<b>&log" not in html
-    assert "&lt;b&gt;&amp;log: 100 rows" in results["Run"]._repr_html_()
-
-
-@pytest.mark.slow
-def test_each_result_has_a_dictionary_and_a_frame_but_for_what_is_described(results: dict[str, Any]) -> None:
-    for name, one in results.items():
-        if name not in ("Chain", "Network"):
+        line, html = repr(one), one._repr_html_()
+        assert line.startswith(f"<{name} ") and line.endswith(">") and line.isprintable() and len(line) <= 120
+        assert html.startswith(f"<p><b>{name}</b> ") and "<table" in html and "<b>&log" not in html
+        if name not in ("Chain", "Network"):  # which are described
             assert one.to_dict()
             assert len(one.to_frame().columns) > 1 or name == "Report"
-
-
-@pytest.mark.slow
-def test_the_lines_say_what_each_holds(results: dict[str, Any]) -> None:
+    assert "&lt;b&gt;&amp;log: 100 rows" in results["Run"]._repr_html_()
     assert repr(results["Run"]) == "<Run <b>&log: urm6, 100 rows in 0.495 s, grid of 100 samples>"
     line = "<Comparison <b>&log-against-path: pass, on 1 assumption: <b>&log pass (4.56e-05 m), 1 warning>"
     assert repr(results["Comparison"]) == line
-    assert repr(results["IkResult"]) == ("<IkResult targets: pass, ur5e, 1 of 1 target reached, iterative>")
+    assert repr(results["IkResult"]) == "<IkResult targets: pass, ur5e, 1 of 1 target reached, iterative>"
 
 
 @pytest.mark.slow
@@ -139,7 +125,7 @@ def test_a_deviation_has_every_quantity_over_time(results: dict[str, Any]) -> No
     assert frame["x"].abs().max() == deviation.statistics["x"].max
 
 
-def test_warnings_are_counted_in_the_line_and_told_in_the_notebook(tmp_path: Path) -> None:
+def test_warnings_are_counted_in_the_line_and_listed_in_the_notebook(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,q1\n0,0.1\n0.005,0.2\n0.01,0.3\n", encoding="utf-8")
     with pytest.warns(urmpipe.UrmpipeWarning):
