@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections import defaultdict
 from collections.abc import Iterator
@@ -88,8 +89,8 @@ def drawing(path: Path, *roots: str) -> str:
         batch, timeline = chunk.to_record_batch(), next(iter(chunk.timeline_names), "")
         at = batch.column(timeline).cast("int64").to_pylist() if timeline else [0] * batch.num_rows
         for name in (one for one in batch.schema.names if ":" in one):
-            rows = zip(at, batch.column(name).to_pylist(), strict=True)
-            found[chunk.entity_path, name, timeline] += [row for row in rows if row[1] is not None]
+            values = zip(at, batch.column(name).to_pylist(), strict=True)
+            found[chunk.entity_path, name, timeline] += [row for row in values if row[1] is not None]
     lines = []
     for entity, keys in itertools.groupby(sorted(found), key=lambda key: key[0]):
         lines.append(entity)
@@ -155,6 +156,8 @@ def _text(value: Any, name: str) -> str:
     if isinstance(value, list):
         if len(value) == 1:
             return _text(value[0], name)
+        if "quaternion" in name and isinstance(value[0], float):  # both signs are the same turn
+            value = [one * math.copysign(1, next(filter(lambda at: abs(at) > 1e-6, value))) for one in value]
         some = value if len(value) <= 6 else [*value[:2], f"... {len(value)} ...", value[-1]]
         return f"[{', '.join(_text(one, name) for one in some)}]"
     if isinstance(value, float):

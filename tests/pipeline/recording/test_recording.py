@@ -1,4 +1,4 @@
-"""What is written is read back: every array bit for bit, and all metadata."""
+"""What is written is read back: every array bit for bit, and all metadata, of runs and results over them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,19 +14,34 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 import made_runs
 from asserting import refusal, there
-from recordable import build_comparison, build_run
+from diagnoses import diagnosis_of
+from recordable import build_comparison, build_run, build_solved
+from recorded import columns
 from same_results import assert_comes_back, assert_same
-from urmpipe_models.errors import OutputError
+from urmpipe_models.errors import LogError, OptionError, OutputError, RecordingError
+from urmpipe_models.ik.solutions import Targets
 from urmpipe_pipeline.comparison.baseline import compare_with_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, compare_with_recorded_tcp
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.verdict import DeltaMeterResult
 from urmpipe_pipeline.joint_log import Inference, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.operands import load_comparison, load_runs
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.results import read_recording, write_recording
+from urmpipe_pipeline.recording.layout import SLICE
+from urmpipe_pipeline.results import enclosing_result, read_recording, write_recording
 from urmpipe_pipeline.runs.run import Run
+from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 from urmpipe_pipeline.trajectories import AlignMode
+
+MakeSimulation = Callable[..., Simulation]
+
+
+# --- runs ------------------------------------------------------------------------------------------
 
 
 def full(run: Run) -> Run:
@@ -95,50 +111,46 @@ def test_a_run_comes_back_as_it_was(rows: int, change: Callable[[Run], Run], tmp
     assert_comes_back(run, tmp_path)
 
 
-def test_a_comparison_of_paths_is_recorded(tmp_path: Path) -> None:
+# --- comparisons, diagnoses, solved targets --------------------------------------------------------
+
+
+def compared_paths() -> Comparison:
     run = path_run(build_run(rows=20))
     comparison = compare_runs(run, [run, build_run(rows=20)])
     assert [one.run.log.joints for one in comparison.runs] == [(), build_run(rows=20).log.joints]
-    assert_comes_back(comparison, tmp_path)
+    return comparison
 
 
-@pytest.mark.slow
-def test_a_comparison_comes_back_as_it_was(tmp_path: Path) -> None:
+def compared_with_a_baseline() -> Comparison:
     comparison = build_comparison(("coppeliasim", "matlab", "solidworks"))
     assert [one.verdict for one in comparison.runs] == ["pass", "pass", "fail"]
     assert comparison.runs[2].out_of_tolerance.any()
-    assert_comes_back(comparison, tmp_path)
     earlier = replace(
         build_comparison(("matlab", "old")), tolerance={"axis": 0.002}, recording=Path("before.rrd")
     )
     baseline = compare_with_baseline(comparison, earlier, {"axis": 1e-5})
     assert baseline.changes and baseline.new and baseline.missing and baseline.differences
-    comparison = replace(comparison, baseline=baseline)
-    assert_comes_back(comparison, tmp_path)
+    return replace(comparison, baseline=baseline)
 
 
-def test_a_comparison_with_samples_left_out_comes_back_as_it_was(tmp_path: Path) -> None:
+def compared_with_samples_left_out() -> Comparison:
     run = build_run()
     position = there(run.tcp).position.copy()
     position[[0, 5, 6, 700]] = np.nan
     run = replace(run, tcp=replace(there(run.tcp), position=position))
     comparison = compare_runs(path_run(build_run(rows=1400)), [run], CompareOptions(sync=-0.1))
     assert comparison.runs[0].left_out == 101  # 20 before and 80 after the path, one NaN
-    assert_comes_back(comparison, tmp_path)
+    return comparison
 
 
-def test_comparisons_with_recorded_poses_come_back_as_they_were(tmp_path: Path) -> None:
+def compared_with_recorded_poses() -> Comparison:
     reference, log = full(build_run("asked for")), full(build_run("log"))
-    own = compare_with_recorded_tcp(log)
-    assert_comes_back(own, tmp_path)
     comparison = compare_runs(reference, [log], CompareOptions(tcp="recorded"))
     assert (comparison.runs[0].angle is None, comparison.runs[0].left_out) == (False, 1)
-    assert_comes_back(comparison, tmp_path)
+    return comparison
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("align", get_args(AlignMode))
-def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(align: AlignMode, tmp_path: Path) -> None:
+def aligned(align: AlignMode) -> Comparison:
     reference, log = build_run("asked for"), build_run("log", offset=0.002)
     turned = replace(log, q=log.q + 2 * np.pi * np.array([0, 0, 1, 0, 0, -2]))
     comparison = compare_runs(reference, [turned, full(log)], CompareOptions({"angle": 0.001}, align=align))
@@ -148,16 +160,16 @@ def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(align: AlignMode,
     assert set(first.statistics) == {"x", "y", "z", "norm", "path", "angle"}
     assert list(first.joint_statistics) == list(log.log.joints)
     assert first.alignment.mode == align
-    assert_comes_back(comparison, tmp_path)
+    return comparison
 
 
-def test_unobservable_frames_come_back_as_they_were(tmp_path: Path) -> None:
+def compared_where_frames_are_unobservable() -> Comparison:
     still = np.tile([0.0, 0.0, 0.0, 1.0], (40, 1))
     position = np.random.default_rng(0).normal(size=(40, 3))
     reference, log = made_runs.path_run(position), made_runs.path_run(position, still, name="log")
     comparison = compare_runs(reference, [log], CompareOptions(align="base+tool"))
     assert [one.part for one in comparison.runs[0].alignment.unobservable] == ["tool offset"] * 3
-    assert_comes_back(comparison, tmp_path)
+    return comparison
 
 
 NAMES = (
@@ -166,60 +178,218 @@ NAMES = (
 )  # fmt: skip
 
 
-@pytest.mark.slow
-def test_runs_may_have_any_names(tmp_path: Path) -> None:
-    comparison = compare_runs(
-        build_run("reference", 40), [build_run(f"run {i}", 40) for i in range(len(NAMES))]
-    )
+def compared_with_odd_names() -> Comparison:
+    comparison = compare_runs(build_run("reference", 40), [build_run(f"run {name}", 40) for name in NAMES])
     named = tuple(
         replace(one, name=name, run=replace(one.run, name=name))
         for one, name in zip(comparison.runs, NAMES, strict=True)
     )
-    comparison = replace(comparison, name="x\udc80y", runs=named)
-    assert_comes_back(comparison, tmp_path)
+    return replace(comparison, name="x\udc80y", runs=named)
 
 
-ODD = st.text(st.characters(exclude_categories=[]), max_size=12)
+def diagnosed() -> Comparison:
+    result = build_comparison(("log",))
+    return replace(result, runs=(replace(result.runs[0], diagnosis=diagnosis_of(result.runs[0])),))
+
+
+def positions_alone() -> Result:
+    one = build_solved(timed=False)
+    position = one.targets.position.copy()
+    position[5] = np.nan
+    return replace(one, targets=Targets(position), angle=None, all_solutions=False)
+
+
+BRANCHES = "1", "q", "a/b", "a\\", "a", "a ", "", "unnamed", "elbow (2)", "ü, 肘", "**", "a\ud800b"
+QUICK: list[Callable[[], Result]] = [
+    compared_paths,
+    compared_with_samples_left_out,
+    compared_with_recorded_poses,
+    lambda: compare_with_recorded_tcp(full(build_run("log"))),
+    compared_where_frames_are_unobservable,
+    diagnosed,
+    lambda: there(diagnosed().runs[0].diagnosis),
+    lambda: replace(build_solved(), motion=build_solved().as_run()),
+    lambda: build_solved(timed=False),
+    lambda: build_solved(names=BRANCHES, rows=20),
+    positions_alone,
+]
+SLOW = [
+    compared_with_a_baseline,
+    compared_with_odd_names,
+    *(partial(aligned, one) for one in get_args(AlignMode)),
+]
+
+
+@pytest.mark.parametrize("make", [*QUICK, *(pytest.param(one, marks=pytest.mark.slow) for one in SLOW)])
+def test_a_result_comes_back_as_it_was(make: Callable[[], Result], tmp_path: Path) -> None:
+    assert_comes_back(make(), tmp_path)
+
+
+def test_a_diagnosis_is_no_log_and_recorded_with_its_comparison(tmp_path: Path) -> None:
+    comparison, path = diagnosed(), tmp_path / "result.rrd"
+    alone = there(comparison.runs[0].diagnosis)
+    write_recording(alone, path)
+    said = f"{path}: found the recording of a diagnosis, allowed: one that ingest wrote"
+    assert refusal(RecordingError, load_runs, [path]) == said
+    found = replace(alone, comparison=comparison)
+    assert enclosing_result(found) is comparison
+    assert_same(read_recording(write_recording(found, path)), comparison)
+
+
+# --- simulations -----------------------------------------------------------------------------------
+
+
+def wide(simulation: Simulation) -> Simulation:
+    """Return a simulation whose signals are views into one array, as those of a co-simulation are."""
+    recorded = np.random.default_rng(5).normal(size=(40, 9))
+    signals = (
+        Signal("b", "x", recorded[:, 4]), Signal("b", "y", recorded[:, 1:4]),
+        Signal("b", "z", np.asfortranarray(recorded[:, 5:])), Signal("b", "w", recorded[::-1, 0]),
+    )  # fmt: skip
+    return replace(simulation, signals=signals, verdicts=())
+
+
+ODD = (
+    "a b", "a ", "a", " a", " ", "", "a/b", "a/", "/", "a%2Fb", "\\", "a\\", "a\\/b", "a\\ ", "..", "/**",
+    "a.b", "x[1]", "<b>", "a\n", "a\tb", "a\0", "a\u00a0", "\u202e", "\ud800", "\ud801", "?", "A", "$",
+)  # fmt: skip
+
+
+def odd(simulation: Simulation) -> Simulation:
+    """Return one with names that Rerun, which drops a blank or a backslash at the end, takes for others."""
+    pairs = [pair for name in ODD for pair in ((name, "v"), ("b", name), (name, f"{name}2"))]
+    signals = tuple(Signal(*pair, np.arange(3.0) + i) for i, pair in enumerate(pairs))
+    (arm,) = simulation.arms
+    arms = tuple(replace(arm, block=name, q=arm.q + i) for i, name in enumerate(ODD))
+    return replace(simulation, signals=signals, arms=arms, verdicts=())
+
+
+@pytest.mark.parametrize(
+    ("make", "change"),
+    [
+        ((600,), None),
+        ((37, "chain: fmi2DoStep returned fmi2Error: q is NaN"), None),
+        ((0, "chain: crashed"), None),
+        ((1,), None),
+        ((20,), lambda one: replace(one, signals=(), verdicts=(), arms=())),
+        ((40,), wide),
+        ((3,), lambda one: replace(one, signals=(Signal("b", "v", np.arange(3.0), "\ud800"),), verdicts=())),
+        pytest.param((3,), odd, marks=pytest.mark.slow),
+        # Three slices, the ends and the middle sent before the others.
+        pytest.param((2 * SLICE + 5,), None, marks=pytest.mark.slow),
+    ],
+)
+def test_a_simulation_comes_back_as_it_was(
+    make: tuple[Any, ...],
+    change: Callable[[Simulation], Simulation] | None,
+    make_simulation: MakeSimulation,
+    tmp_path: Path,
+) -> None:
+    made = make_simulation(*make)
+    assert_comes_back(change(made) if change else made, tmp_path)
+
+
+def test_a_variable_is_an_entity_with_a_column_a_scalar(
+    make_simulation: MakeSimulation, tmp_path: Path
+) -> None:
+    simulation = make_simulation(50)
+    path = write_recording(simulation, tmp_path / "a.rrd")
+    for one in simulation.signals[:4]:
+        found = np.array(columns(path, f"/signals/{one.name}/values", "Scalars:scalars"))
+        np.testing.assert_array_equal(found, one.columns)
+
+
+def test_the_recording_of_a_simulation_is_compared_as_it_is(
+    make_simulation: MakeSimulation, tmp_path: Path
+) -> None:
+    simulation = make_simulation(5)
+    path = write_recording(simulation, tmp_path / "a.rrd")
+    for run in load_runs([path, simulation], block="chain"):
+        np.testing.assert_array_equal(run.q, simulation.arms[0].q)
+    assert [one.log.name for one in load_runs([path, simulation], block=["log", "chain"])] == [
+        "log-to-delta (log)", "log-to-delta (chain)",
+    ]  # fmt: skip
+    assert refusal(LogError, load_runs, [path]) == (
+        f"{path}: found 2 blocks with a motion, allowed: one; use --block chain or --block log"
+    )
+    for blocks in (["a", "b"], ["chain", "log", "chain"]):
+        refused = refusal(OptionError, load_runs, [path], block=blocks)
+        assert (
+            refused.startswith("block (--block): found 'a'")
+            or "with 1 simulation, allowed: a block" in refused
+        )
+    assert load_comparison(path) is None
+
+
+# --- any text and number ---------------------------------------------------------------------------
+
+
+TEXT = st.text(st.characters(exclude_categories=[]), max_size=12)
 NUMBERS = st.floats(allow_nan=False)
 OPTIONS = st.recursive(
-    st.none() | st.booleans() | st.integers() | NUMBERS | ODD,
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(ODD, inner, max_size=3),
+    st.none() | st.booleans() | st.integers() | NUMBERS | TEXT,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
     max_leaves=5,
 )
 
 
-@pytest.mark.slow
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    texts=st.lists(ODD, min_size=10, max_size=10),
-    joints=st.lists(ODD, min_size=6, max_size=6, unique=True),
-    options=st.dictionaries(ODD, OPTIONS, max_size=3),
-    number=NUMBERS,
-    row=st.none() | st.integers(-3, 10**12),
-)
-def test_metadata_of_any_text_come_back(
-    tmp_path: Path,
-    texts: list[str],
-    joints: list[str],
-    options: dict[str, Any],
-    number: float,
-    row: int | None,
-) -> None:
-    name, source, kind, message, file, what, value, unit, command, created = texts
-    run = build_run(rows=3)
+@st.composite
+def runs(draw: st.DrawFn) -> Run:
+    """Draw a run with any texts in its metadata."""
+    run, number, row = build_run(rows=3), draw(NUMBERS), draw(st.none() | st.integers(-3, 10**12))
+    name, source, kind, message, file, what, value, unit, command, created = (draw(TEXT) for _ in range(10))
+    joints = draw(st.lists(TEXT, min_size=6, max_size=6, unique=True))
     log = replace(
         run.log, name=name, source=source, files=(SourceFile(file, what, 2**40),), joints=tuple(joints),
         clock_start_ns=row or 0, first_line=9, digits=None,
         columns=tuple(LogColumn(n, n, "joint", j, unit, number) for j, n in enumerate(joints)),
         inferences=(Inference(what, value, message),), warnings=(LogWarning(kind, message, row),),
     )  # fmt: skip
-    run = replace(
+    options = draw(st.dictionaries(TEXT, OPTIONS, max_size=3))
+    return replace(
         run, name=name, log=log, tsp=abs(number), warnings=log.warnings,
         audit=tuple(replace(entry, joint=joints[0]) for entry in run.audit),
         provenance=Provenance(command, options, log.files, {unit: value}, created),
     )  # fmt: skip
-    path = tmp_path / "odd.rrd"
-    assert_same(read_recording(write_recording(run, path)), run)
+
+
+@st.composite
+def simulations(draw: st.DrawFn) -> Simulation:
+    """Draw a simulation with any names, any values, and any number of samples."""
+    samples = draw(st.integers(0, 4))
+    names = draw(st.lists(st.tuples(TEXT, TEXT), max_size=4, unique_by=".".join))
+    signals = [
+        Signal(
+            block, variable,
+            draw(arrays(np.float64, draw(st.sampled_from([(samples,), (samples, 1), (samples, 3)])))),
+            draw(TEXT), draw(TEXT), draw(st.sampled_from(["Real", "Integer", "Boolean"])), draw(TEXT),
+        )
+        for block, variable in names
+    ]  # fmt: skip
+    every = [name for one in signals for name in {one.name, *one.names}]
+    verdict = DeltaMeterResult(
+        draw(TEXT), tuple(draw(st.lists(TEXT, max_size=2))), {"axis": draw(st.floats(0.0, 1e300))}, "x",
+        draw(st.floats()), 0.0, 0, 3, 1, "fail",
+    )  # fmt: skip
+    block = SimulatedBlock(draw(TEXT), "fmu", draw(TEXT), draw(TEXT), (Setting(draw(TEXT), draw(NUMBERS)),))
+    times = draw(st.sets(st.integers(0, 10**15), min_size=samples, max_size=samples))
+    return Simulation(
+        name=draw(TEXT), description=draw(TEXT),
+        t_ns=np.array(sorted(times), np.int64),
+        step=draw(NUMBERS), signals=tuple(signals) if len(set(every)) == len(every) else (),
+        system_svg=draw(TEXT), system_text=draw(TEXT), blocks=(block,),
+        failed=draw(st.none() | TEXT), warnings=(LogWarning(draw(TEXT), draw(TEXT), None),),
+        provenance=Provenance("simulate", {}, (SourceFile(draw(TEXT), draw(TEXT), 1),), {}, draw(TEXT)),
+        connections=draw(st.dictionaries(TEXT, TEXT, max_size=3)),
+        verdicts=(verdict,) if samples else (),
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+@settings(max_examples=45, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(result=runs() | simulations())
+def test_any_run_and_any_simulation_comes_back_as_it_was(result: Result, tmp_path: Path) -> None:
+    assert_same(read_recording(write_recording(result, tmp_path / "any.rrd")), result)
 
 
 def test_options_come_back_as_json_has_them(tmp_path: Path) -> None:
@@ -232,6 +402,9 @@ def test_options_come_back_as_json_has_them(tmp_path: Path) -> None:
     assert back.provenance.options == stored
 
 
+# --- the file --------------------------------------------------------------------------------------
+
+
 @pytest.mark.slow
 def test_a_mended_recording_is_the_same(tmp_path: Path) -> None:
     """Rerun's own tool cuts and orders the chunks anew."""
@@ -242,9 +415,10 @@ def test_a_mended_recording_is_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_rerun_finds_nothing_wrong(tmp_path: Path) -> None:
-    path = write_recording(build_comparison(NAMES[:3]), tmp_path / "odd.rrd")
-    assert "1 file verified without error" in rerun_tool("rrd", "verify", str(path))
+def test_rerun_finds_nothing_wrong(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    results = {"odd": build_comparison(NAMES[:3]), "simulation": make_simulation()}
+    paths = [str(write_recording(one, tmp_path / f"{name}.rrd")) for name, one in results.items()]
+    assert "2 files verified without error" in rerun_tool("rrd", "verify", *paths)
 
 
 def rerun_tool(*arguments: str) -> str:

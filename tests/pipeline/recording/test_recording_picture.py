@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from made_plans import FAILED, SMALL, limited, planned
 from recordable import build_comparison, build_run, build_solved
+from shapes_arm import arm_of_shapes
 from toys import eye_of
 from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
@@ -287,10 +288,8 @@ def test_the_arm_stands_where_its_kinematics_project_it(viewer: Any, tmp_path: P
     assert_stands(viewer, run, tmp_path, JOINT_COLOURS[:6], joints, (3.0, 8.5))
 
 
-def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
-    viewer: Any, shapes: Path, tmp_path: Path
-) -> None:
-    robot = read_urdf(shapes)
+def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(viewer: Any, tmp_path: Path) -> None:
+    robot = read_urdf(arm_of_shapes(tmp_path))
     run = build_run(rows=4000, robot=robot)
     carriers = ["turn1", "turn2", "turn3", "turn4"]
     numbers = [1 + [joint.name for joint in robot.joints].index(name) for name in carriers]

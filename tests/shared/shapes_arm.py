@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 
 def arm_of_shapes(folder: Path) -> Path:
@@ -48,9 +47,3 @@ def box_stl(size: tuple[float, float, float]) -> bytes:
     facets = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
     facets["corners"] = corners[triangles]
     return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
-
-
-@pytest.fixture
-def shapes(tmp_path: Path) -> Path:
-    """Return the URDF of an arm of shapes."""
-    return arm_of_shapes(tmp_path)
