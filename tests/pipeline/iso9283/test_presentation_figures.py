@@ -19,20 +19,7 @@ from repeated import along, late
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
-from urmpipe_pipeline.iso9283.figures import (
-    FACTORS,
-    MAX_DISPLAYED,
-    MAX_DRAWN,
-    RING_PIECES,
-    corner_drawing,
-    deviation_figure,
-    display_factor,
-    mean_line,
-    path_figure,
-    pose_drawing,
-    speed_figure,
-    tube,
-)
+from urmpipe_pipeline.iso9283 import figures
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest
 from urmpipe_pipeline.presentation.figure import Figure, Panel
 from urmpipe_pipeline.results import present, write_recording
@@ -68,13 +55,9 @@ def panels(figure: Figure) -> list[Panel]:
     return [panel for view in figure.views for panel in view.panels]
 
 
-# --- drawings --------------------------------------------------------------------------------------
-
-
-def frames(root: ET.Element) -> list[dict[str, float]]:
-    """The squares of a drawing: left, top, width and height of each in pixels."""
-    clips = (one[0] for one in root.iter(f"{SVG}clipPath"))
-    return [{name: float(one.attrib[name]) for name in ("x", "y", "width", "height")} for one in clips]
+def views(root: ET.Element) -> int:
+    """The number of squares of a drawing."""
+    return len([*root.iter(f"{SVG}clipPath")])
 
 
 def dots(root: ET.Element) -> list[FloatArray]:
@@ -85,9 +68,9 @@ def dots(root: ET.Element) -> list[FloatArray]:
 
 def test_a_pose_is_its_cloud_in_three_views_of_one_scale(iso: IsoTest) -> None:
     poses = there(iso.poses)
-    root = ET.fromstring(pose_drawing(iso, poses).svg)
+    root = ET.fromstring(figures.pose_drawing(iso, poses).svg)
     clouds, count = dots(root), len(poses.command)
-    assert len(clouds) == len(frames(root)) == 3 * count
+    assert len(clouds) == views(root) == 3 * count
     for k in range(count):
         off = poses.attained[:, k] - poses.command[k]
         side, front, above = (cloud - cloud.mean(axis=0) for cloud in clouds[3 * k : 3 * k + 3])
@@ -109,10 +92,11 @@ def test_of_many_poses_the_worst_are_drawn(iso: IsoTest) -> None:
     poses = AttainedPoses(command, attained)
     ap = np.linalg.norm(attained.mean(axis=0) - command, axis=1)
     criteria = tuple(replace(iso.criteria[0], at=f"pose {k + 1}", name="AP", value=ap[k]) for k in range(50))
-    drawing = pose_drawing(replace(iso, criteria=criteria), poses)
-    assert len(dots(ET.fromstring(drawing.svg))) == 3 * MAX_DRAWN and "12 worst of 50 poses" in drawing.alt
+    drawing = figures.pose_drawing(replace(iso, criteria=criteria), poses)
+    assert len(dots(ET.fromstring(drawing.svg))) == 3 * figures.MAX_DRAWN
+    assert "12 worst of 50 poses" in drawing.alt
     told = {int(number) for number in re.findall(r"pose (\d+): AP", drawing.alt)}
-    assert told == {k + 1 for k in np.argsort(-ap)[:MAX_DRAWN].tolist()}
+    assert told == {k + 1 for k in np.argsort(-ap)[: figures.MAX_DRAWN].tolist()}
 
 
 def lengths(root: ET.Element, name: str) -> Iterator[float]:
@@ -124,9 +108,9 @@ def lengths(root: ET.Element, name: str) -> Iterator[float]:
 
 
 def test_corners_show_their_lengths(iso: IsoTest, path: CutPath) -> None:
-    drawing = corner_drawing(path)
+    drawing = figures.corner_drawing(path)
     root = ET.fromstring(drawing.svg)
-    assert len(frames(root)) == len(path.corners) > 1
+    assert views(root) == len(path.corners) > 1
     rounding, beyond = list(lengths(root, "CR")), list(lengths(root, "CO"))
     for k, one in enumerate(path.corners):
         overshoot = there(one.overshoot)
@@ -149,7 +133,7 @@ def test_a_corner_that_turns_back_has_a_plane(iso: IsoTest, path: CutPath) -> No
         mean=np.array([[-0.1, 0, 0], [-1e-4, 0, 0], [-0.1, 0, 0]]), nearest=np.array([-1e-4, 0, 0]),
         rounding=1e-4, overshoot_point=None, nearest_on_leg=None, overshoot=0.0,
     )  # fmt: skip
-    root = ET.fromstring(corner_drawing(replace(path, corners=(back,))).svg)
+    root = ET.fromstring(figures.corner_drawing(replace(path, corners=(back,))).svg)
     assert len(list(lengths(root, "CR"))) == 1 and not list(lengths(root, "CO"))
 
 
@@ -157,16 +141,13 @@ def test_a_small_overshoot_far_from_its_corner_is_told_and_not_drawn(iso: IsoTes
     one = path.corners[0]
     far = one.point + 0.08 * (one.command[-1] - one.point) / np.linalg.norm(one.command[-1] - one.point)
     aside = replace(one, overshoot_point=far + np.array([1e-5, 0.0, 0.0]), nearest_on_leg=far, overshoot=1e-5)
-    drawing = corner_drawing(replace(path, corners=(aside,)))
+    drawing = figures.corner_drawing(replace(path, corners=(aside,)))
     assert not list(lengths(ET.fromstring(drawing.svg), "CO"))
     assert "CO: 80.00 mm from the corner" in drawing.svg and "CO 0.01000 mm" in drawing.alt
 
 
-# --- plots -----------------------------------------------------------------------------------------
-
-
 def test_at_and_rt_stand_at_their_planes_with_what_is_allowed(iso: IsoTest, path: CutPath) -> None:
-    both = panels(deviation_figure(iso, path))
+    both = panels(figures.deviation_figure(iso, path))
     for panel, values, allowed in zip(
         both, (path.accuracy, there(path.repeatability)), (1e-3, 5e-3), strict=True
     ):
@@ -184,12 +165,12 @@ def test_at_and_rt_stand_at_their_planes_with_what_is_allowed(iso: IsoTest, path
 
 def test_without_tolerance_or_repetition_there_is_accuracy_alone(iso: IsoTest, path: CutPath) -> None:
     bare = replace(iso, criteria=tuple(replace(one, tolerance=None) for one in iso.criteria))
-    (panel,) = panels(deviation_figure(bare, replace(path, repeatability=None)))
+    (panel,) = panels(figures.deviation_figure(bare, replace(path, repeatability=None)))
     assert panel.title == "AT" and len(panel.lines) == 1
 
 
 def test_speeds_stand_over_the_path(path: CutPath) -> None:
-    figure = speed_figure(path)
+    figure = figures.speed_figure(path)
     (panel,) = panels(figure)
     s = np.asarray(there(panel.over).values)
     cycles, commanded, mean = (np.asarray(line.values) for line in panel.lines)
@@ -205,46 +186,39 @@ def test_speeds_stand_over_the_path(path: CutPath) -> None:
     assert np.nanmax(cycles) == np.nanmax(path.speed)  # no peak is missing
     assert [mark.words.partition(":")[0] for mark in panel.marks] == [one.name for one in path.legs]
     assert list(figure.instants.values()) == [one.name for one in path.corners]
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path.path, axis=0), axis=1)))
     for row, corner in zip(figure.instants, path.corners, strict=True):
-        at = np.array([np.interp(s[row], _length(path), column) for column in path.path.T])
+        at = np.array([np.interp(s[row], length, column) for column in path.path.T])
         assert np.linalg.norm(at - corner.point) < 2.0 * path.total / len(path.speed_s)
-
-
-def _length(path: CutPath) -> FloatArray:
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path.path, axis=0), axis=1)))
-
-
-# --- space -----------------------------------------------------------------------------------------
 
 
 def test_the_tube_is_as_wide_as_rt_about_the_mean_path(path: CutPath) -> None:
     factor = 20
-    rings = there(tube(path, factor)).position.reshape(len(path.s), RING_PIECES + 2, 3)
+    rings = there(figures.tube(path, factor)).position.reshape(len(path.s), figures.RING_PIECES + 2, 3)
     assert np.isnan(rings[:, -1]).all()
     rings = rings[:, :-1]
     centre = path.command + factor * (path.mean - path.command)
     off = rings - centre[:, np.newaxis]
-    expected = factor * np.repeat(there(path.repeatability)[:, np.newaxis], RING_PIECES + 1, axis=1)
+    expected = factor * np.repeat(there(path.repeatability)[:, np.newaxis], figures.RING_PIECES + 1, axis=1)
     np.testing.assert_allclose(np.linalg.norm(off, axis=2), expected, rtol=1e-12)
     np.testing.assert_allclose(np.einsum("rpi,ri->rp", off, path.normal), 0.0, atol=1e-15)
-    mean = mean_line(path, factor)
+    mean = figures.mean_line(path, factor)
     known = np.isfinite(mean.position).all(axis=1)
     np.testing.assert_array_equal(mean.position[known], centre)
     np.testing.assert_array_equal(np.asarray(mean.values)[known], path.accuracy)
 
 
 def test_a_deviation_is_enlarged_as_far_as_the_scene_allows(iso: IsoTest, path: CutPath) -> None:
-    factor = display_factor(path, None)
+    factor = figures.display_factor(path, None)
     radius = float(np.linalg.norm(np.ptp(path.path, axis=0))) / 2.0
     largest = float((path.accuracy + there(path.repeatability)).max())
-    assert factor * largest <= MAX_DISPLAYED * radius < FACTORS[FACTORS.index(factor) - 1] * largest
-    assert f"x{factor}" in path_figure(path).caption
+    next_factor = figures.FACTORS[figures.FACTORS.index(factor) - 1]
+    assert factor * largest <= figures.MAX_DISPLAYED * radius < next_factor * largest
+    assert f"x{factor}" in figures.path_figure(path).caption
     poses = there(iso.poses)
     far = replace(poses, attained=poses.attained + 1.0)
-    assert display_factor(path, far) == 1
+    assert figures.display_factor(path, far) == 1
 
-
-# --- recording -------------------------------------------------------------------------------------
 
 SCENE = "/shown/scene"
 
@@ -255,7 +229,7 @@ def test_the_recording_holds_balls_tube_and_a_point_each_cycle(
     file = tmp_path / "test.rrd"
     write_recording(result, file)
     scene, poses = scene_of(present(result)), there(iso.poses)
-    factor = display_factor(path, poses)
+    factor = figures.display_factor(path, poses)
     assert f"x{factor}" in scene.title
     radius = [factor * there(there(iso.at(f"pose {k + 1}", "RP")).value) for k in range(len(poses.command))]
     sizes = np.array(static(file, f"{SCENE}/balls", "Ellipsoids3D:half_sizes"))

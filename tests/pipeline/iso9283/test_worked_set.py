@@ -183,16 +183,8 @@ def agrees(test: IsoTest, name: str, unit: float, wanted: dict[str, float]) -> N
     assert abs(test.worst_of(name).value or 0.0) == pytest.approx(abs(largest * unit), abs=1e-12)
 
 
-def poses(*numbers: float) -> dict[str, float]:
-    return {f"pose {k}": number for k, number in enumerate(numbers, 1)}
-
-
-def planes(*numbers: float) -> dict[str, float]:
-    return {f"plane {k}": number for k, number in enumerate(numbers, 1)}
-
-
-def legs(*numbers: float) -> dict[str, float]:
-    return {f"leg {k}": number for k, number in enumerate(numbers, 1)}
+def each(place: str, *numbers: float) -> dict[str, float]:
+    return {f"{place} {k}": number for k, number in enumerate(numbers, 1)}
 
 
 @pytest.mark.slow
@@ -208,7 +200,7 @@ def test_pose_accuracy(iso: IsoTest) -> None:
     # The five points have their barycentre in 0, K = (2, 0, 1, 1, 1) has mean 1:
     # pose 1 (20, -10, 20), pose 2 (27, -10, 20), pose 3 (32, -5, 20), pose 4 (30, -6, 20)
     # squares: 400 + 100 + 400 = 900; 729 + 100 + 400; 1024 + 25 + 400; 900 + 36 + 400
-    agrees(iso, "AP", U, poses(30, sqrt(1229), sqrt(1449), sqrt(1336)))
+    agrees(iso, "AP", U, each("pose", 30, sqrt(1229), sqrt(1449), sqrt(1336)))
 
 
 def test_pose_repeatability(iso: IsoTest) -> None:
@@ -219,16 +211,16 @@ def test_pose_repeatability(iso: IsoTest) -> None:
     # A: (970 - (2120 + 96 L)/5)/4 = 136.5 - 4.8 L; C: (1450 - (3080 + 96 L)/5)/4 = 208.5 - 4.8 L
     a = (2 * sqrt(386) + 24) / 5 + 3 * sqrt(136.5 - 4.8 * sqrt(386))
     c = (2 * sqrt(626) + 24) / 5 + 3 * sqrt(208.5 - 4.8 * sqrt(626))
-    agrees(iso, "RP", U, poses(19, a, c, a))
+    agrees(iso, "RP", U, each("pose", 19, a, c, a))
 
 
 def test_angles_of_poses(iso: IsoTest) -> None:
-    agrees(iso, "AP_rz", MRAD, poses(2, 3, 1, 0))
-    agrees(iso, "AP_ry", MRAD, poses(1, 1, 0, 2))
-    agrees(iso, "AP_rx", MRAD, poses(0.5, 0, 2, 1))
-    agrees(iso, "RP_rz", MRAD, poses(3, 6, 0, 1.5))
-    agrees(iso, "RP_ry", MRAD, poses(1.5, 3, 1.5, 0))
-    agrees(iso, "RP_rx", MRAD, poses(0.75, 0, 3, 6))
+    agrees(iso, "AP_rz", MRAD, each("pose", 2, 3, 1, 0))
+    agrees(iso, "AP_ry", MRAD, each("pose", 1, 1, 0, 2))
+    agrees(iso, "AP_rx", MRAD, each("pose", 0.5, 0, 2, 1))
+    agrees(iso, "RP_rz", MRAD, each("pose", 3, 6, 0, 1.5))
+    agrees(iso, "RP_ry", MRAD, each("pose", 1.5, 3, 1.5, 0))
+    agrees(iso, "RP_rx", MRAD, each("pose", 0.75, 0, 3, 6))
 
 
 def test_distances(iso: IsoTest) -> None:
@@ -261,8 +253,8 @@ def test_stabilisation_and_overshoot(iso: IsoTest) -> None:
     # Pose 1, cycle 1: 0.3 mm beyond at 15, back at 45: at 0.1 mm again at 15 + 30 . 2/3 = 35; 36 in all.
     # Cycle 2: 0.2 mm beyond at 20, back at 45: at 0.1 mm at 20 + 25/2 = 32.5; 33.5. The others 0.
     # Pose 4, cycle 3: 0.4 mm beyond at 10, 0.2 mm before at 40, there at 60: at 0.1 mm at 50; 51.
-    agrees(iso, "PSt", 1e-3, poses((36 + 33.5) / 5, 0, 0, 51 / 5))
-    agrees(iso, "OV", U, poses(30, 0, 0, 40))
+    agrees(iso, "PSt", 1e-3, each("pose", (36 + 33.5) / 5, 0, 0, 51 / 5))
+    agrees(iso, "OV", U, each("pose", 30, 0, 0, 40))
 
 
 def test_drift_of_accuracy(iso: IsoTest) -> None:
@@ -273,7 +265,7 @@ def test_drift_of_accuracy(iso: IsoTest) -> None:
     # pose 3: (56, 0, 15) 3361, (32, -5, 30) 1949
     # pose 4: (49, -6, 15) 2662, (30, -6, 30) 1836
     drifts = ((1349, 1400), (2441, 1729), (3361, 1949), (2662, 1836))
-    agrees(iso, "dAP", U, poses(*(abs(sqrt(last) - sqrt(first)) for first, last in drifts)))
+    agrees(iso, "dAP", U, each("pose", *(abs(sqrt(last) - sqrt(first)) for first, last in drifts)))
     assert {one.value for one in iso.criteria if one.name == "dRP"} == {None}
 
 
@@ -283,7 +275,7 @@ def test_path_accuracy(iso: IsoTest) -> None:
     # (leg 3), 0.832 + 0.04 (leg 4), 0.96 + 0.04, 1.088 + 0.04 (leg 5), 1.216 + 0.08 (leg 6).
     # Legs are off by (30, 40), (5, 12), (-8, 15); before K1 by z of mean 24, behind it by x of mean
     # -70/5 = -14, too: 196 + 576 = 772; then (12, 35), before K2 z of mean -18, (-24, 7).
-    agrees(iso, "AT", U, planes(50, 50, 13, 13, 17, 24, sqrt(772), 37, 18, 25))
+    agrees(iso, "AT", U, each("plane", 50, 50, 13, 13, 17, 24, sqrt(772), 37, 18, 25))
 
 
 def test_path_repeatability(iso: IsoTest) -> None:
@@ -294,16 +286,16 @@ def test_path_repeatability(iso: IsoTest) -> None:
     six = 12 + 3 * sqrt(70)
     roots = sqrt(416) + sqrt(116) + 4 + sqrt(136) + sqrt(436)
     seven = roots / 5 + 3 * sqrt((1120 - roots**2 / 5) / 4)
-    agrees(iso, "RT", U, planes(19, 19, 38, 38, 19, six, seven, 19, 0.6 * six, 19))
+    agrees(iso, "RT", U, each("plane", 19, 19, 38, 38, 19, six, seven, 19, 0.6 * six, 19))
 
 
 def test_angles_at_planes(iso: IsoTest) -> None:
-    agrees(iso, "AT_rz", MRAD, planes(4, 4, 5, 5, 1, 1, 2, 0, 0, 3))
-    agrees(iso, "AT_ry", MRAD, planes(1, 1, 0, 0, 2, 2, 3, 1, 1, 1))
-    agrees(iso, "AT_rx", MRAD, planes(1, 1, 3, 3, 1, 1, 0, 4, 4, 2))
-    agrees(iso, "RT_rz", MRAD, planes(3, 3, 4.5, 4.5, 0, 0, 1.5, 6, 6, 9))
-    agrees(iso, "RT_ry", MRAD, planes(3, 3, 0, 0, 6, 6, 4.5, 0, 0, 1.5))
-    agrees(iso, "RT_rx", MRAD, planes(6, 6, 3, 3, 1.5, 1.5, 3, 4.5, 4.5, 0))
+    agrees(iso, "AT_rz", MRAD, each("plane", 4, 4, 5, 5, 1, 1, 2, 0, 0, 3))
+    agrees(iso, "AT_ry", MRAD, each("plane", 1, 1, 0, 0, 2, 2, 3, 1, 1, 1))
+    agrees(iso, "AT_rx", MRAD, each("plane", 1, 1, 3, 3, 1, 1, 0, 4, 4, 2))
+    agrees(iso, "RT_rz", MRAD, each("plane", 3, 3, 4.5, 4.5, 0, 0, 1.5, 6, 6, 9))
+    agrees(iso, "RT_ry", MRAD, each("plane", 3, 3, 0, 0, 6, 6, 4.5, 0, 0, 1.5))
+    agrees(iso, "RT_rx", MRAD, each("plane", 6, 6, 3, 3, 1.5, 1.5, 3, 4.5, 4.5, 0))
 
 
 def test_corner_rounding(iso: IsoTest) -> None:
@@ -329,10 +321,10 @@ def test_speeds(iso: IsoTest) -> None:
     # leg 4: 80/0.6 = 400/3 three times, 80/0.8 = 100 twice: 120, 3 . 1600/9 + 2 . 400 = 4000/3
     # leg 5: 125, 125, 100, 100, 100: 110, 2 . 225 + 3 . 100 = 750
     # leg 6: 120, 120, 80, 80, 100: 100, 4 . 400 = 1600
-    agrees(iso, "AV", 0.01, legs(-4, 0, 2, 20, 10, 0))
-    agrees(iso, "RV", 0.03, legs(sqrt(80), 0, sqrt(507.5), sqrt(1000 / 3), sqrt(187.5), 20))
+    agrees(iso, "AV", 0.01, each("leg", -4, 0, 2, 20, 10, 0))
+    agrees(iso, "RV", 0.03, each("leg", sqrt(80), 0, sqrt(507.5), sqrt(1000 / 3), sqrt(187.5), 20))
     # Cycle 5 goes on leg 3 from 0.06 to 0.1 m in 0.2 s, from there to 0.14 m in 0.6 s: 200 and 200/3 mm/s.
-    agrees(iso, "FV", 1e-3, legs(0, 0, 400 / 3, 0, 0, 0))
+    agrees(iso, "FV", 1e-3, each("leg", 0, 0, 400 / 3, 0, 0, 0))
 
 
 def test_drift_of_repeatability(tmp_path: Path) -> None:
@@ -347,5 +339,5 @@ def test_drift_of_repeatability(tmp_path: Path) -> None:
     done = still(tmp_path / "visits.csv", np.array(rows))
     iso = told(reference, done, poses=True)
     assert len(iso.cycles) == 11
-    agrees(iso, "dAP", U, poses(2, 0))
-    agrees(iso, "dRP", U, poses(2, 0))
+    agrees(iso, "dAP", U, each("pose", 2, 0))
+    agrees(iso, "dRP", U, each("pose", 2, 0))
