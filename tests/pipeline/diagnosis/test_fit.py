@@ -14,15 +14,13 @@ from scipy.signal import lfilter
 from altered_arm import altered, called, nominal, rich_motion, spoilt, state_of, times, uniform
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.diagnosis import fit
 from urmpipe_pipeline.diagnosis.fit import (
     NormalEquations,
     WeightedRows,
     autocorrelation_time,
-    cost,
-    find_inliers,
     fit_parameters,
     normal_equations,
-    residual,
 )
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.models import ArmModel
@@ -72,7 +70,7 @@ def test_a_fit_is_that_of_scipy(model: ArmModel) -> None:
     variance = 2.0 * theirs.cost / len(theirs.fun)
     deviations = np.sqrt(variance * np.diag(np.linalg.inv(slopes.T @ slopes)))
     assert np.abs((ours.values[columns] - theirs.x) / deviations).max() < 0.02
-    assert cost(model, ours, rows) <= variance * (1.0 + 1e-8)
+    assert fit.cost(model, ours, rows) <= variance * (1.0 + 1e-8)
     assert not np.delete(ours.values, columns).any()
 
 
@@ -132,10 +130,10 @@ def test_equations_without_columns_are_those_of_the_residual_of_ridge_regression
 
 def test_outliers_are_left_out_and_gaussian_noise_is_not() -> None:
     noise = np.random.default_rng(8).normal(size=(3, 10_000))
-    assert find_inliers(noise).all()
+    assert fit.find_inliers(noise).all()
     noise[:, ::100] += 60.0
     noise[1, 5] = np.nan
-    kept = find_inliers(noise)
+    kept = fit.find_inliers(noise)
     assert not kept[::100].any()
     assert not kept[5]
     assert kept.sum() == 10_000 - 100 - 1
@@ -147,7 +145,7 @@ def test_a_fit_to_the_rows_that_are_no_outliers_is_not_led_astray() -> None:
     model = replace(clean, position=spoilt(np.random.default_rng(9), position))
     groups = groups_of(model, "joint_offset:phi2")
     start = fit_parameters(model, state_of(model, {}), groups, ALL)
-    some = ALL.without_outliers(residual(model, start, ALL.at))
+    some = ALL.without_outliers(fit.residual(model, start, ALL.at))
     assert SAMPLES * 0.97 < len(some.at) < SAMPLES
     (offset,) = fit_parameters(model, start, groups, some).of(groups[0])
     # 2 mm of noise a coordinate, 400 samples, a lever of 0.5 m: 0.1 mrad
