@@ -1,110 +1,73 @@
-"""`urmpipe accuracy`: the running speed, the command and the call; accuracy.cases has its errors."""
+"""`urmpipe accuracy` with native FMUs: the error that decides, and the same motion by `simulate`."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import urmpipe
-from flat_arm import ARM, MASSES, drive, lay_flat_arm
-from urmpipe.driven_runs import Within, running_speed
-from urmpipe.main import run
+from answered import full_answer
+from driven_paths import CONTOUR, PERIOD, begun, joint_log, planned, set_points_log
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_models.planning.path import cube_rows
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.robots.toml import robot_toml
 
-Captured = pytest.CaptureFixture[str]
-
-
-def runs(good: Callable[[float], bool]) -> tuple[list[float], Within]:
-    """Return what is within a limit by a rule, and the velocities that it is asked for."""
-    asked: list[float] = []
-
-    def within(velocities: Sequence[float]) -> list[bool]:
-        asked.extend(velocities)
-        return [good(one) for one in velocities]
-
-    return asked, within
-
-
-def test_the_running_speed_is_known_to_one_percent() -> None:
-    asked, within = runs(lambda v: v <= 0.537)
-    found = running_speed(within, [0.1, 0.5, 1.0])
-    assert found is not None
-    assert found <= 0.537
-    assert any(0.537 < one <= 1.01 * found * (1 + 1e-12) for one in asked)
-
-
-def test_the_first_velocity_that_fails_bounds_it() -> None:
-    found = running_speed(runs(lambda v: v < 0.3 or v > 0.6)[1], [0.8, 0.2, 0.4])
-    assert found is not None
-    assert 0.3 / 1.01 <= found < 0.3
-
-
-@pytest.mark.parametrize(("good", "speed"), [(True, 10.0), (False, None)])
-def test_all_or_none_within(good: bool, speed: float | None) -> None:
-    assert running_speed(runs(lambda _: good)[1], [0.1, 1.0]) == speed
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a short path and an arm."""
-    monkeypatch.chdir(tmp_path)
-    lay_flat_arm(tmp_path)
-    return tmp_path
-
-
-GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "short.csv", "--backend", "python", "--json")
+ROUNDED = 1e-11
+"""The planner solves the joints for the tool to within 1e-12 m of the path, of whose points there are two."""
 
 
 @pytest.mark.slow
-def test_errors_of_the_command_and_of_the_call(folder: Path, capsys: Captured) -> None:
-    assert run([*GIVEN, "--velocities", "0.05,0.025"]) == 0
-    printed = capsys.readouterr()
-    assert printed.err == "note: the arm runs in NumPy, some hundred times slower than machine code\n"
-    result = urmpipe.accuracy("short.csv", "arm.toml", velocities=[0.05, 0.025, 0.05], backend="python")
-    assert [one.velocity for one in result.errors] == [0.05, 0.025]
-    assert result.verdict is None
-    errors = result.to_dict()["errors"]
-    assert json.loads(printed.out)["errors"] == errors
-    rows = result.to_frame().set_index("velocity")
-    assert [rows.error[v] for v in (0.05, 0.025)] == errors
-
-
-@pytest.mark.slow
-def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Captured) -> None:
+def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows() -> None:
     # as short a path as reaches 0.3 m/s; the contour of test_iso9283_accuracy.py begins there: the same FMU
     cube = "cube:wall,a=0.1,r=0.01,x=1.7,y=0.25,z=1"
-    given = ("accuracy", "--robot", "irb60", "--path", cube, "--json")
-    between = "0.0021"  # m: between the two errors at 0.3 m/s
-    verdicts = []
-    for which, code in (("time", 1), ("path", 0)):
-        assert run([*given, "--limit", between, "--error", which, "--velocities", "0.27,0.3"]) == code
-        verdicts.append(json.loads(capsys.readouterr().out))
-    assert [one["verdict"] for one in verdicts] == ["fail", "pass"]
-    assert [one["limited_error"] for one in verdicts] == ["time", "path"]
-    by_path = verdicts[1]
-    error, path_error = by_path["errors"][1], by_path["path_errors"][1]
-    assert path_error < float(between) < error
-    speed, tried = by_path["running_speed"], by_path["probed"]
-    held = {one["velocity"]: one["path_error"] <= float(between) for one in tried}
-    assert held[speed]
-    assert min(v for v, within in held.items() if not within and v > speed) <= 1.01 * speed * (1 + 1e-12)
-    assert 0.3 in held
-    rows = urmpipe.accuracy(
-        cube_rows("wall", 0.1, 0.01, np.array([1.7, 0.25, 1.0])), "irb60", velocities=[0.3]
-    )
-    assert [one.error for one in rows.errors] == [error]
+    between = 0.0021  # m: between the two errors at 0.3 m/s
+    line = f"accuracy --robot irb60 --path {cube} --limit {between} --velocities 0.27,0.3"
+    keys = ("verdict", "limited_error", "errors", "path_errors", "running_speed", "probed")
+    by_time, by_path = (full_answer(f"{line} --error {which}", *keys)[:2] for which in ("time", "path"))
+    assert [code for code, _ in (by_time, by_path)] == [1, 0]
+    assert [found["verdict"] for _, found in (by_time, by_path)] == ["fail", "pass"]
+    assert [found["limited_error"] for _, found in (by_time, by_path)] == ["time", "path"]
+    found = by_path[1]
+    error, speed = found["errors"][1], found["running_speed"]
+    assert found["path_errors"][1] < between < error
+    is_within = {one["velocity"]: one["path_error"] <= between for one in found["probed"]}
+    assert is_within[speed]
+    assert min(v for v, good in is_within.items() if not good and v > speed) <= 1.01 * speed * (1 + 1e-12)
+    assert 0.3 in is_within
+    rows = cube_rows("wall", 0.1, 0.01, np.array([1.7, 0.25, 1.0]))
+    assert [one.error for one in urmpipe.accuracy(rows, "irb60", velocities=[0.3]).errors] == [error]
 
 
 @pytest.mark.slow
-def test_an_arm_that_diverges(folder: Path, capsys: Captured) -> None:
-    (folder / "short.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.499,0\n")
-    strong = drive("a", -7500.0).replace("u_max = 48.0", "u_max = 4.8e6")  # it diverges at once
-    (folder / "arm.toml").write_text(ARM + MASSES + strong + drive("b"))
-    assert run([*GIVEN, "--velocities", "0.01", "--limit", "1mm"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert found["errors"] == [None]
-    assert found["diverged"][0]["joint"] in ("a", "b")
+@pytest.mark.skipif(
+    bool(native_unavailable_reason(())), reason=f"runs native FMUs: {native_unavailable_reason(())}"
+)
+def test_driven_arm_from_a_log_compared_with_the_plan_has_the_errors_of_accuracy(tmp_path: Path) -> None:
+    velocity = 1.0  # m/s: on the way voltages are at their limits and below
+    arm = load_robot("irb60")
+    plan = planned(CONTOUR, arm, velocity, tmp_path / "plan.csv")
+    (tmp_path / "arm.toml").write_text(robot_toml(begun(arm, plan)), encoding="utf-8")
+    set_points_log(tmp_path / "points.csv", plan, [0, 1, 2])
+    inputs = "".join(
+        f'"arm.{name}[{k}]" = {{ log = "points.csv", column = "{column}{k}" }}\n'
+        for k in (1, 2, 3)
+        for column, name in (("theta", "set_phi"), ("omega", "set_phid"), ("alpha", "set_phidd"))
+    )
+    (tmp_path / "system.toml").write_text(
+        f'[system]\nstep = {PERIOD}\n[blocks.arm]\nunit = "driven_arm"\nrobot = "arm.toml"\n'
+        f"start = {{ force = [0.0, 0.0, 0.0], moment = [0.0, 0.0, 0.0] }}\n[inputs]\n{inputs}",
+        encoding="utf-8",
+    )
+    simulated = urmpipe.simulate(tmp_path / "system.toml")
+    assert simulated.failed is None
+    log = joint_log(tmp_path / "log.csv", arm, simulated.signal("arm.phi").values)
+    (run,) = urmpipe.compare(tmp_path / "plan.csv", log, robot="irb60").runs
+    (errors,) = urmpipe.accuracy(CONTOUR, arm, velocities=[velocity]).errors
+    assert run.start == pytest.approx([0.0] * 4, abs=ROUNDED)  # at rest it is where the path begins
+    assert errors.error is not None and errors.path_error is not None
+    assert errors.path_error > 1e-4  # m: there is something to compare
+    assert run.statistics["norm"].max == pytest.approx(errors.error, rel=0, abs=ROUNDED)
+    assert run.statistics["path"].max == pytest.approx(errors.path_error, rel=0, abs=ROUNDED)
