@@ -193,15 +193,8 @@ def test_each_option_is_a_keyword_of_the_function_and_each_keyword_an_option(
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_all_wrong_keywords_are_one_error_before_the_work(function: str) -> None:
     parameters = signature(FUNCTIONS[function]).parameters
-    unread = {
-        "t",
-        "q",
-        "recorded_tcp",
-        "names",
-        "logs",
-        "log",
-        "targets",
-    }  # arrays and operands, which the work checks
+    # Arrays and operands, which the work checks
+    unread = {"t", "q", "recorded_tcp", "names", "logs", "log", "targets"}
     wrong = {
         name: object()
         for name, one in parameters.items()
