@@ -20,7 +20,12 @@ from urmpipe.main import cli, find_commands, run
 from urmpipe_datasets import LOGS
 
 RunCommand = Callable[..., Any]
-"""What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
+
+
+def python(code: str, *words: str | Path, flags: tuple[str, ...] = ()) -> subprocess.CompletedProcess[str]:
+    """Run code in a new process."""
+    line = [sys.executable, *flags, "-c", code, *words]
+    return subprocess.run(line, capture_output=True, text=True, check=False)
 
 
 def test_the_short_help_of_every_command_is_its_own() -> None:
@@ -38,8 +43,7 @@ def test_importing_urmpipe_leaves_the_garbage_collection_alone() -> None:
         "import urmpipe; urmpipe.ingest; import urmpipe.main;"
         "print(gc.get_threshold() == before)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "True\n"
+    assert python(code).stdout == "True\n"
 
 
 def test_version(urmpipe: RunCommand) -> None:
@@ -80,19 +84,17 @@ def test_numpy_warns_of_no_huge_value(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("python", "words", "shown"), [((), (), 0), ((), ("ingest", "--debug"), 1), (("-W", "error"), (), 1)]
+    ("flags", "words", "shown"), [((), (), 0), ((), ("ingest", "--debug"), 1), (("-W", "error"), (), 1)]
 )
 def test_a_warning_of_numpy_reaches_who_debugs_alone(
-    python: tuple[str, ...], words: tuple[str, ...], shown: int
+    flags: tuple[str, ...], words: tuple[str, ...], shown: int
 ) -> None:
     code = (
         "import sys, numpy as np, urmpipe.main as main;"
         "main.cli.main = lambda *_, **__: np.zeros(1) / np.zeros(1);"
         "main.run(sys.argv[1:])"
     )
-    line = [sys.executable, *python, "-c", code, *words]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    assert done.stderr.count("RuntimeWarning: invalid value") == shown
+    assert python(code, *words, flags=flags).stderr.count("RuntimeWarning: invalid value") == shown
 
 
 @pytest.mark.slow
@@ -105,7 +107,7 @@ def test_a_stop_in_a_callback_of_python_stops_all_the_same() -> None:
         "main.cli.main = lambda *_, **__: (made.clear(), [time.sleep(0.01) for _ in range(6000)]);"
         "main.main([])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python(code)
     assert (done.returncode, done.stderr) == (2, "error: stopped; no file is left incomplete\n")
 
 
@@ -154,33 +156,27 @@ def test_a_shell_completes_whatever_the_lab_says(
     assert capsys.readouterr() == (offered, "")
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
-@pytest.mark.parametrize("arguments", [(), ("--json",)])
-def test_an_output_that_is_full_is_one_line(arguments: tuple[str, ...]) -> None:
-    with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "urmpipe", "simulate", "--list", *arguments]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert (done.returncode, done.stderr) == (2, "error: No space left on device\n")
+FULL = "error: No space left on device\n"
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
-def test_a_standard_error_that_is_full_is_no_verdict() -> None:
-    with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "urmpipe", "simulate"]
-        assert subprocess.run(command, stderr=full, check=False).returncode == 2
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="closes an output as a shell of Unix does")
-def test_outputs_that_are_closed_are_no_fault() -> None:
-    command = [sys.executable, "-m", "urmpipe", "simulate", "--list"]
-    for closed in (">&-", "2>&-"):
-        done = subprocess.run(
-            ["sh", "-c", f'"$@" {closed}', "sh", *command], capture_output=True, check=False
-        )
-        assert (done.returncode, done.stderr) == (0, b""), closed
+@pytest.mark.parametrize(
+    ("line", "code", "error"),
+    [
+        ("simulate --list > /dev/full", 2, FULL),
+        ("simulate --list --json > /dev/full", 2, FULL),
+        ("simulate 2> /dev/full", 2, ""),
+        ("simulate --list >&-", 0, ""),
+        ("simulate --list 2>&-", 0, ""),
+    ],
+)
+def test_an_output_that_is_full_is_an_error_of_one_line_and_a_closed_output_none(
+    line: str, code: int, error: str
+) -> None:
+    command = ["sh", "-c", f'"$0" -m urmpipe {line}', sys.executable]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (code, error)
 
 
 def test_an_error_that_a_stop_caused_is_a_stop(
@@ -189,7 +185,6 @@ def test_an_error_that_a_stop_caused_is_a_stop(
     """Ctrl-C in the import of a library in C comes out of it as an ImportError."""
 
     def fail(*_: object, **__: object) -> None:
-        """Fail as such an import does."""
         raise ImportError("initialization failed")
 
     monkeypatch.setattr("urmpipe.main._stopped", [signal.SIGINT])
@@ -208,6 +203,5 @@ def check():
 atexit.register(check)
 main()
 """
-    line = ["ingest", str(LOGS / "matlab.csv"), "--robot", "urm6", "-q", "-o", str(tmp_path / "run.rrd")]
-    done = subprocess.run([sys.executable, "-c", code, *line], capture_output=True, text=True, check=True)
+    done = python(code, "ingest", LOGS / "matlab.csv", "--robot", "urm6", "-q", "-o", tmp_path / "run.rrd")
     assert done.stdout == "False [1]\n"
