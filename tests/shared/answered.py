@@ -18,11 +18,11 @@ def ran(line: str) -> tuple[int, str, str]:
 
 
 def json_answer(line: str, *keys: str) -> dict[str, Any]:
-    """Return these keys of the answer of `urmpipe LINE --json`, which must not be refused."""
+    """Return these keys, or all, of the answer of `urmpipe LINE --json`, which must not be refused."""
     code, out, err = ran(f"{line} --json")
     assert code != 2, err
     answer = json.loads(out)
-    return {key: answer[key] for key in keys}
+    return {key: answer[key] for key in keys or answer}
 
 
 def full_answer(line: str, *keys: str) -> tuple[int, dict[str, Any], list[str]]:
