@@ -8,7 +8,7 @@ or the line of the verdict says what it assumes. A log that is written well is n
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import urmpipe
+from orientation_columns import orientation_columns
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
@@ -30,9 +31,6 @@ from urmpipe_models.robots.catalogue import load_robot
 TOLERANCE, ANGLE = 3.5e-3, np.radians(1.0)
 
 ROBOTS = ("ur5e", "ur10", "panda", "urm6", "iiwa14")
-
-EULER = {"rpy": "xyz", "zyx": "ZYX", "xyz": "XYZ", "zyz": "ZYZ", "zxz": "ZXZ"}
-"""Forms of Euler angles as SciPy calls them: extrinsic in small letters."""
 
 NAMES = {
     "vector": ("rotvec_x", "rotvec_y", "rotvec_z"),
@@ -64,12 +62,16 @@ class Case:
         """Return one of some values."""
         return choices[int(self.rng.integers(len(choices)))]
 
-    def unit(self, true: str, other: str, *, lies: bool = True) -> str:
-        """Return what the header says of a unit: the truth, nothing, or the other one."""
-        said = true if self.rng.random() < 0.6 else "" if not lies or self.rng.random() < 0.5 else other
-        self.well &= said == true
-        self.told.append(f"{true} called {said or 'nothing'}")
-        return f" [{said}]" if said else ""
+    def columns(
+        self, names: Iterable[str], values: FloatArray, *units: str, factor: float = 180.0 / np.pi
+    ) -> tuple[list[str], FloatArray]:
+        """Return columns in either of two units; the header has it, none, or the other one."""
+        k = int(self.rng.integers(2))
+        true, other = units[k], units[1 - k]
+        written = true if self.rng.random() < 0.6 else self.one_of("", other)
+        self.well &= written == true
+        self.told.append(f"{true} called {written or 'nothing'}")
+        return [f"{name} [{written}]" if written else name for name in names], values * (1.0, factor)[k]
 
 
 def motion(case: Case, arm: Chain, rows: int) -> tuple[FloatArray, FloatArray]:
@@ -115,46 +117,32 @@ def placed(arm: Chain, q: FloatArray) -> tuple[FloatArray, Rotation]:
 
 def joint_columns(case: Case, q: FloatArray, name: str = "q{}") -> tuple[list[str], FloatArray]:
     """Return the columns of joints in rad or deg, perhaps wrapped into half a turn."""
-    unit = case.one_of("rad", "deg")
     if case.rng.random() < 0.2:
         q = (q + np.pi) % (2 * np.pi) - np.pi
-    said = case.unit(unit, {"rad": "deg", "deg": "rad"}[unit])
-    names = [f"{name.format(j + 1)}{said}" for j in range(q.shape[1])]
-    return names, np.degrees(q) if unit == "deg" else q
+    return case.columns([name.format(j + 1) for j in range(q.shape[1])], q, "rad", "deg")
 
 
-def position_columns(
-    case: Case, position: FloatArray, names: Sequence[str] = "xyz"
-) -> tuple[list[str], FloatArray]:
+def position_columns(case: Case, position: FloatArray) -> tuple[list[str], FloatArray]:
     """Return the columns of positions in m or mm."""
-    unit = case.one_of("m", "mm")
-    said = case.unit(unit, {"m": "mm", "mm": "m"}[unit])
-    return [f"{name}{said}" for name in names], position * (1e3 if unit == "mm" else 1.0)
+    return case.columns("xyz", position, "m", "mm", factor=1e3)
 
 
 def rotation_columns(case: Case, turned: Rotation) -> tuple[list[str], FloatArray]:
     """Return the columns of an orientation in any form and unit."""
     form = case.one_of(*FORMS)
     case.told.append(form)
-    if form == "matrix":
-        return list(NAMES[form]), turned.as_matrix().reshape(-1, 9)
-    if form.startswith("quat"):
-        return list(NAMES[form]), turned.as_quat()[:, [3, 0, 1, 2] if form == "quat_wxyz" else [0, 1, 2, 3]]
+    values = orientation_columns(turned, form)
+    if form == "matrix" or form.startswith("quat"):
+        return list(NAMES[form]), values
     called = form if form in NAMES and case.rng.random() < 0.5 else "any"
-    unit = case.one_of("rad", "deg")
-    said = case.unit(unit, {"rad": "deg", "deg": "rad"}[unit])
-    values = turned.as_rotvec() if form == "vector" else turned.as_euler(EULER[form])  # type: ignore[call-overload]
-    return [f"{name}{said}" for name in NAMES[called]], np.degrees(values) if unit == "deg" else values
+    return case.columns(NAMES[called], values, "rad", "deg")
 
 
 def write(path: Path, *groups: tuple[list[str], FloatArray], header: bool = True) -> Path:
     """Write groups of columns as one table."""
     names = [name for group, _ in groups for name in group]
     table = np.column_stack([values for _, values in groups])
-    first = ",".join(names) if header else ""
-    np.savetxt(path, table, "%.10g", ",", header=first, comments="")
-    if not header:
-        path.write_text(path.read_text(encoding="utf-8").lstrip("\n"), encoding="utf-8")
+    np.savetxt(path, table, "%.10g", ",", header=",".join(names) if header else "", comments="")
     return path
 
 
@@ -177,13 +165,8 @@ def alone(case: Case, folder: Path, arm: Chain, *, still: bool) -> tuple[dict[st
     if case.rng.random() < 0.3:
         turn[int(case.rng.integers(len(q)))] += 0.05
     wanted = Rotation.from_rotvec(turn) * turned
-    groups = [
-        *times,
-        joint_columns(case, q),
-        position_columns(case, recorded),
-        rotation_columns(case, wanted),
-    ]
-    log = write(folder / "log.csv", *groups)
+    tcp = position_columns(case, recorded), rotation_columns(case, wanted)
+    log = write(folder / "log.csv", *times, joint_columns(case, q), *tcp)
     angle = float((wanted * turned.inv()).magnitude().max())
     tolerance = {"axis": TOLERANCE, "angle": ANGLE}
     return {"reference": log, "tolerance": tolerance}, fails(recorded, position) or angle > ANGLE
@@ -207,37 +190,33 @@ def against_log(case: Case, folder: Path, arm: Chain, *, still: bool) -> tuple[d
     if still:
         q = case.rng.uniform(low, high, (int(case.rng.integers(12, 60)), len(low)))
         done = deviating(case, q, 5e-5, 0.06)
-        files = [
-            write(folder / f"{name}.csv", joint_columns(case, one)) for name, one in (("a", q), ("b", done))
-        ]
-        return {"reference": files[0], "logs": files[1]}, fails(placed(arm, q)[0], placed(arm, done)[0])
+        reference, log = (
+            write(folder / name, joint_columns(case, one)) for name, one in (("a.csv", q), ("b.csv", done))
+        )
+        return {"reference": reference, "logs": log}, fails(placed(arm, q)[0], placed(arm, done)[0])
     t, q = motion(case, arm, int(case.rng.integers(80, 200)))
     done = deviating(case, q, 5e-5, 0.06)
     at = np.round(t + 0.3 * case.rng.random() * np.diff(t, append=t[-1]) * (np.arange(len(t)) > 0), 6)
-    files = [
-        write(folder / f"{name}.csv", clock(case, when), joint_columns(case, one))
-        for name, when, one in (("a", t, q), ("b", at, done))
-    ]
+    reference, log = (
+        write(folder / name, clock(case, when), joint_columns(case, one))
+        for name, when, one in (("a.csv", t, q), ("b.csv", at, done))
+    )
     wanted, points = placed(arm, q)[0], placed(arm, done)[0]
     within = at <= np.round(t[-1], 6)
     between = np.column_stack([np.interp(at[within], np.round(t, 6), column) for column in wanted.T])
-    return {"reference": files[0], "logs": files[1]}, fails(between, points[within])
+    return {"reference": reference, "logs": log}, fails(between, points[within])
 
 
 def two_sides(case: Case, folder: Path, arm: Chain) -> tuple[dict[str, Any], bool]:
     """What was asked for against what was done, in one file."""
     t, q = motion(case, arm, int(case.rng.integers(80, 200)))
     done = deviating(case, q, 5e-5, 0.06)
-    asked_word, done_word = case.one_of(
-        ("target", "actual"), ("desired", "actual"), ("commanded", "measured")
-    )
+    sides = case.one_of(("target", "actual"), ("desired", "actual"), ("commanded", "measured"))
     columns = [
-        joint_columns(case, one, f"{word}_q_{{}}") for word, one in ((asked_word, q), (done_word, done))
+        joint_columns(case, *one) for one in zip((q, done), (f"{w}_q_{{}}" for w in sides), strict=True)
     ]
     log = write(folder / "log.csv", clock(case, t), *columns)
-    return {"reference": log, "sides": (asked_word, done_word)}, fails(
-        placed(arm, q)[0], placed(arm, done)[0]
-    )
+    return {"reference": log, "sides": sides}, fails(placed(arm, q)[0], placed(arm, done)[0])
 
 
 def made(seed: int, folder: Path) -> tuple[Case, dict[str, Any], bool]:
