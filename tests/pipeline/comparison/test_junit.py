@@ -94,7 +94,7 @@ def test_an_error_replaces_no_file_of_another_and_no_input(tmp_path: Path) -> No
 @pytest.mark.slow
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(st.characters(categories=["L", "N", "P", "S", "Z", "C"]), min_size=1, max_size=20))
-def test_any_name_of_a_file_is_held(tmp_path: Path, name: str) -> None:
+def test_any_name_of_a_file_is_kept(tmp_path: Path, name: str) -> None:
     result = replace(paths({"a": off(0.0, 5)}), name=name)
     result = replace(result, runs=(replace(result.runs[0], name=name),))
     root = written(result, tmp_path / "verdict.xml")

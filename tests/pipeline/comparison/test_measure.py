@@ -27,7 +27,7 @@ T = np.linspace(0.0, 5.0, 300)
 SIDES = ((0.005, "path"), (0.0047, "log"))
 
 
-def held(reference: Run, log: Run) -> Deviation:
+def compared(reference: Run, log: Run) -> Deviation:
     return compare_runs(reference, [log], CompareOptions({"axis": 1e9})).runs[0]
 
 
@@ -37,7 +37,7 @@ def test_the_reference_turns_on_the_great_arc_between_its_samples() -> None:
     wanted = Slerp(np.arange(20.0), rotation)(np.arange(0, 19.01, 0.25))
     at = [np.interp(np.arange(0, 19.01, 0.25), np.arange(20), column) for column in position.T]
     log = path_run(np.column_stack(at), wanted.as_quat(), name="log")
-    found = held(path_run(position, rotation.as_quat(), tsp=0.02), log)
+    found = compared(path_run(position, rotation.as_quat(), tsp=0.02), log)
     np.testing.assert_allclose(there(found.angle), 0.0, atol=1e-14)
     assert found.statistics["norm"].max < 1e-14
 
@@ -73,14 +73,14 @@ def test_the_path_is_never_further_than_the_place_at_that_time(seed: int, share:
     wanted = np.cumsum(rng.normal(0, 0.01, (120, 3)), axis=0)
     wanted[rng.integers(0, 120, 5)] = np.nan
     done = rng.normal(0, 0.05, (150, 3))
-    found = held(path_run(wanted), path_run(done, tsp=0.005 * share, name="log"))
+    found = compared(path_run(wanted), path_run(done, tsp=0.005 * share, name="log"))
     assert (found.path <= found.delta[:, 3]).all()
 
 
 def test_the_speed_of_positions_is_that_of_the_parabola_through_the_neighbours() -> None:
     position = np.column_stack([T**2, 2 * T, np.zeros(300)])
     step = round(T[1], 9)
-    found = held(path_run(position, tsp=step), path_run(position, tsp=step, name="b"))
+    found = compared(path_run(position, tsp=step), path_run(position, tsp=step, name="b"))
     expected = np.hypot(2 * T, 2.0)
     np.testing.assert_allclose(found.speed[1:-1], expected[1:-1], rtol=1e-7)  # the period rounds to 1 ns
     np.testing.assert_allclose(
