@@ -24,21 +24,18 @@ def send(sink: Sink) -> str:
 
 
 @pytest.mark.parametrize("piped", [True, False])
-def test_both_ways_write_the_same(tmp_path: Path, *, piped: bool) -> None:
+def test_both_ways_write_the_same_and_raise_an_error_of_the_sender(tmp_path: Path, *, piped: bool) -> None:
     path = tmp_path / "one.rrd"
     assert write_into(path, send, piped=piped) == "sent"
     assert "/q rows=10" in RrdReader(path).store().summary()
 
-
-@pytest.mark.parametrize("piped", [True, False])
-def test_an_error_of_the_sender_is_raised(tmp_path: Path, *, piped: bool) -> None:
     def fail(sink: Sink) -> None:
         """Send, and fail."""
         send(sink)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_into(tmp_path / "one.rrd", fail, piped=piped)
+        write_into(tmp_path / "two.rrd", fail, piped=piped)
 
 
 def test_a_file_that_is_closed_early_is_an_error_of_the_sink(tmp_path: Path) -> None:
