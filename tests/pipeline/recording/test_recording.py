@@ -265,28 +265,24 @@ def odd(simulation: Simulation) -> Simulation:
 
 
 @pytest.mark.parametrize(
-    ("make", "change"),
+    "change",
     [
-        ((600,), None),
-        ((37, "chain: fmi2DoStep returned fmi2Error: q is NaN"), None),
-        ((0, "chain: crashed"), None),
-        ((1,), None),
-        ((20,), lambda one: replace(one, signals=(), verdicts=(), arms=())),
-        ((40,), wide),
-        ((3,), lambda one: replace(one, signals=(Signal("b", "v", np.arange(3.0), "\ud800"),), verdicts=())),
-        pytest.param((3,), odd, marks=pytest.mark.slow),
+        lambda make: make(600),
+        lambda make: make(37, "chain: fmi2DoStep returned fmi2Error: q is NaN"),
+        lambda make: make(0, "chain: crashed"),
+        lambda make: make(1),
+        lambda make: replace(make(20), signals=(), verdicts=(), arms=()),
+        lambda make: wide(make(40)),
+        lambda make: replace(make(3), signals=(Signal("b", "v", np.arange(3.0), "\ud800"),), verdicts=()),
+        pytest.param(lambda make: odd(make(3)), marks=pytest.mark.slow),
         # Three slices, the ends and the middle sent before the others.
-        pytest.param((2 * SLICE + 5,), None, marks=pytest.mark.slow),
+        pytest.param(lambda make: make(2 * SLICE + 5), marks=pytest.mark.slow),
     ],
 )
 def test_a_simulation_comes_back_as_it_was(
-    make: tuple[Any, ...],
-    change: Callable[[Simulation], Simulation] | None,
-    make_simulation: MakeSimulation,
-    tmp_path: Path,
+    change: Callable[[MakeSimulation], Simulation], make_simulation: MakeSimulation, tmp_path: Path
 ) -> None:
-    made = make_simulation(*make)
-    assert_comes_back(change(made) if change else made, tmp_path)
+    assert_comes_back(change(make_simulation), tmp_path)
 
 
 def test_a_variable_is_an_entity_with_a_column_a_scalar(
