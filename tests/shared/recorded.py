@@ -14,7 +14,6 @@ from uuid import UUID
 import numpy as np
 from rerun.chunk import RrdReader
 
-from urmpipe_pipeline.presentation.palette import rgb
 from urmpipe_pipeline.recording.reader import Store
 from urmpipe_pipeline.recording.views.plots import SHARED_AXIS
 
@@ -72,12 +71,6 @@ def views(path: Path) -> dict[str, list[Any]]:
                 values = batch.column(name).to_pylist()
                 found.setdefault(name, []).extend(itertools.chain.from_iterable(filter(None, values)))
     return found
-
-
-def packed(colour: str) -> int:
-    """Return a colour as Rerun stores it: red, green, blue and full alpha in one number."""
-    red, green, blue = rgb(colour)
-    return (red << 24) + (green << 16) + (blue << 8) + 255
 
 
 def drawing(path: Path, *roots: str) -> str:

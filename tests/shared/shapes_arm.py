@@ -12,9 +12,8 @@ def arm_of_shapes(folder: Path) -> Path:
 
     The first four shapes lie around z = 0.1 m of the frame that carries them, as far as 0.1 m from it.
     """
-    bar = box_stl((0.05, 0.05, 0.2))
     (folder / "meshes").mkdir()
-    (folder / "meshes" / "bar.stl").write_bytes(bar)
+    (folder / "meshes" / "bar.stl").write_bytes(box_stl((0.05, 0.05, 0.2)))
     shapes = [
         ("0.4 0.4 0.4", "0 0 -0.05", '<box size="0.3 0.3 0.1"/>'),
         ("1 0.2 0.2", "0 0 0.1", '<cylinder radius="0.06" length="0.2"/>'),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,8 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.palette import AXIS_COLOURS
 from urmpipe_pipeline.presentation.section import Presentation, Section
-from urmpipe_pipeline.recording.layout import Opening
 from urmpipe_pipeline.recording.views.blueprint import send_views
 from urmpipe_pipeline.recording.writer import write_result
-
-if TYPE_CHECKING:
-    from rerun.blueprint import Blueprint
 
 COLOURS = tuple(AXIS_COLOURS.values())
 STEP_NS = 5_000_000
@@ -77,22 +73,11 @@ def recorded(one: Presentation, folder: Path, result: Toy | None = None) -> Path
     return path
 
 
-def laid_out(one: Presentation) -> tuple[Blueprint, Opening]:
-    """Return the layout of a presentation and where it opens."""
-    import rerun as rr
-
-    layout, opening, _ = send_views(rr.RecordingStream("toy"), one, lambda values, t_ns: None)
-    return layout, opening
-
-
-def root_of(one: Presentation) -> Any:
-    """Return the outermost container of a presentation's layout."""
-    return laid_out(one)[0].root_container
-
-
 def eye_of(one: Presentation) -> tuple[FloatArray, FloatArray]:
     """Return where the eye of a presentation's 3D view is and what it looks at in [m], shape (3,) each."""
-    root = root_of(one)
+    import rerun as rr
+
+    root: Any = send_views(rr.RecordingStream("toy"), one, lambda values, t_ns: None)[0].root_container
     left = root.contents if hasattr(root.contents[0], "properties") else root.contents[0].contents
     (controls,) = (
         view.properties["EyeControls3D"]
