@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from asserting import there
 from made_runs import path_run
-from repeated import along, curve, eight, evaluated, judged, repeated, still, told, value, written
+from repeated import along, curve, eight, evaluated, judged, repeated, value, written
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.results import present
@@ -60,23 +60,6 @@ def test_all_are_found_with_noise_but_a_cut_one(way: str, tmp_path: Path) -> Non
     assert value(judged(result), "AP") < 1e-4 * 6.0 / np.sqrt(50.0 * whole)  # chi with 3 degrees: 1e-7
     # RT of crossings between two rows: 3.616 . 0.1 mm in space, less in a plane; the largest of 50
     assert 2e-4 < value(judged(result), "RT") < 5e-4
-
-
-POSES = np.array([[0.1 * k, 0.05 * k * k, 0.3] for k in range(5)])
-
-
-@pytest.mark.slow
-def test_30_visits_of_5_static_poses_in_one_log_and_in_30(tmp_path: Path) -> None:
-    visits = np.tile(POSES, (30, 1)) + np.random.default_rng(1).normal(0.0, 1e-4, (150, 3))
-    reference = still(tmp_path / "poses.csv", POSES)
-    iso = told(reference, still(tmp_path / "visits.csv", visits), poses=True)
-    assert [(cycle.row, cycle.last_row) for cycle in iso.cycles] == [
-        (5 * k + 1, 5 * k + 5) for k in range(30)
-    ]
-    assert 0.0 < value(iso, "AP") < 6e-4 / np.sqrt(30.0)  # of 30: chi with 3 degrees beyond 6 is 1e-7
-    files = [still(tmp_path / f"visit{k}.csv", visits[5 * k : 5 * k + 5]) for k in range(30)]
-    assert told(reference, files, poses=True).criteria == iso.criteria
-    assert not any(one.name in ("AT", "PSt", "AV") and one.value for one in iso.criteria)
 
 
 TICK = 0.02  # s, from row to row

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 
 from asserting import there
 from made_runs import path_run
-from repeated import TICK, along, overall, still, told, value, values_of
+from repeated import TICK, along, overall, value, values_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import to_matrices, to_quaternions
 from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
@@ -194,17 +193,6 @@ def test_a_gaussian_cloud_has_the_repeatability_of_chi(seed: int) -> None:
     assert spread is not None
     # 1 % as the issue has it; chance makes 0.673 . sqrt((1 + 9 . 0.56)/1e5)/3.616 = 0.15 % of it.
     assert spread[0] == pytest.approx(FACTOR * SIGMA, rel=0.01)
-
-
-@pytest.mark.slow
-def test_a_gaussian_cloud_of_visits_has_it_too(tmp_path: Path) -> None:
-    rng = np.random.default_rng(4)
-    reference = still(tmp_path / "command.csv", np.array([[0.5, 0.2, 0.1]]))
-    done = still(tmp_path / "visits.csv", np.array([0.5, 0.2, 0.1]) + rng.normal(0.0, SIGMA, (1000, 3)))
-    iso = told(reference, done, poses=True)
-    # Of 1000 visits chance makes 1.6 % (one standard deviation, as above).
-    assert value(iso, "RP") == pytest.approx(FACTOR * SIGMA, rel=0.05)
-    assert value(iso, "AP") < 6.0 * SIGMA / np.sqrt(1000.0)  # chance: chi with 3 degrees, 1e-7 beyond 6
 
 
 @pytest.mark.slow
