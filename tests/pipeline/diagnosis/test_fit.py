@@ -231,24 +231,23 @@ def test_positions_of_urm6_do_not_determine_seven_of_its_parameters() -> None:
     gram = normal_equations(model, state_of(model, {}), WeightedRows(np.arange(500), np.ones(3))).gram
     size = np.maximum(np.sqrt(np.diag(gram)), 1e-9)  # gravity does not pull at an upright axis
     places = {
-        f"{group.name} {'xyz'[k]}" if len(group.columns) > 1 and group.kind.endswith("shift") else
-        f"{group.kind}:{group.name} {k}": c
-        for group in model.groups for k, c in enumerate(group.columns)
-        if group.kind in PLAIN and not ("segment" in group.name or called(group).endswith((" x", " y", " z")))
-    }  # fmt: skip
+        called(group): group.columns[0]
+        for group in model.groups
+        if group.kind in PLAIN and len(group.columns) == 1 and "segment" not in group.name
+    }
 
     def rank(*names: str) -> int:
         at = [places[name] for name in names]
         scaled = (gram / np.outer(size, size))[np.ix_(at, at)]
         return int(np.linalg.matrix_rank(scaled, tol=1e-9, hermitian=True))
 
-    assert rank("link_length:r1 0", "base z") == 1
-    assert rank("joint_offset:phi1 0", "base_rotation:base 2") == 1
-    assert rank("link_length:r7 0", "tool z") == 1
-    assert rank("tilt:theta7 0", "tool x") == 1
-    assert rank("joint_offset:phi6 0", "tool y") == 1
+    assert rank("link_length:r1", "base_shift:base z") == 1
+    assert rank("joint_offset:phi1", "base_rotation:base z") == 1
+    assert rank("link_length:r7", "tool_shift:tool z") == 1
+    assert rank("tilt:theta7", "tool_shift:tool x") == 1
+    assert rank("joint_offset:phi6", "tool_shift:tool y") == 1
     wrist = ("link_length:r6", "link_length:r7", "tilt:theta7", "joint_offset:phi6")
-    assert rank(*(f"{name} 0" for name in wrist), "tool x", "tool y", "tool z") == 3
+    assert rank(*wrist, *(f"tool_shift:tool {axis}" for axis in "xyz")) == 3
     assert rank(*places) == len(places) - 6
 
 

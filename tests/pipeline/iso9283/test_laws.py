@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from asserting import there
 from made_runs import path_run
 from repeated import TICK, along, overall, value, values_of
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import to_matrices, to_quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.iso9283.criteria import UNITS, repeatability
 from urmpipe_pipeline.iso9283.result import IsoTest
@@ -45,14 +46,12 @@ def turned(rows: int) -> FloatArray:
     """Rotations that change slowly, shape (n, 3, 3)."""
     share = np.linspace(0.0, 1.0, rows)
     half = np.column_stack((0.05 * share, 0.1 * share**2, 0.2 * np.sin(share), np.ones(rows)))
-    return to_matrices(half / np.linalg.norm(half, axis=1)[:, np.newaxis]).reshape(-1, 3, 3)
+    return np.asarray(Rotation.from_quat(half).as_matrix())
 
 
 def about(axis: Sequence[float], angle: float) -> FloatArray:
     """A rotation about an axis, shape (3, 3)."""
-    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+    return np.asarray(Rotation.from_rotvec(angle * np.asarray(axis) / np.linalg.norm(axis)).as_matrix())
 
 
 def off(k: int, rows: int) -> FloatArray:
