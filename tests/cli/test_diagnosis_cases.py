@@ -13,12 +13,12 @@ TOOL, BASE = "the tool centre point were moved by", "the base were moved by"
 FOUR = r"\+4\.0\d+ mm in"
 
 CASES = {
-    "t0069 ur5e": rf"PASS  0\.22\d+ mm of 0\.31\d+ mm rms would go if {TOOL} \+0\.(29|30)\d* mm in y",
-    "t0071 irb120.toml": rf"PASS  only 0\.10\d+ mm of 0\.46\d* mm .* {TOOL} \+0\.(29|30)\d* mm in y",
+    "t0069/ ur5e": rf"PASS  0\.22\d+ mm of 0\.31\d+ mm rms would go if {TOOL} \+0\.(29|30)\d* mm in y",
+    "t0071/ irb120.toml": rf"PASS  only 0\.10\d+ mm of 0\.46\d* mm .* {TOOL} \+0\.(29|30)\d* mm in y",
     # joint 3 is late by 16.5 ms
-    "t0219 irb120.toml": r"PASS  only 0\.05\d+ mm of 0\.89\d+ mm .* joint j3 were made 16\.\d+ ms earlier",
-    "t0301 iiwa14": rf"PASS  3\.5\d+ mm of 3\.59\d+ mm rms would go if {TOOL} {FOUR} x and {BASE} {FOUR} z",
-    "t0279 ur5e": r"FAIL  the base is mirrored: z has the opposite sign: rms 1297\.6 mm -> 0\.8\d+ mm",
+    "t0219/ irb120.toml": r"PASS  only 0\.05\d+ mm of 0\.89\d+ mm .* joint j3 were made 16\.\d+ ms earlier",
+    "t0301/ iiwa14": rf"PASS  3\.5\d+ mm of 3\.59\d+ mm rms would go if {TOOL} {FOUR} x and {BASE} {FOUR} z",
+    "t0279/ ur5e": r"FAIL  the base is mirrored: z has the opposite sign: rms 1297\.6 mm -> 0\.8\d+ mm",
     "base-180 ur5e": r"FAIL  the base needs a turn of 180 deg about z: rms 1146\.9 mm -> 0\.000\d mm",
     "scale-collapse scale-collapse.toml":
         r"FAIL  joint q2 reads 1\.7[1-3]\d* deg too low: rms 11\.417 mm -> 0\.43\d* mm",
@@ -36,21 +36,14 @@ CASES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_right_cause_is_named(urmpipe: Callable[..., Any], shared: Path, case: str) -> None:
-    trials, reading = shared / "cases" / "diagnosis", shared / "cases" / "reading"
-    if not trials.is_dir():
+    folder = shared / "cases"
+    if not folder.is_dir():
         pytest.skip("the folder shared has no cases")
     name, _, robot = case.partition(" ")
-    if name == "small-share":
-        sides = [reading / f"{name}-{side}.csv" for side in ("sim", "real")]
-        ran = urmpipe("diagnose", *sides, "--unit", "deg", "--tolerance", "joint=0.5deg")
-    else:
-        is_trial = (trials / name).is_dir()
-        folder = trials if is_trial else reading
-        files = (
-            [trials / name / "path.csv", trials / name / "log.csv"] if is_trial else [reading / f"{name}.csv"]
-        )
-        arm = folder / robot if robot.endswith(".toml") else robot
-        ran = urmpipe("diagnose", *files, "--robot", arm, "--unit", "rad")
+    files = sorted(folder.glob(f"*/{name}*.csv"), reverse=True)  # path.csv before log.csv
+    arm = next(folder.glob(f"*/{robot}")) if robot.endswith(".toml") else robot
+    joints = ("--unit", "deg", "--tolerance", "joint=0.5deg")
+    ran = urmpipe("diagnose", *files, *(("--robot", arm, "--unit", "rad") if robot else joints))
     first = ran.out.partition("\n")[0]
     assert re.fullmatch(CASES[case], first), first + ran.err
     assert ran.code == first.startswith("FAIL")
