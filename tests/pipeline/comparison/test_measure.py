@@ -134,7 +134,7 @@ def test_no_size_of_the_blocks_changes_a_bit(kind: str, block_rows: int) -> None
 
 def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual() -> None:
     rng = np.random.default_rng(5)
-    q = np.sin(np.outer(T, np.arange(1.0, 7.0))) + np.arange(6)
+    q = np.sin(np.outer(T, np.arange(1.0, 7.0))) + np.arange(6.0)
     shift = rng.normal(0.001, 0.0005, (300, 3))
     wanted = positions_over_log(URM6, q) + shift
     deviation = compare_runs(path_run(wanted), [run_of(q)]).runs[0]
