@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from itertools import pairwise
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -16,7 +15,6 @@ from hypothesis import strategies as st
 
 import urmpipe
 from made_runs import ingested
-from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import rotation_angle, to_quaternions
 from urmpipe_pipeline.comparison.compare import compare_runs
@@ -162,25 +160,6 @@ def test_no_well_made_pair_fails_by_its_shares() -> None:
             sides.append(ingested(t[kept], position=path_of(t[kept], rest)))
         shares = compare_runs(sides[0], sides[1:]).runs[0].shares
         assert all(one.verdict == "pass" for one in shares.values()), (periods, shares)
-
-
-@pytest.mark.parametrize("kept", [[0, -1], [0, 50, 99], [0, 1, 98, 99], [*range(50)]])
-def test_what_was_not_seen_is_no_pass_wherever_a_verdict_is_read(
-    kept: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    t = 0.02 * np.arange(100, dtype=np.float64)
-    asked, done, junit, csv = (tmp_path / name for name in ("asked.csv", "done.csv", "v.xml", "v.csv"))
-    table(t, path_of(t)).to_csv(asked, index=False)
-    table(t[kept], path_of(t[kept])).to_csv(done, index=False)
-    arguments = ["compare", str(asked), str(done), "-o", str(tmp_path / "v.rrd")]
-    assert run([*arguments, "-q", "--junit", str(junit), "--csv", str(csv)]) == 1
-    assert f"coverage {len(kept)}.0 % of 90" in (said := "".join(capsys.readouterr()))
-    assert "needed, longest unseen: " in said
-    assert 'message="coverage = ' in junit.read_text()
-    rows = {row["quantity"]: row for row in pd.read_csv(csv).to_dict("records")}
-    found = [rows["coverage"][key] for key in ("value", "tolerance", "verdict")]
-    assert found == [len(kept) / 100, 0.9, "fail"]
-    assert run([*arguments, "-q", "--tolerance", "coverage=1%"]) == 0
 
 
 @pytest.mark.parametrize("tolerance", ["joint=0.1deg", "angle=0.1deg", "norm=1mm", "x=1mm", "path=1mm"])
