@@ -52,7 +52,7 @@ def test_a_byte_that_aborts_the_reader_is_one_line(tmp_path: Path) -> None:
     assert ended.returncode == -signal.SIGABRT  # else nothing would need a process of its own
 
 
-def test_a_changed_value_is_told(tmp_path: Path) -> None:
+def test_a_changed_value_is_an_error(tmp_path: Path) -> None:
     run = build_run(rows=50)
     path = write_recording(run, tmp_path / "whole.rrd")
     content = path.read_bytes()
@@ -68,7 +68,7 @@ def test_a_changed_value_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_changed_letter_of_the_metadata_is_told(tmp_path: Path) -> None:
+def test_a_changed_letter_of_the_metadata_is_an_error(tmp_path: Path) -> None:
     path = write_recording(build_run(rows=5), tmp_path / "whole.rrd")
     run: Any = read_recording(path)
     created, content, said = run.provenance.created.encode()[:19], path.read_bytes(), set()

@@ -84,7 +84,7 @@ def test_each_ghost_is_drawn_where_its_joints_put_it_and_gone_elsewhere(tmp_path
             np.testing.assert_allclose(begin + along, end[row], rtol=0, atol=1e-6)
 
 
-def test_along_a_motion_a_new_branch_is_told_at_its_row() -> None:
+def test_along_a_motion_a_new_branch_is_named_at_its_row() -> None:
     one = build_solved(rows=9000)
     labels = np.array(one.solutions.labels)
     labels[:4001, 0], labels[4001:, 0] = "up", "down"

@@ -176,7 +176,7 @@ def test_a_comparison_in_the_viewer(viewer: Any, tmp_path: Path) -> None:
     assert "delta = reference - log [mm]" in view_names(viewer)
 
 
-def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
+def test_a_branch_in_the_viewer_is_there_only_where_there_is_a_solution_of_it(
     viewer: Any, tmp_path: Path
 ) -> None:
     """At 0.5 s neither the arm is there, whose joints have the same colours, nor a branch."""

@@ -78,7 +78,7 @@ def length(strips: Sequence[FloatArray]) -> float:
 
 
 @pytest.mark.parametrize(("turns", "dashes"), [(20, DASHES), (1, 55)])
-def test_what_was_asked_for_is_dashed(turns: int, dashes: int) -> None:
+def test_a_requested_path_is_dashed(turns: int, dashes: int) -> None:
     """A short path has fewer dashes: they would run together."""
     angle = np.linspace(0.0, 2.0 * np.pi * turns, 9000)
     position = np.column_stack((np.cos(angle), np.sin(angle), 0.01 * angle))
@@ -173,7 +173,7 @@ def test_each_link_moves_with_its_frame(tmp_path: Path) -> None:
         np.testing.assert_allclose(turned, expected, atol=1e-6)
 
 
-def test_meshes_are_in_the_recording_and_a_solid_stands_for_one_that_is_gone(tmp_path: Path) -> None:
+def test_meshes_are_in_the_recording_and_a_solid_stands_for_a_lost_mesh(tmp_path: Path) -> None:
     robot, mesh = read_urdf(arm_of_shapes(tmp_path)), tmp_path / "meshes" / "bar.stl"
     path = write_recording(build_run(rows=50, robot=robot), tmp_path / "run.rrd")
     blob = column(path, "joint/turn3/visual\\ 1", "Asset3D:blob")

@@ -1,17 +1,23 @@
-"""The plots of a recording: what is thinned out and keeps its extremes, and what stands as an array."""
+"""Plots that are thinned out and keep their extremes, and where the viewer opens; see also views.cases."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
-from recorded import columns, times_of
+from recordable import build_comparison
+from recorded import columns, entities, times_of
 from toys import PLOT, STEP_NS, figure, line, panel, recorded, shown, toy
 from urmpipe_pipeline.recording import writer
+from urmpipe_pipeline.recording.viewer import openings
 from urmpipe_pipeline.recording.views.plots import COPIED, LONG, ROWS
+from urmpipe_pipeline.results import write_recording
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 SCALARS = "Scalars:scalars"
 
@@ -47,3 +53,22 @@ def test_of_very_many_rows_only_what_is_plotted_stands_by_itself(
     assert len(columns(recorded(shown(figure(panel(one))), tmp_path, one), "/values", SCALARS)) == rows
     bare = recorded(shown(), tmp_path, one)
     assert len(columns(bare, "/values", "urmpipe:packed")) == 1 and not columns(bare, "/values", SCALARS)
+
+
+def test_results_open_where_their_verdict_was_decided(
+    make_simulation: Callable[..., Simulation], tmp_path: Path
+) -> None:
+    comparison = build_comparison(("solidworks", "coppeliasim"))
+    path = write_recording(comparison, tmp_path / "both.rrd")
+    assert openings([path])[path].at / 1e9 == comparison.worst.worst_statistics.t_max > 0
+    path = write_recording(make_simulation(), tmp_path / "simulation.rrd")
+    assert openings([path])[path].at == 1_250_000_000
+
+
+def test_what_is_drawn_stands_below_one_root_and_on_no_clock_of_the_writer(tmp_path: Path) -> None:
+    """The other entities are the arrays of the result, at the paths of their fields."""
+    path = write_recording(build_comparison(rows=50), tmp_path / "both.rrd")
+    roots = {entity.split("/")[1] for entity in entities(path)}
+    assert roots == {"shown", "reference", "runs"}
+    timelines = {name for chunk in RrdReader(path).store().stream() for name in chunk.timeline_names}
+    assert timelines == {"t", "row"}
