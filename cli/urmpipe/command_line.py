@@ -82,7 +82,7 @@ def _read_option(ctx: click.Context, option: click.Parameter, value: Any) -> Any
     try:
         return param.kind.read(value)
     except (ValueError, TypeError, OptionError) as error:
-        for fault in param.kind.find_faults(name, value, error):
+        for fault in param.kind.find_faults(name, value, error, typed=True):
             text = json.dumps(value) if isinstance(value, bool) else fault.found  # a bool is of urmpipe.toml
             fault_at = locate_fault(ctx, option, replace(fault, found=text))
             ctx.meta.setdefault(FAULTS, []).append(fault_at)
@@ -106,7 +106,10 @@ def operand(name: str, kind: Kind, **settings: Any) -> Callable[[Function], Func
             return tuple(map(kind.read, value)) if many else kind.read(list(value) if kind.repeats else value)
         except (ValueError, TypeError, OptionError) as error:
             raise OptionError(
-                *(locate_fault(ctx, param, fault) for fault in kind.find_faults(name, value, error))
+                *(
+                    locate_fault(ctx, param, fault)
+                    for fault in kind.find_faults(name, value, error, typed=True)
+                )
             ) from None
 
     settings = {"shell_complete": kind.complete, "callback": read, "type": click.UNPROCESSED} | settings
@@ -194,15 +197,17 @@ def usage_finding(error: click.UsageError) -> Finding:
             needs_value = "requires" in error.message  # the message alone distinguishes the two
             fault, allowed = ("no value", _metavar(ctx, name)) if needs_value else ("a value", "alone")
             text = f"{name}: found {fault}, allowed: {name} {allowed}"
+        case click.MissingParameter(param=click.Option() as param):
+            name = f"--{long_name(param)}"
+            text = f"found no {name}, allowed: {name} {_metavar(ctx, name)}"
         case click.MissingParameter(param=click.Parameter() as param):
-            text = f"found no {_display_name(param)}, allowed: {_usage(ctx)}"
+            text = f"found no {param.human_readable_name}, allowed: {_usage(ctx)}"
         case click.BadParameter(param=click.Parameter() as param):
             return locate_fault(ctx, param, Finding(error.message))
         case click.UsageError() if ctx and "unexpected extra" in error.message:  # it has no separate class
             extra = error.message.partition("(")[2].rstrip(")")
-            takes_robot = any("--robot" in param.opts for param in ctx.command.params)
-            robot = "; --robot sets a robot" if takes_robot else ""
-            text = f"found {extra} besides the rest, allowed: {_usage(ctx)}{robot}"
+            noun = "extra arguments" if "arguments" in error.message else "an extra argument"
+            text = f"found {noun}, {extra}, allowed: {_usage(ctx)}{_robot_hint(ctx, extra)}"
         case _:
             text = error.format_message()
     return Finding(text if ctx is None or "allowed: " in text else f"{text}; see {ctx.command_path} --help")
@@ -215,9 +220,7 @@ def locate_fault(ctx: click.Context | None, param: click.Parameter, fault: Findi
         return replace(fault, message=message, file=str(ctx.obj.file_of(long_name(param))), parameter=None)
     if isinstance(param, click.Option):
         return replace(fault, parameter=param.name)
-    return replace(
-        fault, message=": ".join(filter(None, (_display_name(param), fault.message))), parameter=None
-    )
+    return replace(fault, message=": ".join(filter(None, (param.name, fault.message))), parameter=None)
 
 
 def is_from_file(ctx: click.Context, param: click.Parameter) -> bool:
@@ -230,8 +233,13 @@ def long_name(param: click.Parameter) -> str:
     return to_option(param.name or "").lstrip("-")
 
 
-def _display_name(param: click.Parameter) -> str:
-    return f"--{long_name(param)}" if isinstance(param, click.Option) else str(param.human_readable_name)
+def _robot_hint(ctx: click.Context, extra: str) -> str:
+    """Return the hint to --robot, if a command has this option and the first of the words is a robot."""
+    from urmpipe_models.robots.catalogue import robot_names
+
+    name = extra.partition(" ")[0]
+    takes_robot = any("--robot" in param.opts for param in ctx.command.params)
+    return f"; --robot {name} sets the robot" if takes_robot and name in robot_names() else ""
 
 
 def _metavar(ctx: click.Context | None, name: str) -> str:

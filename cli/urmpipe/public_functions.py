@@ -145,7 +145,7 @@ def require_recordings(files: Sequence[Path]) -> None:
     """Raise a `RecordingError` with all existing files that are not recordings."""
     foreign = [path for path in files if path.exists() and not is_recording(path)]
     if foreign:
-        message = "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"
+        message = "found no recording of urmpipe, allowed: a recording (.rrd) that urmpipe wrote"
         raise RecordingError(*(Finding(message, file=str(path)) for path in foreign))
 
 

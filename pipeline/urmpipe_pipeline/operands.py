@@ -40,7 +40,9 @@ from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import MemoryTable, ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
 
-NOT_A_RUN = "found the recording of {}, allowed: one that ingest wrote"
+NOT_A_RUN = (
+    "found the recording of {}, allowed: one with a motion, such as ingest, ik, plan or network drive write"
+)
 BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
 BASELINE_HINT = Hint("baseline", None, "compares it, alone, with an earlier one")
 

@@ -33,7 +33,8 @@ OutputKind = Literal[
 ]  # fmt: skip
 
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "turns_before", "turns_after")  # header of an audit
-MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --log-map THIS"  # first line of a map
+MAP_MARK = "# How urmpipe reads these logs: "  # start of a map
+MAP_HEADER = f"{MAP_MARK}urmpipe ingest LOG --map THIS"  # its first line
 STATISTICS_HEADER = "run,sync_offset,quantity,kind,unit,max,"  # a later version may have more columns
 CRITERIA_HEADER = "name,at,value,unit,cycles,tolerance,verdict"  # of a test after ISO 9283, likewise
 JUNIT_HEADER = '<?xml version="1.0" encoding="UTF-8"?><!-- urmpipe: verdict of a comparison -->'  # first line
@@ -78,7 +79,7 @@ class OutputRule(NamedTuple):
 OUTPUT_RULES: dict[OutputKind, OutputRule] = {
     "recording": OutputRule("recording", (".rrd",)),
     "report": OutputRule("report", (".html", ".htm"), _GENERATOR),
-    "map": OutputRule("map", (".toml",), _first_line(MAP_HEADER)),
+    "map": OutputRule("map", (".toml",), _first_line(MAP_MARK)),
     "export": OutputRule("export"),
     "audit": OutputRule("audit", (".csv",), _first_line(",".join(AUDIT_COLUMNS))),
     "junit": OutputRule("JUnit file", (".xml",), _first_line(JUNIT_HEADER)),

@@ -62,7 +62,8 @@ class Kind(NamedTuple):
             OptionError: If the kind has none.
         """
         if not self.exporter:
-            raise OptionError(f"{self.with_article} has no tables")
+            known = ", ".join(kind.name for kind in KINDS if kind.exporter)
+            raise OptionError(f"found {self.with_article}, which has no tables, allowed: {known}")
         tables: Exports = _load(self.exporter)(result)
         return tables
 

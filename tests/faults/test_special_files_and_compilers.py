@@ -20,7 +20,7 @@ HANGS = 120.0
 
 COMMAND = [sys.executable, "-P", "-m", "urmpipe"]
 
-NO_RECORDING = "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"
+NO_RECORDING = "found no recording of urmpipe, allowed: a recording (.rrd) that urmpipe wrote"
 PIPE = "found a pipe or a device, allowed: a recording (.rrd) that urmpipe wrote"
 
 

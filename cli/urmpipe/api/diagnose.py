@@ -97,7 +97,10 @@ def diagnose(
     (run,) = comparison.runs
     assert run.diagnosis is not None
     warnings = (*run.diagnosis.warnings, *comparison.general_warnings, *comparison.warnings_of(run))
-    return replace(run.diagnosis, warnings=warnings, recording=comparison.recording, comparison=comparison)
+    return replace(
+        run.diagnosis, verdict=comparison.verdict, warnings=warnings, recording=comparison.recording,
+        comparison=comparison,
+    )  # fmt: skip
 
 
 def _load_finished(reference: object) -> Comparison | None:

@@ -38,7 +38,8 @@ def diagnose(
       urmpipe diagnose log-against-path.rrd
       urmpipe diagnose path.csv log.csv --robot urm6 --json
 
-    Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
+    Exit codes: 0 within tolerance and not worse than the baseline, 1 out of tolerance or worse, 2 bad input
+    or usage.
     """
     options = call.without_log_options((reference, *logs), options)
     finished = None if logs else load_finished(call, reference, "output")

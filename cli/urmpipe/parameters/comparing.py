@@ -131,7 +131,7 @@ class Baseline(TypedDict, total=False):
         "PathLike | Comparison | None",
         Param(
             kinds.BASELINE,
-            "Report changes since an earlier comparison (.rrd); exit code 1 if worse.",
+            "Report changes since an earlier comparison or test (.rrd); exit code 1 if worse.",
             heading=Heading.BASELINE,
             each_call=True,
         ),
@@ -162,7 +162,11 @@ class Verdicts(Inputs, Progress, total=False):
     ]
     csv: Annotated[
         PathLike | None,
-        _output(kinds.TABLE_FILE, "Write the statistics as a table, one row per log and quantity."),
+        _output(
+            kinds.TABLE_FILE,
+            "Write the statistics as a table, one row per log and quantity; of a test one per criterion and"
+            " place.",
+        ),
     ]
     defaults: Annotated[
         Sequence[str],

@@ -45,6 +45,7 @@ SOURCES = (
 DELIMITERS = ("comma", "semicolon", "tab", "spaces", "bar")
 SYNC_WORDS = ("stamps", "start", "auto")
 PLATFORMS = ("linux64", "win64")
+A_PATH, A_NAME = "a path: text or a Path, not empty", "the name of a file"  # in Python; in a shell
 
 
 # 1. Readers
@@ -161,8 +162,8 @@ def _read_frame(value: Any) -> Any:
     return from_offset(offset)
 
 
-def _read_named(value: Any, *, flags: bool = False) -> dict[str, Any]:
-    """Read values by name: a mapping, or texts NAME=VALUE."""
+def _read_named(value: Any, form: str, *, flags: bool = False) -> dict[str, Any]:
+    """Read values by name: a mapping, or texts of a form such as NAME=VALUE."""
     if isinstance(value, Mapping):
         has_names = all(isinstance(name, str) and name for name in value)
         if not has_names or (not flags and any(map(_is_flag, value.values()))):
@@ -172,7 +173,7 @@ def _read_named(value: Any, *, flags: bool = False) -> dict[str, Any]:
     for text in _read_texts(value):
         name, sign, content = text.partition("=")
         if not sign or not name.strip() or name.strip() in result:
-            raise OptionError(Finding(found=format_value(text), allowed="NAME=VALUE, each name once"))
+            raise OptionError(Finding(found=format_value(text), allowed=f"{form}, each name once"))
         result[name.strip()] = content
     return result
 
@@ -409,12 +410,21 @@ def one_of(*names: str) -> Kind:
 
 def file(metavar: str, *suffixes: str) -> Kind:
     """Return the kind of a file; the shell completes those with one of some suffixes."""
-    return Kind(metavar, "a path: text or a Path, not empty", _read_path, files(*suffixes), is_file=True)
+    return Kind(metavar, A_PATH, _read_path, files(*suffixes), is_file=True, typed=A_NAME)
 
 
-def file_or(metavar: str, allowed: str, classes: Sequence[str], complete: Complete) -> Kind:
-    """Return the kind of a name or a file, or an object of Python of some classes."""
-    return Kind(metavar, allowed, partial(_read_file_or, classes=classes), complete, is_file=True)
+def file_or(metavar: str, typed: str, further: str, classes: Sequence[str], complete: Complete) -> Kind:
+    """Return the kind of a name or a file, or an object of Python of some classes.
+
+    Args:
+        metavar: The value in the help.
+        typed: The names and files.
+        further: The objects of Python, behind those.
+        classes: Their classes.
+        complete: The completion.
+    """
+    read = partial(_read_file_or, classes=classes)
+    return Kind(metavar, f"{typed}{further}", read, complete, is_file=True, typed=typed)
 
 
 def number(si: str, *, positive: bool = False, deviation: bool = False) -> Kind:
@@ -435,9 +445,17 @@ def numbers(metavar: str, si: str, allowed: str, length: int = 0) -> Kind:
     return Kind(metavar, allowed, partial(_read_numbers, si=si, length=length))
 
 
-def named(metavar: str, allowed: str, complete: Complete | None = None, *, flags: bool = False) -> Kind:
-    """Return the kind of values by name, True and False if `flags`: a mapping, or NAME=VALUE for each."""
-    return Kind(metavar, allowed, partial(_read_named, flags=flags), complete, repeats=True)
+def named(form: str, allowed: str, complete: Complete | None = None, *, flags: bool = False) -> Kind:
+    """Return the kind of values by name, True and False if `flags`: a mapping, or a form for each.
+
+    Args:
+        form: What a text is, such as NAME=VALUE.
+        allowed: What else Python takes.
+        complete: The completion.
+        flags: Whether True and False are values.
+    """
+    read = partial(_read_named, form=form, flags=flags)
+    return Kind(form, allowed, read, complete, repeats=True, typed=f"{form}, each name once")
 
 
 def texts(
@@ -464,22 +482,24 @@ TABLE_FILE = file("FILE.csv", ".csv")
 MAP_FILE = file("FILE.toml", ".toml")
 DRAWING = file("FILE.svg", ".svg")
 RECORDING = file("RUN.rrd", ".rrd")
-FOLDER = Kind("DIR", "a path: text or a Path, not empty", _read_path, folders, is_file=True)
+FOLDER = Kind("DIR", A_PATH, _read_path, folders, is_file=True, typed="the name of a folder")
 PATHS = Kind(
     "FILE",
     "a path or a list of paths: text or a Path, not empty",
     lambda value: tuple(map(_read_path, [value] if isinstance(value, (str, Path)) else _read_list(value))),
     files(),
     repeats=True,
+    typed=A_NAME,
 )
 
 ROBOT = file_or(
     "NAME|FILE",
-    "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)",
+    "a name, or a TOML or URDF file",
+    ", or a Chain, such as urmpipe.load_robot(NAME)",
     ("Chain",),
     files(".toml", ".urdf", names=robots),
 )
-ROBOT_FILE = ROBOT._replace(allowed="a name, or a TOML or URDF file", read=partial(_read_file_or, classes=()))
+ROBOT_FILE = ROBOT._replace(allowed=ROBOT.typed, read=partial(_read_file_or, classes=()))
 FRAME = Kind(
     "X,Y,Z[,RX,RY,RZ]",
     "X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg",
@@ -490,7 +510,7 @@ JOINT_VALUES = Kind(
     "Q1,Q2,...", "joint values in rad and m, or with units, such as 0,180deg,500mm", _read_joint_values
 )
 
-MAP = file_or("FILE.toml", "a map (TOML), or what `read_map` returned", ("LogMap",), files(".toml"))
+MAP = file_or("FILE.toml", "a map (TOML)", ", or what `read_map` returned", ("LogMap",), files(".toml"))
 DELIMITER = Kind("|".join(DELIMITERS), "a non-empty text", _reader("delimiter"), words(*DELIMITERS))
 DECIMAL = one_of("point", "comma", ".", ",")
 ROTATION = one_of(*FORMS)
@@ -499,7 +519,7 @@ TIME = Kind("COLUMN", "a column by name or number", _reader("time"), columns("no
 TIME_OF_FILE = TIME._replace(metavar="[FILE:]COLUMN")
 COLUMNS = Kind(
     "A,B,C",
-    "columns by name or number, such as ['q1', 'q2'] or [2, 3]",
+    "columns by name or number, such as q1,q2 or 2,3",
     _reader("joints", _split_columns),
     columns(several=True),
 )
@@ -511,14 +531,14 @@ LAYOUT = Kind(
 )
 UNIT = Kind(
     "[COLUMN=]UNIT",
-    "a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}",
+    "a unit of every angle, such as deg, or units by column, such as q1=deg",
     _reader("unit", _split_units),
     units,
     repeats=True,
 )
 INTERVAL = Kind(
     "[JOINT=]LOW:HIGH",
-    "two ends for all joints that turn, or a mapping, such as {'q1': (-180.0, 180.0)}",
+    "two ends for all joints that turn, or ends by joint, such as q1=-180:180",
     _reader("interval", _split_intervals),
     columns(sign="="),
     repeats=True,
@@ -531,6 +551,7 @@ TOLERANCE = Kind(
     _read_tolerance,
     tolerances(),
     repeats=True,
+    typed="a length, such as 3.5mm, or KIND=VALUE,..., such as axis=3.5mm,angle=0.5deg",
 )
 CRITERIA = Kind(
     "CRITERION=VALUE,...",
@@ -538,6 +559,7 @@ CRITERIA = Kind(
     partial(_read_tolerance, iso=True),
     tolerances(iso=True),
     repeats=True,
+    typed="CRITERION=VALUE,..., such as AP=0.4mm,AV=5%",
 )
 NOISE = TOLERANCE._replace(read=_read_noise, complete=tolerances(shares=False))
 AXIS_TOLERANCE = DEVIATION._replace(read=_read_axis_tolerance)
@@ -558,8 +580,15 @@ CYCLES = Kind(
     "FIRST:LAST,...",
     'a text such as "1:1477,1478:2955", or pairs of rows, such as [(1, 1477)]',
     _read_cycles,
+    typed="FIRST:LAST,..., such as 1:1477,1478:2955",
 )
-BASELINE = file_or("RUN.rrd", "a recording, or what `compare` returned", ("Comparison",), files(".rrd"))
+BASELINE = file_or(
+    "RUN.rrd",
+    "the recording of an earlier comparison",
+    ", or what `compare` returned",
+    ("Comparison",),
+    files(".rrd"),
+)
 
 TARGETS = Kind(
     "TARGETS",
@@ -567,16 +596,19 @@ TARGETS = Kind(
     lambda value: _read_path(value) if isinstance(value, str) else _read_object(value),
     files(),
     is_file=True,
+    typed=A_NAME,
 )
 PLANNED = file_or(
     "PATH.csv|cube:...",
-    'a file, a test cube ("cube:..."), or PathRows',
+    'a file, or a test cube ("cube:...")',
+    ", or PathRows",
     ("PathRows",),
     files(names=lambda: ("cube:wall,", "cube:diagonal,")),
 )
 NETWORK = file_or(
     "NAME|FILE",
-    "a name, a TOML file, the tables of one, or a Network",
+    "a name, or a TOML file",
+    ", the tables of one, or a Network",
     ("Network", "dict"),
     files(".toml", names=networks),
 )
@@ -587,12 +619,14 @@ RUN = Kind("RUN", "a Run, such as urmpipe.ingest(LOG)", lambda value: _read_inst
 SYSTEM = file_or(
     "SYSTEM|FILE.toml",
     "the name of a system, or a system file (TOML)",
+    "",
     (),
     files(".toml", names=list_names("urmpipe_fmus.cosim:system_names")),
 )
 UNIT_MODEL = file_or(
     "UNIT|FILE.py",
-    "the name of a unit, a Python file with one, or a BlockModel",
+    "the name of a unit, or a Python file with one",
+    ", or a BlockModel",
     ("BlockModel",),
     files(".py", names=list_names("urmpipe_fmus.blocks:block_names")),
 )
@@ -602,23 +636,27 @@ LOG = Kind(
     lambda value: value if _is_run_or_table(value) else _read_path(value),
     files(),
     is_file=True,
+    typed=A_NAME,
 )
 POINT = Kind(
     "BODY:X,Y,Z",
     'a text such as "coupler:0.45,0.2,0", or a body and three numbers',
     lambda value: value if isinstance(value, (list, tuple)) and len(value) == 2 else _read_text(value),
+    typed="BODY:X,Y,Z, such as coupler:0.45,0.2,0",
 )
 WRENCHES = Kind(
     "BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ]",
     'a list of texts such as "coupler:0.45,0,0:0,-50,0"',
     lambda value: tuple(map(_read_wrench, _read_list(value, split=False))),
     repeats=True,
+    typed="BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ], such as coupler:0.45,0,0:0,-50,0",
 )
 WIDTH = Kind(
     "WIDTH",
     'column, page, a text such as "85mm", or a number in m',
     lambda value: float(value) if _is_number(value) else _read_text(value),
     words("column", "page"),
+    typed="column, page, or a length such as 85mm",
 )
 PROGRESS = Kind("", "a function of the completed share, 0 to 1, such as print", _read_function)
 ON_MESSAGE = PROGRESS._replace(allowed="a function of a text, such as print")

@@ -67,11 +67,12 @@ class Export(Inputs, total=False):
         ),
     ]
     rows: Annotated[
-        Literal["grid", "file", "velocities", "samples", "criteria"] | None,
+        Literal["grid", "file", "compared", "criteria", "velocities", "samples", "simulated"] | None,
         Param(
-            kinds.one_of("grid", "file", "velocities", "samples", "criteria"),
+            kinds.one_of("grid", "file", "compared", "criteria", "velocities", "samples", "simulated"),
             "Rows of a log: grid, in SI on the time grid, or file, with the file's own names and units"
-            " [default: grid]; of accuracy: velocities or samples [default: velocities]; of iso: criteria.",
+            " [default: grid]; of a comparison: compared; of iso also criteria; of accuracy:"
+            " velocities or samples [default: velocities]; of a simulation: simulated.",
         ),
     ]
     tcp: Annotated[

@@ -48,6 +48,7 @@ class Kind(NamedTuple):
         complete: The completion of a value in the shell.
         repeats: Whether the option may be given several times; `read` also takes a list of their texts.
         is_file: Whether a text may name a file, which urmpipe.toml names from its own folder.
+        typed: The values allowed in a shell and in urmpipe.toml, where Python has others.
     """
 
     metavar: str
@@ -56,15 +57,20 @@ class Kind(NamedTuple):
     complete: Callable[..., Any] | None = None
     repeats: bool = False
     is_file: bool = False
+    typed: str = ""
 
-    def find_faults(self, name: str, value: Any, error: Exception) -> Iterator[Finding]:
-        """Yield the faults of a value that `read` refused with an error."""
+    def find_faults(
+        self, name: str, value: Any, error: Exception, *, typed: bool = False
+    ) -> Iterator[Finding]:
+        """Yield the faults of a value that `read` refused with an error; if typed, in a shell or a file."""
         from urmpipe_models.errors import Finding, UrmpipeError, format_value
 
         if isinstance(error, UrmpipeError):
             yield from (replace(finding, parameter=name) for finding in error.findings)
         else:
-            yield Finding(parameter=name, found=format_value(value), allowed=self.allowed)
+            yield Finding(
+                parameter=name, found=format_value(value), allowed=(typed and self.typed) or self.allowed
+            )
 
 
 class Param(NamedTuple):

@@ -93,7 +93,7 @@ class BuildFmu(OnMessage, total=False):
     log: Annotated[
         Any,  # PathLike | LogTable | None
         Param(
-            kinds.file_or("LOG", "a log: CSV, or a folder of plots", ("LogTable",), kinds.files()),
+            kinds.file_or("LOG", "a log: CSV, or a folder of plots", "", ("LogTable",), kinds.files()),
             "Log, for units that play one back.",
         ),
     ]
@@ -262,6 +262,6 @@ class NetworkDrive(Reading, Processing, Search, Strict, Progress, total=False):
 
 
 DRIVES = kinds.named(
-    "[CONTROL=FROM:TO]...",
+    "CONTROL=FROM:TO or CONTROL=VALUE",
     'a mapping of names to pairs of numbers or texts, such as {"crank": (0, "360deg")}',
 )

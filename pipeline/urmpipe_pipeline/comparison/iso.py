@@ -353,7 +353,7 @@ def _match_cycles(
         matched = (
             match_cycle(stations, motion)
             if can_match
-            else f"its path differs from that of {reference.run.name}"
+            else f"it does not follow the path of {reference.run.name} from start to end"
         )
         shares: dict[str, Share] = {}
         if not isinstance(matched, str):

@@ -354,7 +354,7 @@ def _undiagnosed(deviation: Deviation) -> Iterator[Fact]:
     is_diagnosable = len(deviation.sample) >= MIN_SAMPLES and not is_stationary(deviation)
     failed = deviation.worst_statistics.verdict == "fail"
     if failed and deviation.diagnosis is None and deviation.alignment.mode == "none" and is_diagnosable:
-        yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))
+        yield Fact("Cause", "urmpipe diagnose with the same arguments searches for it")
 
 
 def format_sync(sync: Sync) -> tuple[str, str]:

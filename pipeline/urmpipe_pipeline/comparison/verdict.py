@@ -102,7 +102,10 @@ def parse_tolerance(
         number = quantity_to_si(value, WRITTEN.get(unit, {}))
         if ambiguous := readings(value, unit) if math.isfinite(number) else ():
             prefix = f"{kinds[0]}=" if sign else ""
-            allowed = f"a unit: {' or '.join(f'{prefix}{reading}' for reading in ambiguous)}"
+            possible = [
+                one for one in ambiguous if _is_in_range(kinds[0], quantity_to_si(one, WRITTEN[unit]), zero)
+            ]
+            allowed = f"a unit: {' or '.join(f'{prefix}{reading}' for reading in possible)}"
             errors.append(Finding(parameter=parameter, found=part, allowed=allowed))
         fits = _is_in_range(kinds[0], number, zero)
         twice = " twice" if fits and not tolerance.keys().isdisjoint(kinds) else ""
@@ -314,8 +317,9 @@ def format_verdict(comparison: Comparison) -> str:
     """Return the logs out of tolerance, or that all are within, the reference, and the assumptions."""
     failed = [run for run in comparison.runs if run.verdict == "fail"]
     total = len(comparison.runs) + len(comparison.failed_logs)
-    message = f"{_who(failed or comparison.runs, total)} {'out of' if failed else 'within'} tolerance"
-    message += f" against {comparison.reference.name}"
+    is_out = any(one.verdict == "fail" for run in failed for one in run.all_statistics)
+    verdict = "within tolerance" if not failed else "out of tolerance" if is_out else "not fully judged"
+    message = f"{_who(failed or comparison.runs, total)} {verdict} against {comparison.reference.name}"
     message += f"{_points(comparison)}{_part(comparison)}{_clocks(comparison)}"
     if comparison.baseline and comparison.baseline.verdict == "fail":
         message += f", {'and' if failed else 'but'} worse than the baseline {comparison.baseline.name}"

@@ -112,7 +112,8 @@ def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> 
             unit = UNITS[kind]
             message = f"a noise of {text.format_stated(level, unit)} ({kind}) reaches the tolerance of"
             why = f"{text.format_stated(allowed, unit)}: nothing within it can be worse than the baseline"
-            yield LogWarning(LARGE_NOISE, f"{message} {why}; a number without a unit is in {unit}")
+            bare = "a fraction: 0.05 is 5 %" if unit == "1" else f"in {unit}"
+            yield LogWarning(LARGE_NOISE, f"{message} {why}; a number without a unit is {bare}")
 
 
 def left_out_warnings(deviation: Deviation, reference: Trajectory) -> Iterator[LogWarning]:

@@ -260,9 +260,9 @@ def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> DrivenVariables:
         network = mechanism.network
         controls = [control.name for control in network.controls if control.value is None]
         free = [joint.name for joint in network.joints if None in joint.drives]
-        listed = ", ".join(controls or free) or "a network with a control or a joint that can be driven"
-        message = f"found nothing that drives {network.name}, allowed: {listed}"
-        raise OptionError(Finding(message, parameter="drives"))
+        ranges = ", ".join(f"{name}=FROM:TO" for name in controls or free)
+        allowed = ranges or f"a network with a control or a joint that can be driven; {network.name} has none"
+        raise OptionError(Finding(parameter="drives", found="none", allowed=allowed))
     return find_driven_variables(mechanism, names)
 
 
@@ -298,6 +298,8 @@ def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str,
         return named
     if len(controls) == 1 and len(joints) == 1:
         return {controls[0]: joints[0]}
+    if not joints:
+        raise OptionError(Finding(parameter="log", found="no joints", allowed="a log with joints"))
     listed = ", ".join(joints)
     message = f"found joints {listed} in the log, none of which is a control or joint of {network.name}"
     allowed = f"which of them drives what, such as {(controls or free or ['CONTROL'])[0]}={joints[0]}"

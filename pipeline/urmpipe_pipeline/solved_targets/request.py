@@ -133,7 +133,7 @@ def joint_values(arm: Chain, given: JointValues, parameter: str) -> FloatArray:
     Raises:
         OptionError: If there is not one finite value for each joint, or its unit is not the joint's.
     """
-    allowed = f"{len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
+    allowed = f"{len(arm.coordinates)} values, one for each of {', '.join(arm.coordinates)}"
     if isinstance(given, (list, tuple)) and len(given) == len(arm.coordinates):
         given = map_collecting_errors(
             partial(_joint_value, parameter), list(zip(arm.moving, given, strict=True))

@@ -13,9 +13,9 @@ from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.math3d import FORMS, RotationForm
 from urmpipe_models.measure_units import compatible_units, quantity_to_si
 
-COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
-UNITS = "a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}"
-INTERVALS = "two ends for all joints that turn, or a mapping, such as {'q1': (-180.0, 180.0)}"
+COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
+UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
+INTERVALS = "two ends for all joints that turn, or ends by joint, such as q1=-180:180"
 
 GivenInterval: TypeAlias = tuple[float | str, float | str]
 """LOW and HIGH of a joint: numbers in the file's own unit, or both angles as texts with units."""

@@ -47,7 +47,7 @@ FORMATS: tuple[Format, ...] = get_args(Format)
 
 # grid: the run on its grid, in SI; file: the rows of the file, its columns in its own units; of an accuracy
 # velocities: the errors of each; samples: those of all its motions; criteria: those of a test after ISO 9283.
-RowNames = Literal["grid", "file", "velocities", "samples", "criteria"]
+RowNames = Literal["grid", "file", "compared", "criteria", "velocities", "samples", "simulated"]
 
 PoseNames = Literal["fk", "recorded"]  # by forward kinematics, or as the log recorded them
 

@@ -229,8 +229,8 @@ def test_a_diagnosis_is_no_log_and_recorded_with_its_comparison(tmp_path: Path) 
     comparison, path = diagnosed(), tmp_path / "result.rrd"
     alone = there(comparison.runs[0].diagnosis)
     write_recording(alone, path)
-    said = f"{path}: found the recording of a diagnosis, allowed: one that ingest wrote"
-    assert refusal(RecordingError, load_runs, [path]) == said
+    message = f"{path}: found the recording of a diagnosis, allowed: one with a motion, such as "
+    assert refusal(RecordingError, load_runs, [path]).startswith(message)
     found = replace(alone, comparison=comparison)
     assert enclosing_result(found) is comparison
     assert_same(read_recording(write_recording(found, path)), comparison)

@@ -329,14 +329,14 @@ def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None
     assert ReadOptions(joints=once).joints == ("q1", "q2")
     with pytest.raises(OptionError) as caught:
         ReadOptions(joints="q1", position=3, unit=3, interval=2.0)  # type: ignore[arg-type]
-    columns = "allowed: columns by name or number, such as ['q1', 'q2'] or [2, 3]"
+    columns = "allowed: columns by name or number, such as q1,q2 or 2,3"
     assert str(caught.value).split("\n") == [
         f"joints (--joints): found 'q1', {columns}",
         f"position: found 3, {columns}",
-        "unit (--unit): found 3, allowed: a unit of every angle, such as 'deg', or a mapping, such as"
-        " {'q1': 'deg'}",
-        "interval (--interval): found 2.0, allowed: two ends for all joints that turn, or a mapping, such as"
-        " {'q1': (-180.0, 180.0)}",
+        "unit (--unit): found 3, allowed: a unit of every angle, such as deg, or units by column, such as"
+        " q1=deg",
+        "interval (--interval): found 2.0, allowed: two ends for all joints that turn, or ends by joint, such"
+        " as q1=-180:180",
     ]
 
 
