@@ -137,8 +137,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize(("code", "line"), CASES)
 def test_the_installed_program_exits_with_this_code(code: int, line: str, folder: Path) -> None:
-    program = Path(sys.executable).with_name("urmpipe")
-    done = subprocess.run([str(program), *line.split()], cwd=folder, capture_output=True, text=True, check=False)
+    program = str(Path(sys.executable).with_name("urmpipe"))
+    done = subprocess.run([program, *line.split()], cwd=folder, capture_output=True, text=True, check=False)
     assert (done.returncode, "an error in urmpipe" in done.stderr) == (code, False), done.stderr
 
 
