@@ -53,7 +53,8 @@ class ParamOption(HeadedOption):
     def __init__(self, name: str, param: Param) -> None:
         kind, names = param.kind, sorted(param.names, key=lambda option: option.startswith("--"))
         short = [option for option in names if not option.startswith("--")]
-        default = "" if param.default in (None, False, ()) else f" [default: {param.default}]"
+        is_unset = param.default is None or param.default is False or param.default == ()
+        default = "" if is_unset else f" [default: {param.default}]"
         value: dict[str, Any] = {"type": click.UNPROCESSED}
         value |= {"required": True} if param.required else {"default": None}
         value |= {"metavar": kind.metavar, "multiple": kind.repeats} if kind.metavar else {"is_flag": True}

@@ -203,7 +203,7 @@ def _key_fault(name: str, options: Mapping[str, Any], all_options: Mapping[str, 
     if name in allowed:
         return None
     if name in all_options and all_options[name].param.each_call:
-        return f"{name}: found an option of a single call, allowed: --{name} on the command line"
+        return f"{name}: found an option that cannot be a default, allowed: --{name} on the command line"
     return (
         f"{name}: unknown{format_suggestion(name, allowed)}; allowed: {format_names(name, sorted(allowed))}"
     )

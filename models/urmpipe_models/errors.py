@@ -36,6 +36,7 @@ class Placeholder(str):
 
 
 _PLACEHOLDERS: Mapping[str, Any] = {  # of other parameters: the name in capitals
+    "arguments": Placeholder("VALUE"),
     "audit": Placeholder("FILE.csv"),
     "base": [Placeholder("X"), Placeholder("Y"), Placeholder("Z")],
     "baseline": Placeholder("RUN.rrd"),

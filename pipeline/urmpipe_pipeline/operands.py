@@ -25,6 +25,7 @@ from urmpipe_models.errors import (
     OptionError,
     RecordingError,
     UrmpipeError,
+    format_names,
     format_value,
     map_collecting_errors,
 )
@@ -208,16 +209,22 @@ class _Blocks:
             return
         names = ", ".join(map(format_value, self._names))
         found = f"{names} with {format_count(self._simulations, 'simulation')}"
-        allowed = "a block of a simulation, or one for each of several"
+        allowed = "one block, or one for each simulation"
+        if not self._simulations:
+            found, allowed = f"{names} without a simulation", "only with the recording of a simulation"
         raise OptionError(Finding(parameter="block", found=found, allowed=allowed))
 
 
 def _check_sides(operands: Sequence[Operand], sides: tuple[str, str]) -> None:
-    several = len(operands) > 1
-    if several or not is_log(operands[0]) or sides[0].lower() == sides[1].lower():
-        found = ",".join(sides) + (" with several logs" if several else "")
-        allowed = "two words for two sides of one log that is yet to be read"
-        raise OptionError(Finding(parameter="sides", found=found, allowed=allowed))
+    if len(operands) > 1:
+        fault, allowed = f" with {len(operands)} logs", "one log"
+    elif not is_log(operands[0]):
+        fault, allowed = " with a log that was read before", "a log file"
+    elif sides[0].lower() == sides[1].lower():
+        fault, allowed = ", the same word twice", "two words, such as target,actual"
+    else:
+        return
+    raise OptionError(Finding(parameter="sides", found=f"{','.join(sides)}{fault}", allowed=allowed))
 
 
 def _check_units(read: ReadOptions, runs: Sequence[Run]) -> None:
@@ -230,10 +237,14 @@ def _check_units(read: ReadOptions, runs: Sequence[Run]) -> None:
     }
     unused = [name for name in read.unit if name and not {name, key(name)} & used]
     if unused:
-        allowed = "a column that a log has, and that is read"
+        read_names = [column.name for column in columns]
         raise OptionError(
             *(
-                Finding(parameter="unit", found=f"no column {format_value(name)}", allowed=allowed)
+                Finding(
+                    parameter="unit",
+                    found=f"no column {format_value(name)}",
+                    allowed=format_names(name, read_names),
+                )
                 for name in unused
             )
         )

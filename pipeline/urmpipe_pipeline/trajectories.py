@@ -291,7 +291,7 @@ def _build_trajectory(run: Run, position: FloatArray, quat: FloatArray | None) -
 def reference_rows(reference: Side, log: Side) -> Trajectory:
     """Return the rows of a reference that are joined by lines: those with a value, on its own clock.
 
-    All rows where nothing is joined: of still poses, and of the record that a log is compared with itself.
+    All rows where nothing is joined: of static poses, and of the record that a log is compared with itself.
     """
     trajectory = reference.trajectory
     joined = reference.run is not log.run and reference.run.timed
@@ -384,13 +384,13 @@ def joint_order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] |
 def joint_mismatch(reference: Trajectory, joints: tuple[str, ...], units: tuple[str, ...]) -> str:
     """Return why the joints of a log cannot be compared with the reference's, or an empty string."""
     if not reference.joints or not joints:
-        return "a side has no joints"
+        return f"no joints in {'the log' if reference.joints else 'the reference'}"
     order = joint_order(reference.joints, joints)
     if order is None:
-        return f"the log has {len(joints)} joints, the reference has {len(reference.joints)}"
+        return f"{len(joints)} joints in the log and {len(reference.joints)} in the reference"
     expected = [reference.joint_units[place] for place in order]
     names = [name for name, unit, other in zip(joints, units, expected, strict=True) if unit != other]
-    return f"{', '.join(names)} turn on one side and slide on the other" if names else ""
+    return f"{', '.join(names)} revolute on one side and prismatic on the other" if names else ""
 
 
 def kinematics_missing(run: Run, *hints: Hint) -> Finding:

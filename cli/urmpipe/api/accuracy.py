@@ -24,6 +24,7 @@ from urmpipe_models.drives import DrivenJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius
 from urmpipe_models.errors import (
     Finding,
+    Hint,
     LogError,
     OptionError,
     PathError,
@@ -32,6 +33,7 @@ from urmpipe_models.errors import (
     map_collecting_errors,
 )
 from urmpipe_models.planning.path import PathRows
+from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.result import FASTEST, AccuracyResult, Decides
 from urmpipe_pipeline.joint_log import LogWarning
@@ -115,7 +117,8 @@ def accuracy(
 def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Request:
     """Return the request; raise an error if the arm cannot be driven, or suits neither start nor law."""
     if arm is None:
-        raise OptionError(Finding(parameter="robot", found="none", allowed="an arm with masses and drives"))
+        allowed, hints = "an arm with masses and drives", (Hint("robot", None, "sets one"),)
+        raise OptionError(Finding(parameter="robot", found="none", allowed=allowed, hints=hints))
     parts: tuple[Callable[[], Any], ...] = (
         lambda: start_of(arm, start),
         lambda: require_limits(timing, arm),
@@ -129,6 +132,9 @@ def _check_drives(arm: Chain) -> None:
     """Raise a `RobotError` with every key that a driven arm lacks."""
     driven = {drive.joint for drive in arm.drives}
     faults = [] if arm.inertials else [f"robot {arm.name}: key inertials: not found, allowed: its masses"]
+    if faults and arm.name in robot_names():
+        command = f"urmpipe robot export {arm.name} -o {arm.name}.toml"
+        faults[0] += f"; {command} writes a file to which they can be added"
     faults += [
         f"robot {arm.name}: key drives.{name}: not found, allowed: the drive of the joint, or {{ k, l }} of a"
         " spring that holds it"
@@ -148,8 +154,8 @@ def _read_rows(path: PathLike | PathRows, options: Mapping[str, Any]) -> GivenPa
         with Path(path).open("rb") as file:
             header = file.readline(HEAD)
         if PATH_ROW.encode() in header:
-            allowed = "the rows that it was made of"
-            raise LogError(Finding(file=str(path), found="the log of a plan", allowed=allowed))
+            allowed = "the path (CSV of x, y, z, ...) from which it was planned"
+            raise LogError(Finding(file=str(path), found="the motion of a plan", allowed=allowed))
     return given_path(path, to_read_options(options))
 
 
@@ -263,8 +269,8 @@ def _iter_warnings(
         yield LogWarning("unstable-loop", f"{message}, allowed: below 1")
     slow = [motion.errors for motion in motions if motion.errors.reached < REACHED * motion.velocity]
     if slow:
-        speeds = ", ".join(f"{errors.velocity:g} m/s ({errors.reached:.4g})" for errors in slow)
-        yield LogWarning("not-reached", f"the path or the joint limits keep the speed below {speeds}")
+        speeds = ", ".join(f"{errors.velocity:g} m/s ({errors.reached:.4g} m/s reached)" for errors in slow)
+        yield LogWarning("not-reached", f"the path or the joint limits do not allow {speeds}")
     if speed == FASTEST:
         yield LogWarning("fastest", f"all velocities up to {FASTEST:g} m/s are within the limit")
     for motion in motions:

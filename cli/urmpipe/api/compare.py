@@ -205,7 +205,11 @@ def _compare(
     reference, *logs = load([file for file in files if not isinstance(file, Comparison)], failed=failed)
     if isinstance(options, IsoOptions):
         if not logs:
-            raise OptionError(Finding(about="logs", found="none", allowed="a reference and its cycles"))
+            raise OptionError(
+                Finding(
+                    about="logs", found="none", allowed="one or more logs of its cycles, after the reference"
+                )
+            )
         return checked(measure_iso(reference, logs, options))
     if not logs:
         return checked(compare_with_recorded_tcp(reference, options))
@@ -228,8 +232,9 @@ def _load_comparison(reference: Operand | Comparison, output: PathLike | None) -
         return None
     comparison = reference if isinstance(reference, Comparison) else load_comparison(Path(reference))
     if comparison is not None and output is not None:
-        value = f"{output} with an existing comparison"
-        raise OptionError(Finding(parameter="output", found=value, allowed="without"))
+        allowed = "no output, as nothing new is recorded"
+        value = f"{output} with the recording of a comparison"
+        raise OptionError(Finding(parameter="output", found=value, allowed=allowed))
     return comparison
 
 

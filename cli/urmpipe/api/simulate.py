@@ -20,7 +20,7 @@ from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_fmus.cosim.simulation import start_worker
-from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.errors import Finding, Hint, OptionError
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -95,8 +95,11 @@ def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
         return set(shipped.values())
     settings = " and ".join(f"{name} is {value}" for name, value in replaced.items())
     missing = [
-        f"argument {name}: not set, but {settings}; allowed: a file of the same motion"
-        f" ({system}'s own {value} has another motion)"
+        Finding(
+            f"argument {name}: not set, but {settings}; allowed: a file of the same motion"
+            f" ({system}'s own {value} has another motion)",
+            hints=(Hint("arguments", {name: None}, "sets it"),),
+        )
         for name, value in shipped.items()
         if name not in replaced
     ]

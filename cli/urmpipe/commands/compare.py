@@ -111,8 +111,8 @@ def load_finished(call: Call, reference: Path, *also: str) -> Any:
     options = call.explicit_options(lambda name: name not in OF_RESULTS and name not in also)
     if comparison is not None and options:
         raise click.UsageError(
-            f"{', '.join(options)}: found with the recording of a comparison ({reference}), which stands as"
-            " it was made, allowed: with the logs themselves"
+            f"{', '.join(options)}: found with the recording of a comparison ({reference}), whose"
+            " options are fixed, allowed: with the logs, to compare them again"
         )
     return comparison
 

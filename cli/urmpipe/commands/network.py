@@ -48,8 +48,8 @@ def check(call: Call, name: str, **options: Any) -> Answer:
     """Assemble a network from its start values, and compute its mobility.
 
     Prints its loops and clusters, its mobility by the rank of the Jacobian and by Kutzbach's formula, and
-    the redundant constraints that explain a difference. It names idle spins and special configurations. If
-    a loop does not close, it names the loop and its gap.
+    the redundant constraints that explain a difference. It names passive rotations and special
+    configurations. If a loop does not close, it names the loop and its gap.
 
     \b
     Examples:

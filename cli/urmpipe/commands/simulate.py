@@ -106,7 +106,7 @@ def _write_system(call: Call, system: str, path: Path) -> Answer:
     from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.outputs import safe_output
 
-    allowed = "when the system runs; edit the file instead"
+    allowed = "when the system runs; change the written file instead"
     of_runs = [
         param.name
         for param in call.ctx.command.params
@@ -114,7 +114,7 @@ def _write_system(call: Call, system: str, path: Path) -> Answer:
         and call.explicit_options(str(param.name).__eq__)
     ]
     if of_runs:
-        message = "found for a system that is only written"
+        message = "found together with --write-system, which runs nothing"
         raise OptionError(*(Finding(message, parameter=name, allowed=allowed) for name in of_runs))
     text = system_text(system)
     with safe_output(path, [], "system") as part:

@@ -75,7 +75,8 @@ class Compared(TypedDict, total=False):
         _compared(
             kinds.SIDES,
             "Compare two sets of columns of one log, selected by words in their names: target,actual;"
-            " desired,actual; commanded,measured. rest: all columns without the other word.",
+            " desired,actual; commanded,measured. The word rest stands for all columns without the"
+            " other word.",
         ),
     ]
     block: Annotated[
@@ -97,10 +98,10 @@ class Judging(TypedDict, total=False):
             kinds.TOLERANCE,
             "Largest allowed deviation on each axis, such as 3.5mm, or per kind, such as"
             " axis=3.5mm,norm=5mm,angle=0.5deg. Kinds: axis, x, y, z, norm, path (m, mm, um), angle, joint"
-            " (rad, mrad, deg; m for sliding joints). A number alone is in m or rad; lengths from 0.02 and"
-            " angles above 0.2 need their unit. They replace the default completely: kinds that are not named"
-            " are not judged. Least shares to be seen: coverage of the reference (90% if not named), judged"
-            " of the log's motion (50%).",
+            " (rad, mrad, deg; m for prismatic joints). A number alone is in m or rad; lengths from 0.02 and"
+            " angles above 0.2 need their unit. The given kinds replace the default: other kinds are not"
+            " judged. Minimum shares, these if not given: coverage=90% of the reference that the log shows,"
+            " judged=50% of the log's motion that is compared.",
             default="3.5mm",
             decides=True,
         ),

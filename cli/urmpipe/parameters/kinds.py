@@ -538,7 +538,7 @@ UNIT = Kind(
 )
 INTERVAL = Kind(
     "[JOINT=]LOW:HIGH",
-    "two ends for all joints that turn, or ends by joint, such as q1=-180:180",
+    "two ends for all revolute joints, or ends by joint, such as q1=-180:180",
     _reader("interval", _split_intervals),
     columns(sign="="),
     repeats=True,

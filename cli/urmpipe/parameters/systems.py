@@ -83,7 +83,7 @@ class Simulate(LogReading, Strict, Messages, total=False):
     ]
     timeout: Annotated[
         Quantity,
-        _running(kinds.SECONDS, "Longest time that a call of an FMU may take.", default=60),
+        _running(kinds.SECONDS, "Longest time that a call of an FMU may take.", default="60s"),
     ]
 
 
@@ -131,7 +131,7 @@ class BuildFmu(OnMessage, total=False):
         PathLike,
         Param(
             kinds.file("DIR|FILE.fmu", ".fmu"),
-            "Folder for UNIT.fmu, or the file to write; by default the working folder.",
+            "Folder for UNIT.fmu, or the file to write.",
             default=".",
             names=("-o",),
             each_call=True,
@@ -143,7 +143,7 @@ class CheckFmu(TypedDict, total=False):
     """The parameters of `fmu check`."""
 
     timeout: Annotated[
-        Quantity, Param(kinds.SECONDS, "Longest time that a call of the FMU may take.", default=60)
+        Quantity, Param(kinds.SECONDS, "Longest time that a call of the FMU may take.", default="60s")
     ]
 
 

@@ -99,7 +99,7 @@ def read_table(
     if not motion.timed:
         hint = Hint("period", None, "reads the rows as a motion")
         raise LogError(
-            Finding("found still poses, allowed: a motion with times", str(files[0]), hints=(hint,))
+            Finding("found static poses, allowed: a motion with times", str(files[0]), hints=(hint,))
         )
     quantities = list(_iter_quantities(motion))
     _check_complete(str(files[0]), quantities)

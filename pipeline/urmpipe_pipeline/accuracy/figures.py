@@ -99,7 +99,7 @@ def motion_figures(result: AccuracyResult, motion: DrivenMotion) -> Iterator[Fig
 
 def _velocity_caption(result: AccuracyResult, *, published: bool) -> str:
     caption = "The axis is logarithmic. Strong: the error that decides,"
-    caption += f" {ERROR_DEFINITIONS[result.limited_error]}. Diamonds: velocities asked for."  # plain: ok
+    caption += f" {ERROR_DEFINITIONS[result.limited_error]}. Diamonds: the given velocities."
     caption += " Dashed: the limit." if result.limit is not None else ""
     if result.running_speed is not None:
         caption += " Dotted: the running speed, the largest within it."

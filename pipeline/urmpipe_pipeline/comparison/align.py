@@ -116,12 +116,12 @@ def _rigid(matched: Matched, run: Run) -> Alignment:
     (size, breadth), (other_size, other_breadth) = (side[:2] / np.sqrt(len(actual)) for side in rms)
     related = covariance[1] + covariance[2] > MIN_COVARIANCE * breadth * other_breadth
     if min(breadth, other_breadth) < MIN_BREADTH or not related:
-        fault = "two motions without anything in common"
+        fault = "two unrelated motions"
         if min(size, other_size) < MIN_BREADTH:
             fault = f"compared positions in one point (within {min(size, other_size) * 1e3:.4f} mm rms)"
         elif min(breadth, other_breadth) < MIN_BREADTH:
             fault = f"compared positions on one line (within {min(breadth, other_breadth) * 1e3:.4f} mm rms)"
-        allowed = "which leaves the rotation open, allowed: start, tool, none"
+        allowed = "so the rotation is not determined, allowed: start, tool, none"
         raise LogError(run_finding(run, f"rigid: found {fault}, {allowed}", parameter="align"))
     shift = matched.reference.mean(axis=0) - rotation @ matched.actual.mean(axis=0)
     return _build_alignment("rigid", rotation, shift)
@@ -150,9 +150,9 @@ def _align_tool(matched: Matched, run: Run) -> Matched:
     posed, quat = _with_orientation(matched, "tool", run)
     turn = float(rotation_angle(quat, np.broadcast_to(quat[0], quat.shape)).max())
     if turn < MIN_TURN:
-        fault = f"tool: found a tool that turns by {np.degrees(turn):.4f} deg in all"
-        allowed = "which an offset of the base explains as well, allowed: a log that turns it; start, none"
-        raise LogError(run_finding(run, f"{fault}, {allowed}", parameter="align"))
+        fault = f"tool: found a tool that rotates by {np.degrees(turn):.4f} deg at most, so its offset"
+        allowed = "cannot be separated from one of the base, allowed: a log that rotates it more; start, none"
+        raise LogError(run_finding(run, f"{fault} {allowed}", parameter="align"))
     rotation = to_matrices(quat)
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()
     actual = posed.actual + rotation @ np.array((x, y, z))
@@ -164,7 +164,9 @@ def _align_base_and_tool(matched: Matched, run: Run) -> Matched:
     posed, quat = _with_orientation(matched, "base+tool", run)
     if len(quat) < MIN_POSES:
         poses = format_count(len(quat), "compared pose")
-        message = f"base+tool: found {poses}, which some base and tool fit, allowed: {MIN_POSES} or more"
+        message = (
+            f"base+tool: found {poses}, too few to determine base and tool, allowed: {MIN_POSES} or more"
+        )
         raise LogError(run_finding(run, message, parameter="align"))
     rotation, reference_quat = to_matrices(quat), posed.reference_quat
     reference_rotation = None if reference_quat is None else to_matrices(reference_quat)

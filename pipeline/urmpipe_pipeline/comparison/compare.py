@@ -35,6 +35,7 @@ from urmpipe_pipeline.comparison.measure import joints_not_compared, measure
 from urmpipe_pipeline.comparison.sync import (
     SyncOption,
     check_sync,
+    no_common_sample,
     stamp_offset,
     sync_warnings,
     synchronise,
@@ -257,26 +258,28 @@ def check_static_poses(reference: Run, runs: Sequence[Run], options: CompareOpti
     if not static:
         return
     if len(static) <= len(runs):
-        raise LogError(*map(_no_motion, static))
+        motion = next(run for run in (reference, *runs) if run.timed)
+        raise LogError(*(_no_motion(run, motion) for run in static))
     rows = reference.log.rows
     if unequal := [run for run in runs if run.log.rows != rows]:
-        allowed = f"{rows}, as {reference.name} has: still poses are compared row by row"
+        allowed = f"{rows}, as {reference.name} has: static poses are compared row by row"
         raise LogError(
             *(run_finding(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in unequal)
         )
     if options.sync not in (None, "start"):
-        refused = f"{options.sync} of still poses"
-        raise OptionError(Finding(parameter="sync", found=refused, allowed="start, row by row"))
+        refused, allowed = f"{options.sync} with static poses", "start, as they are compared row by row"
+        raise OptionError(Finding(parameter="sync", found=refused, allowed=allowed))
 
 
-def _no_motion(run: Run) -> Finding:
+def _no_motion(run: Run, motion: Run) -> Finding:
     if run.log.source == SOLVED:
         message = (
             "found targets without times, which are not a motion, allowed: a log or a path of its own times"
         )
         return run_finding(run, message, Hint("tsp", None, "sets their sample period", call="ik"))
-    message = "found still poses beside a motion, allowed: still poses on both sides, or motions"
-    return run_finding(run, message, Hint("poses", True, "takes the rows of every log as still poses"))
+    message = f"found static poses, but {motion.name} is a motion"
+    hint = Hint("poses", True, "reads the rows of every log as static poses")
+    return run_finding(run, f"{message}, allowed: static poses on both sides, or motions on both sides", hint)
 
 
 def _join_frames(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> CompareOptions:
@@ -295,10 +298,10 @@ def _join_frames(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> 
         return options
     if options.diagnose:
         return replace(options, align="base+tool")
-    hint, errors = Hint("align", "base+tool", "finds the frames of base and tool"), []
+    hint, errors = Hint("align", "base+tool", "estimates the frames of base and tool"), []
     for run in measured:
         names = ", ".join(column.name for column in run.log.columns if column.role == "position")
-        side = f"a tool that was measured in a frame of its own ({names})"  # plain: ok
+        side = f"an externally measured tool position ({names}), in the frame of its device"
         error = run_finding(run, "", hint, parameter="align")
         errors.append(replace(error, found=side, allowed="base+tool, rigid, start"))
     raise LogError(*errors)
@@ -320,12 +323,12 @@ def compare_with_recorded_tcp(run: Run, options: CompareOptions | None = None) -
         raise OptionError(Finding(parameter="sync", found=f"{options.sync} for one log", allowed=allowed))
     log = run.log
     if not log.joints:
-        message = "a path alone, which has no joints; allowed: a log to compare with it"
+        message = "found a path alone, which has no joints, allowed: a path and a log"
         raise LogError(run_finding(run, message))
     if run.robot is None:
         raise LogError(run_finding(run, *(NO_ROBOT if log.tcp_position is None else NO_ROBOT_FITS)))
     if log.tcp_position is None:
-        message = "one log, which recorded no tool centre point; allowed: a reference before the log"
+        message = "found one log, which recorded no tool centre point, allowed: a reference and a log"
         unread = [warning.as_finding() for warning in log.warnings if warning.kind == TCP_NOT_READ]
         raise LogError(
             run_finding(run, message), *(replace(finding, file=run_label(run)) for finding in unread)
@@ -419,8 +422,7 @@ def _deviation(reference: Side, log: Side, options: CompareOptions) -> Deviation
     sync = synchronise(target, actual, options.sync, options.align, stamp_offset(reference.run, run))
     matched = match(target, actual, sync)
     if not len(matched.sample):
-        message = f"no sample in common with {target.name} (time offset {sync.offset} s)"
-        raise LogError(run_finding(run, message))
+        raise LogError(no_common_sample(run, target.name, sync))
     deviation = measure(run, target, actual, align(matched, options.align, run), options.tolerance)
     if not options.diagnose:
         return deviation

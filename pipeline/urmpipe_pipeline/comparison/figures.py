@@ -107,8 +107,8 @@ def path_figure(deviation: Deviation) -> Iterator[SpaceFigure]:
         arrows = deviation_arrows(deviation, extent(deviation.actual) / 2)
         yield SpaceFigure(
             "Poses in space",
-            f"Equal scale on all axes. A dot is where a pose was asked for, the arrow from it"
-            f" the {arrows.name}, in the colour of its size.",
+            f"Equal scale on all axes. Dots: poses of the reference; arrows: the {arrows.name}, coloured by"
+            " size.",
             f"Poses of {deviation.name} in three dimensions, each with its deviation as an arrow. {decided}",
             (),
             spots[2:],
@@ -438,9 +438,9 @@ def residual_figure(deviation: Deviation) -> Iterator[Figure]:
     over = "time" if deviation.run.timed else "the rows"
     yield Figure(
         f"Deviation over {over} without the causes",
-        "What stays when the causes above are taken away. Dashed: the tolerance; tinted: out of it.",
+        "The deviation that remains without the causes above. Dashed: the tolerance; tinted: out of it.",
         f"Deviation of {deviation.name} over {over} without the causes: {diagnosis.summary}."
-        f" What stays: {format_residual(diagnosis.unexplained, diagnosis.unit)}.",
+        f" Remaining: {format_residual(diagnosis.unexplained, diagnosis.unit)}.",
         (View("delta without the causes", tuple(_residual_panels(deviation, diagnosis))),),
         share=3.0,
         beside=True,

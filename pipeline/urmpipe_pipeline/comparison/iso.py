@@ -34,7 +34,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.measure import measure, measure_shares
 from urmpipe_pipeline.comparison.path_distance import distance_from_path
-from urmpipe_pipeline.comparison.sync import SyncOption, check_sync
+from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, no_common_sample
 from urmpipe_pipeline.comparison.verdict import (
     MIN_SHARES,
     check_tolerance,
@@ -278,8 +278,7 @@ def _find_candidates(
     found_cycles = find_cycles(command, motion)
     if not found_cycles.rows:
         if motion.timed:
-            message = f"found no motion as in {command.name} that returns to its start"
-            message += ", allowed: one that repeats it"
+            message = f"found no complete cycle of {command.name}, allowed: a log that repeats its motion"
         else:
             count = len(command)
             message = (
@@ -425,8 +424,7 @@ def _deviation(reference: Side, log: Side, sync: Sync) -> Deviation:
     rows = reference_rows(reference, log)
     matched = match(rows, log.trajectory, sync)
     if not len(matched.sample):
-        message = f"no sample in common with {reference.run.name} (time offset {sync.offset} s)"
-        raise LogError(run_finding(log.run, message))
+        raise LogError(no_common_sample(log.run, reference.run.name, sync))
     return measure(log.run, rows, log.trajectory, matched, {})
 
 
@@ -454,7 +452,7 @@ def _few_cycles(test: IsoTest) -> Iterator[LogWarning]:
         if is_tested and count < STANDARD_CYCLES[part]
     ]
     if few:
-        yield LogWarning(FEW, f"{format_count(count, 'cycle')}; ISO 9283 takes {' and '.join(few)}")
+        yield LogWarning(FEW, f"{format_count(count, 'cycle')}; ISO 9283 requires {' and '.join(few)}")
 
 
 def _angle_warnings(command: Motion, cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarning]:
@@ -484,5 +482,5 @@ def _noise_warnings(cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarn
     speed_noise = 6.0 * np.sqrt(2.0) * noise / float(np.median(steps)) if steps else 0.0
     fluctuation = values.get("FV")
     if fluctuation is not None and 2.0 * speed_noise > fluctuation:
-        makes = f"{text.format_quantity(noise, 'm')} from row to row make about {speed_noise:.2g} m/s"
-        yield LogWarning(NOISY_SPEED, f"FV is determined by noise: {makes}")
+        noise_text = f"{text.format_quantity(noise, 'm')} per sample, which gives about {speed_noise:.2g} m/s"
+        yield LogWarning(NOISY_SPEED, f"FV is determined by noise: {noise_text}")

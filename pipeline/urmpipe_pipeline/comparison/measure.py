@@ -136,12 +136,12 @@ def measure(
         errors.append(f"angle: found a side without an orientation, allowed: {ORIENTED}")
     if "joint" in tolerance and joint_delta is None:
         reason = joints_not_compared(reference, run)
-        errors.append(f"joint: found that {reason}, allowed: the same joints on both sides")
+        errors.append(f"joint: found {reason}, allowed: the same joints on both sides")
     if errors:
         raise LogError(*(run_finding(run, message, parameter="tolerance") for message in errors))
     path, in_space = values[:, 3], list[Quantity]()
     if np.isfinite(values).any():
-        joined = ~has_gap_after(reference.t_ns) & run.timed  # nothing joins still poses
+        joined = ~has_gap_after(reference.t_ns) & run.timed  # nothing joins static poses
         joined[[] if reference.discontinuities is None else reference.discontinuities] = False
         path = distance_from_path(matched.actual, reference.position, joined)
         path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, within rounding
@@ -227,7 +227,7 @@ def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[i
 def joints_not_compared(reference: Trajectory, run: Run) -> str:
     """Return why no joint of a log is compared."""
     mismatch = joint_mismatch(reference, run.log.joints, tuple(run.joint_units))
-    return mismatch or "a joint has no value at any compared sample"
+    return mismatch or "a joint without a value at any compared sample"
 
 
 def _speed(run: Run, matched: Matched, blocks: Iterable[slice]) -> FloatArray:
@@ -348,7 +348,7 @@ def measure_shares(
         log: The log, whole, on its own clock.
         matched: Both sides at the compared samples.
         tolerance: By kind: deviations in [m] and [rad], least shares 0..1.
-        timed: Whether the log is a motion; still poses are compared row by row, and none of them rests.
+        timed: Whether the log is a motion; static poses are compared row by row, and none of them rests.
     """
     reference = reference.rows_with_value()
     limits, shift = _limits(tolerance), round(matched.sync.offset * 1e9)

@@ -274,9 +274,7 @@ def cause_facts(comparison: Comparison) -> Iterator[Fact]:
 def decisive_facts(deviation: Deviation, colour: str) -> Iterator[Fact]:
     """Yield the quantity that decided the verdict: its value, time and place."""
     decisive, worst = deviation.decisive, deviation.worst_statistics
-    yield Fact(
-        "Furthest out" if deviation.verdict == "fail" else "Closest to the limit", Ref(deviation.name, colour)
-    )
+    yield Fact("Decisive log", Ref(deviation.name, colour))
     yield Fact("Decided by", format_decisive(decisive), page=False)
     short = ", ".join(filter(None, (absolute_symbol(decisive), format_utilisation(decisive))))
     yield Fact("Decided by", short, brief=False)
@@ -375,15 +373,15 @@ def _worst_joint_fact(deviation: Deviation) -> Iterator[Fact]:
     joint = deviation.worst_joint("rad") or deviation.worst_joint("m")
     if joint is not None and deviation.worst_statistics.kind != "joint" and joint.max:
         message = f"{joint.quantity}: {text.format_quantity(joint.max, joint.unit)}"
-        yield Fact("Joint furthest off", message, page=False)
+        yield Fact("Largest joint deviation", message, page=False)
 
 
 def _left_out(deviation: Deviation, reference_samples: int) -> Fact:
     total = format_count(deviation.left_out + len(deviation.sample), "sample")
-    counts = f"{deviation.left_out} of {total}"
+    counts = f"{deviation.left_out} of {total} of the log"
     counts += f", {deviation.reference_left_out} of {reference_samples} of the reference"
     some = bool(deviation.left_out or deviation.reference_left_out)
-    return Fact("Left out", counts, "no counterpart, or no value", some, page=some)
+    return Fact("Not compared", counts, "no counterpart, or no value", some, page=some)
 
 
 def _out_of_tolerance(deviation: Deviation, *, ranked: bool) -> Iterator[Fact]:
@@ -395,7 +393,7 @@ def _out_of_tolerance(deviation: Deviation, *, ranked: bool) -> Iterator[Fact]:
         page=not ranked,
     )
     if longest := deviation.longest_out_interval:
-        yield Fact("Longest stretch out", format_interval(longest))
+        yield Fact("Longest interval out of tolerance", format_interval(longest))
 
 
 def _turns(deviation: Deviation) -> str:
@@ -424,16 +422,16 @@ def remedy_hints(deviation: Deviation) -> list[Hint]:
     hints = []
     for cause in diagnosis.causes:
         if cause.kind == "time_lag":
-            hints.append(Hint("sync", round(deviation.sync.offset + cause.value[0], 6), "sets the clocks"))
+            hints.append(Hint("sync", round(deviation.sync.offset + cause.value[0], 6), "aligns the clocks"))
         elif cause.kind == "joint_unit":
             unit = "deg" if cause.value[0] < 1.0 else "rad"
-            hints.append(Hint("unit", dict.fromkeys(cause.joints, unit), "reads it so"))
+            hints.append(Hint("unit", dict.fromkeys(cause.joints, unit), "reads the joints in this unit"))
         elif cause.kind == "other_robot":
-            hints.append(Hint("robot", cause.name, "takes this arm"))
+            hints.append(Hint("robot", cause.name, "selects this robot"))
     by_joints = all("joint_offset" not in untested.kinds for untested in diagnosis.untested)
     if robot is not None and by_joints:  # poses that a log recorded have another base and tool than its arm
         base, tool = _corrected_frames(diagnosis.causes, robot.base, robot.tool)
-        hints += [Hint("base", _given(base), "puts the arm there")] if base != robot.base else []
+        hints += [Hint("base", _given(base), "sets this base")] if base != robot.base else []
         hints += [Hint("tool", _given(tool), "sets this tool")] if tool != robot.tool else []
     return hints
 
@@ -462,7 +460,7 @@ def _given(frame: Transform) -> list[float]:
 
 
 def _sliding(deviation: Deviation) -> str:
-    """Return the tolerance of joints that slide; empty without any."""
+    """Return the tolerance of prismatic joints; empty without any."""
     sliding = [
         statistics
         for statistics in deviation.joint_statistics.values()
@@ -471,4 +469,4 @@ def _sliding(deviation: Deviation) -> str:
     if not sliding:
         return ""
     names = ", ".join(statistics.quantity for statistics in sliding)
-    return f"in m for joints that slide: {names} {text.format_limit(sliding[0].tolerance)} mm"
+    return f"in m for prismatic joints: {names} {text.format_limit(sliding[0].tolerance)} mm"

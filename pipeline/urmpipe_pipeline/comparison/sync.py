@@ -28,7 +28,7 @@ from urmpipe_pipeline.sources.cells.text_clock import DATE
 from urmpipe_pipeline.sources.checks import REBUILT, SPREAD
 from urmpipe_pipeline.sources.clocks.halves import EPOCH
 from urmpipe_pipeline.sources.clocks.text_times import ZONED
-from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory, extent, joint_order
+from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory, extent, joint_order, run_finding
 
 SyncOption: TypeAlias = Literal["stamps", "start", "auto"] | float
 
@@ -68,7 +68,7 @@ MIN_FINE_SAMPLES = 8  # that both sides must have: fewer do not determine the st
 # distinguishable from these.
 MIN_RATE_LEFT = 1e-6
 
-ALLOWED = "one motion that does not repeat itself, half of it in both"
+ALLOWED = "one motion that does not repeat itself, at least half of it on both sides"
 STAMPS = "Unix times or dates on both sides that overlap, a time for each row"
 BY_MOTION = Hint("sync", "auto", "estimates the offset from the motion")
 BY_HAND = (Hint("sync", "start", "aligns the first samples"), Hint("sync", None, "sets the offset"))
@@ -272,13 +272,13 @@ def _estimate_offset(channels: Channels, reference: str) -> OffsetEstimate | _Fa
     rates = mean_rates(channels)
     peaks = find_peaks(rates, channels.turned) if rates else []
     if rates is None or not peaks:
-        return _Failure(f"no offset at which the {by} move as in {reference}")
+        return _Failure(f"no offset at which the motion of the {by} agrees with {reference}")
     estimates = sorted((refine(channels, rates, *peak) for peak in peaks), key=lambda at: -at.similarity)
     best = estimates[0]
     at_best = f"{best.offset:.6g} s with a similarity of {best.similarity:.3f}"
     if best.similarity < MIN_SIMILARITY:
-        message = f"low similarity of the {by} to {reference}: {at_best} at best"
-        return _Failure(f"{message}, {MIN_SIMILARITY:g} is needed", best.similarity)
+        message = f"too low a similarity of the {by} to {reference}: {at_best} at best"
+        return _Failure(f"{message}, where {MIN_SIMILARITY:g} is needed", best.similarity)
     if not np.isfinite(best.precision):
         return _Failure(f"no clear best offset to {reference} by the {by}: about {at_best}", best.similarity)
     limit, distance = MIN_ADVANTAGE * _unexplained(best), 2e-9 * rates.period_ns
@@ -498,6 +498,13 @@ def linearise(channels: Channels, rates: Rates, offset_ns: int) -> LinearisedOff
     return LinearisedOffset(residual, rate, energy)
 
 
+def no_common_sample(run: Run, reference: str, sync: Sync) -> Finding:
+    """Return the error of a log without a sample at a time of the reference."""
+    message = f"found no sample in common with {reference} at a time offset of {sync.offset:.6g} s"
+    hints = (BY_MOTION, BY_HAND[0]) if sync.mode in ("given", "stamps") else ()
+    return run_finding(run, f"{message}, allowed: samples at common times", *hints)
+
+
 def sync_warnings(name: str, sync: Sync, period: float) -> list[LogWarning]:
     """Return the warnings about an estimated offset.
 
@@ -514,6 +521,6 @@ def sync_warnings(name: str, sync: Sync, period: float) -> list[LogWarning]:
         warnings.append(LogWarning("sync-uncertain", message, about=name))
     if sync.similarity is not None and sync.similarity < CERTAIN_SIMILARITY:
         message = f"{offset} gives a similarity of {sync.similarity:.2f} only, of 1"
-        question = "do both logs show the same motion?"
-        warnings.append(LogWarning("sync-unlike", f"{message}: {question}", about=name))
+        message += ": the logs may show different motions"
+        warnings.append(LogWarning("sync-unlike", message, about=name))
     return warnings

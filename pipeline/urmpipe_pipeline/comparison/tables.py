@@ -53,7 +53,7 @@ def ranking_tables(comparison: Comparison) -> tuple[Table, ...]:
         **_sizes(comparison),
     }
     note = "The logs are ranked by the largest share of a tolerance that each uses."
-    left_out = "Left out: samples of the log without a counterpart or without a value."
+    left_out = "Not compared: samples of the log without a counterpart or without a value."
     partly = {share.quantity for deviation in comparison.runs for share in deviation.incomplete_shares}
     note += "".join(f" {name.capitalize()}: share {MEANING[name]}." for name in MEANING if name in partly)
     hidden = set(MEANING) - partly
@@ -121,15 +121,18 @@ def _conditions(comparison: Comparison, names: Heads[Deviation]) -> Iterator[Col
     heads: Heads[Deviation] = {
         **names,
         "t": ("decided at t", lambda deviation: Value(_decided_t(deviation), "s")),
-        "place": ("log there at x, y, z", _decided_place),
-        "longest_out_interval": ("longest out", lambda deviation: _longest_out(deviation, "duration")),
-        "longest_out_interval_t": ("longest out from t", lambda deviation: _longest_out(deviation, "t")),
+        "place": ("position of the log then", _decided_place),
+        "longest_out_interval": (
+            "longest out of tolerance",
+            lambda deviation: _longest_out(deviation, "duration"),
+        ),
+        "longest_out_interval_t": ("from t", lambda deviation: _longest_out(deviation, "t")),
         "sync_offset": ("offset", lambda deviation: Value(deviation.sync.offset, "s", signed=True)),
         "speed_correlation": (
             "r(‖Δ‖, speed)",
             lambda deviation: Value(deviation.speed_correlation, "1", signed=True),
         ),
-        "left_out": ("left out", lambda deviation: Value(deviation.left_out)),
+        "left_out": ("not compared", lambda deviation: Value(deviation.left_out)),
         "warnings": ("warnings", lambda deviation: Value(len(comparison.warnings_of(deviation)))),
         "alignment": ("alignment", lambda deviation: format_alignment(deviation)[0]),
     }
@@ -245,9 +248,9 @@ def _shares(deviation: Deviation) -> tuple[Column, ...]:
         "value": ("share", share_value),
         "samples": ("samples", lambda share: Value(share.samples)),
         "total": ("total", lambda share: Value(share.total)),
-        "unseen_t": ("longest unseen from t", unseen("t", "s")),
-        "longest_unseen": ("unseen for", unseen("duration", "s")),
-        "unseen_samples": ("unseen samples", unseen("samples")),
+        "unseen_t": ("longest part not compared from t", unseen("t", "s")),
+        "longest_unseen": ("not compared for", unseen("duration", "s")),
+        "unseen_samples": ("samples not compared", unseen("samples")),
     }
     return columns_of(list(deviation.shares.values()), heads)
 

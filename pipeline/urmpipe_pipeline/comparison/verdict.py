@@ -55,11 +55,9 @@ UNITS = {
 
 ALLOWED = (
     "a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
-    " m of a joint that slides)"
+    " m of a prismatic joint)"
 )
-ALLOWED_NUMBERS = (
-    "numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a joint that slides)"
-)
+ALLOWED_NUMBERS = "numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a prismatic joint)"
 ALLOWED_CRITERIA = (  # with iso
     "criteria: AP=, RP=, AD=, RD=, vAP=, OV=, dAP=, dRP=, AT=, RT=, CR=, CO= (m, mm, um), PSt= (s, ms), AV=,"
     " RV= (%), FV= (m/s, mm/s), AP_rz=, RP_ry=, AT_rx=, ... (rad, mrad, deg)"
@@ -378,7 +376,7 @@ def _clocks(comparison: Comparison) -> str:
 def format_share(share: Share, whose: str = "") -> str:
     """Return a share, with the name of the log if there are several, and the unseen part if too small.
 
-    As in "coverage 0.5 % of 90 % needed, longest unseen: 3.970 s from t = 0.010 s of the reference".
+    As in "coverage 0.5 % of 90 % needed, longest part not compared: 3.97 s from t = 0.01 s of the reference".
     """
     of_log = f" of {whose}" if whose else ""
     if share.verdict != "fail":
@@ -388,10 +386,10 @@ def format_share(share: Share, whose: str = "") -> str:
 
 
 def format_unseen(share: Share) -> str:
-    """Return the longest unseen part, as ", longest unseen: 3.970 s from t = 0.010 s of the reference"."""
+    """Return the longest unseen part, as ", longest part not compared: 3.97 s from t = 0.01 s of the log"."""
     side = "reference" if share.quantity == "coverage" else "log"
     longest = share.longest_unseen
-    return "" if longest is None else f", longest unseen: {format_interval(longest)} of the {side}"
+    return "" if longest is None else f", longest part not compared: {format_interval(longest)} of the {side}"
 
 
 def symbol(quantity: Statistics | Share | DeltaMeterResult) -> str:

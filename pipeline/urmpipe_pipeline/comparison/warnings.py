@@ -169,12 +169,14 @@ def undetermined_frames(deviation: Deviation) -> Iterator[LogWarning]:
     weak = [direction for direction in unobservable if direction.sensitivity >= MIN_SENSITIVITY]
     parts = []
     if undetermined:
-        parts.append(f"do not determine {_format_directions(undetermined)}, so the smallest values are used")
+        parts.append(
+            f"do not determine {_format_directions(undetermined)}, so the smallest values that fit are used"
+        )
     if weak:
-        weakly = f"hardly determine {_format_directions(weak)}"
-        parts.append(f"{weakly}, so a small error of the log causes a large one")
+        weakly = f"determine {_format_directions(weak)} only weakly"
+        parts.append(f"{weakly}, so small errors of the log change the result much")
     if parts:
-        message = f"the compared poses {', and '.join(parts)}"
+        message = f"the compared poses {', and '.join(parts)}; more varied poses would determine more"
         yield LogWarning("frames-open", message, about=deviation.name, parameter="align")
 
 
@@ -222,7 +224,7 @@ def clocks_differ(reference: Trajectory, log: Trajectory, deviation: Deviation) 
         sync = synchronise(reference, log, "auto", mode)
     except LogError:
         if norm > CERTAINLY_LATE_RATIO * path:
-            message += "; the motion determines no offset: is one side slower?"
+            message += "; the motion determines no offset: one side may be slower"
             yield LogWarning(CLOCKS_DIFFER, message, about=deviation.name, hints=BY_HAND[1:])
         return
     matched = match(reference, log, sync)
@@ -254,19 +256,18 @@ def recorded_tcp_mismatch(runs: Sequence[Run], allowed: float) -> Iterator[LogWa
             continue
         run, distance = group[0]
         limit = text.format_stated(MAX_CALIBRATION)
-        cause = f"more than a calibration explains ({limit}): another robot, tool or base?"
+        cause = f"a calibration explains up to {limit}: check robot, tool and base"
         if calibrated:
-            known = "a controller uses the calibration of its arm, which this robot model lacks"
-            cause = f"usual up to {limit} where {known}"
+            known = "a controller knows the calibration of its arm, this robot model does not"
+            cause = f"up to {limit} is usual: {known}"
+        basis = "the verdict is on the forward kinematics alone; to compare both, compare"
         if len(group) == 1:
             far = f"up to {text.format_quantity(distance, 'm')} from its recorded tool centre point"
-            remedy = f"a comparison of {run.name} alone does"
-            message = f"its kinematics are {far}, {cause}; this verdict does not include that; {remedy}"
+            message = f"by forward kinematics it is {far} ({cause}); {basis} {run.name} alone"
             yield LogWarning(RECORDED_TCP_APART, message, about=run.name)
         else:
             far = text.join_list(
                 [f"{run.name} is up to {text.format_quantity(most, 'm')}" for run, most in group]
             )
-            message = f"by forward kinematics {far} from the recorded tool centre points, {cause}"
-            remedy = "this verdict does not include that; a comparison of each alone does"
-            yield LogWarning(RECORDED_TCP_APART, f"{message}; {remedy}")
+            message = f"by forward kinematics {far} from the recorded tool centre point ({cause})"
+            yield LogWarning(RECORDED_TCP_APART, f"{message}; {basis} each log alone")

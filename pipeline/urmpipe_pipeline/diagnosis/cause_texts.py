@@ -361,16 +361,11 @@ def _path_unit(cause: Cause) -> tuple[str, str]:
 
 def _sign_kind() -> KindText:
     place = "(in the log or in the robot: positions do not show which)"
-
-    def clause(cause: Cause) -> str:
-        turns = "counter-rotates" if MODULE.fullmatch(cause.name) else "rotates in reverse"
-        return f"{_joints(cause)} {turns}"
-
     return KindText(
-        "sense of a joint",
-        lambda cause: f"sense of {cause.name}",
-        clause,
-        lambda cause: Remedy("count", _joints(cause), "the other way", place),
+        "reversed sign of a joint",
+        lambda cause: f"sign of {cause.name}",
+        lambda cause: f"{_joints(cause)} has a reversed sign",
+        lambda cause: Remedy("reverse", f"the sign of {_joints(cause)}", "", place),
     )
 
 
@@ -425,7 +420,7 @@ KIND_TEXTS: Mapping[str, KindText] = {
     "own_geometry": KindText(
         "the arm's own geometry",
         lambda _: "own geometry",
-        lambda _: "the arm's own geometry, as a calibration finds it",
+        lambda _: "the arm's geometry differs from its model",
         lambda _: Remedy("calibrate", "the arm"),
     ),
     "base_shift": _frame_kind("place of the base", "base shift", "the base", "move"),
@@ -462,7 +457,7 @@ KIND_TEXTS: Mapping[str, KindText] = {
         "lag of all joints",
         lambda _: "servo lag",
         lambda cause: (
-            f"all joints lag by {format_value(cause)}, as a servo does"
+            f"all joints lag by {format_value(cause)} (servo lag)"
             if cause.value[0] > 0.0
             else f"all joints are ahead by {format_value(cause)}"
         ),

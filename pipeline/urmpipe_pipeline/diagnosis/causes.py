@@ -19,9 +19,9 @@ Kind = Literal[  # of a cause
 ]  # fmt: skip
 STRUCTURE = ("link_length", "link_shift", "tilt")
 CLOCKS = ("time_lag", "clock_drift")
-TOO_LARGE = "more than any arm differs by"  # reasons of refusals
-CANCELLING = "they cancel each other"
-NOT_CONSTANT = "what would fit changes during the log"
+TOO_LARGE = "too large for a real arm"  # reasons of refusals
+CANCELLING = "the causes cancel each other"
+NOT_CONSTANT = "the best value changes during the log"
 
 
 @dataclass(frozen=True, slots=True)

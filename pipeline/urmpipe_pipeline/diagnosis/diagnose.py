@@ -90,8 +90,8 @@ LENGTHS = ("axis", "norm", "path")  # kinds of tolerances of a length
 COUNTED_ROWS = 2_000  # evenly spaced, of which those with all values are counted
 MIN_SAMPLES = 10  # a cause has up to three parameters of three per sample
 
-UNRELATED = "more than half of how far the reference moves: probably different motions"
-OWN_GEOMETRY = "the arm's own geometry, as a calibration finds it"
+UNRELATED = "more than half of the reference's motion (rms): probably different motions"
+OWN_GEOMETRY = "the arm's geometry differs from its model: a calibration determines it"
 SAME_TCP = "the joint values differ, but their tool centre points do not"
 SAME = "both sides agree"
 ELSEWHERE = "no change of joints or clock makes the tool centre points agree"

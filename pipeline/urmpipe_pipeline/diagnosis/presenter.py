@@ -75,7 +75,7 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
     own_tcp = "; ".join(map(format_own_tcp, diagnosis.recorded_tcp))
     return (
         Fact("Diagnosis" if diagnosis.verdict == "pass" else "Cause", diagnosis.summary, leads=True),
-        Fact("Meaning", _meaning(diagnosis, hints), brief=False, leads=True),
+        Fact("Remedy", _remedy(diagnosis, hints), brief=False, leads=True),
         Fact("95 % interval", format_interval(single) if single else "", brief=False, page=False),
         Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
         Fact("Equivalent causes", equivalents, page=False),  # tables have all of them
@@ -85,12 +85,12 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
     )
 
 
-def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
+def _remedy(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
     """Return what to do about the causes of the answer; None without any, or if the answer says it."""
     if not diagnosis.causes or diagnosis.unexplained.is_unrelated_motion:
         return None
     if diagnosis.verdict == "pass":
-        return Advice("to try it", tuple(hints)) if hints else None
+        return Advice(hints=tuple(hints)) if hints else None
     remedies = [build_remedy(cause) for cause in select_causes(diagnosis.causes)]
     last = {remedy.place: k for k, remedy in enumerate(remedies)}  # a place is named once, after the last
     steps = [

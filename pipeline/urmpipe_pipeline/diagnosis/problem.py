@@ -212,7 +212,7 @@ def _arm_problem(matched: Matched, reference: Side, log: Side) -> Problem:
     if rotation is None:
         untested.append(UntestedCauses(("tool_rotation",), "a side has no orientation"))
     if frames_open:
-        reason = "measured in a frame of its own: base and tool are unknown"  # plain: ok
+        reason = "externally measured: the frames of base and tool are unknown"
         untested.append(UntestedCauses((*FRAMES, "path_unit"), reason))
     return Problem(
         model=model,
@@ -290,7 +290,7 @@ def _arm_joints(run: Run) -> tuple[str, ...]:
 def _unknown_rates(run: Run, motion: Motion | None = None) -> Iterator[UntestedCauses]:
     """Yield that static poses show nothing of time, and which joints of a log have unknown accelerations."""
     if not run.timed:
-        yield UntestedCauses(TIME, "still poses have no time")
+        yield UntestedCauses(TIME, "static poses have no time")
     elif motion is not None:
         moves = np.fmax.reduce(motion.value, axis=1) - np.fmin.reduce(motion.value, axis=1) > AT_REST
         unknown = np.flatnonzero(moves & ~motion.second.any(axis=1)).tolist()

@@ -203,14 +203,18 @@ def _format_avoidable(diagnosis: Diagnosis) -> str:
     unit, listed = diagnosis.unit, select_causes(diagnosis.causes)
     before, removed = diagnosis.rms, diagnosis.rms - diagnosis.unexplained.rms
     little = "only " if removed < MIN_EXPLAINED * before else ""
-    amount = "next to nothing" if removed < NOTHING * before else f"{little}{format_amount(removed, unit)}"
+    amount = f"{little}{format_amount(removed, unit)}"
+    if removed < NOTHING * before:
+        amount = f"less than {100.0 * NOTHING:g} %"
     amounts = f"{amount} of {format_amount(before, unit)} rms"
     undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
     if not listed:
         return f"{amounts} is explained: {undecided}"
     conditions = text.join_list([build_remedy(cause).conditional() for cause in listed])
     return "; ".join(
-        filter(None, (f"{amounts} would go if {conditions}", _format_more(diagnosis, listed), undecided))
+        filter(
+            None, (f"{amounts} would be removed if {conditions}", _format_more(diagnosis, listed), undecided)
+        )
     )
 
 

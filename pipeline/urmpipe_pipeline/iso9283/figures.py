@@ -134,8 +134,8 @@ def speed_figure(path: CutPath) -> Figure:
     return Figure(
         "Speed along the path",
         "The speed of each cycle, their mean and the commanded speed over the length of the command."
-        " Diamonds: the middle of each straight leg with a constant commanded speed, on whose middle half AV,"
-        " RV and FV rest. Dotted: corners.",
+        " Diamonds: the middle of each straight leg with a constant commanded speed; AV, RV and FV are"
+        " evaluated on its middle half. Dotted: corners.",
         f"Speed of {format_count(len(path.speed), 'cycle')} over a path of {format_amount(path.total, 'm')}."
         f" {legs or 'No leg is judged'}.",
         (View("Speed along the path", (panel,)),),

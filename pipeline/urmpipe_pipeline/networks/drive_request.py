@@ -20,6 +20,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.errors import (
     Finding,
+    Hint,
     NetworkError,
     OptionError,
     format_unknown_name,
@@ -130,7 +131,10 @@ class DriveRequest:
         if self.law not in LAWS:
             yield Finding(format_unknown_name(str(self.law), LAWS), parameter="law")
         elif self.law != "uniform" and self.duration is None:
-            yield Finding("found without a duration, allowed: with one", parameter="law")
+            hints = (Hint("duration", None, "gives one"),)
+            yield Finding(
+                "found without a duration, allowed: only with a duration", parameter="law", hints=hints
+            )
         if isinstance(self.restarts, Integral) and self.restarts > MAX_STARTS:
             yield Finding(
                 parameter="restarts", found=format_value(self.restarts), allowed=f"{MAX_STARTS} at most"

@@ -54,7 +54,7 @@ def mobility_facts(moves: Mobility) -> Iterator[Fact]:
     yield Fact("Redundant", redundant_words(moves), "their loss would set nothing free")
     spins = ", ".join(moves.passive)
     yield Fact(
-        "Idle spins", spins, "they turn about the line through two global joints and move nothing else"
+        "Passive rotations", spins, "they turn about the line through two global joints and move nothing else"
     )
     if moves.special:
         said = f"mobility {moves.mobility} here, {moves.nearby} at assembled configurations nearby"
@@ -133,7 +133,7 @@ def mobility_table(moves: Mobility) -> Table:
     if moves.redundant:
         rows.append(("redundant", Value(len(moves.redundant)), redundant_words(moves)))
     if moves.passive:
-        rows.append(("idle spins", Value(len(moves.passive)), ", ".join(moves.passive)))
+        rows.append(("passive rotations", Value(len(moves.passive)), ", ".join(moves.passive)))
     if moves.special:
         rows.append(("mobility nearby", Value(moves.nearby), "a special configuration: less moves nearby"))
     return table_of("Mobility", {"quantity": "", "value": "Value", "about": "Description"}, rows, brief=True)

@@ -87,7 +87,7 @@ def headline(result: NetworkResult) -> str:
     if moves is None:
         return f"{result.name}: {found}"
     said = f"{result.name}: {found}, a {moves.kind} of mobility {moves.mobility}"
-    said += f", {format_count(len(moves.passive), 'idle spin')} of it" if moves.passive else ""
+    said += f", {format_count(len(moves.passive), 'passive rotation')} of it" if moves.passive else ""
     if moves.kutzbach == moves.mobility:
         return said
     count = len(moves.redundant)

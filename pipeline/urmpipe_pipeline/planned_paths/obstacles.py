@@ -58,7 +58,7 @@ def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Infeasibility]:
     """
     grid, s, names = joints.grid, joints.s, joints.chain.coordinates
     for first, last in find_true_runs(~grid.reached):
-        along = f"; so it is along {s[last] - s[first]:.3g} m" if last > first else ""
+        along = f"; this holds for {s[last] - s[first]:.3g} m of the path" if last > first else ""
         yield _obstacle(joints, law, float(s[first]), "unreachable", f"{grid.reasons[first]}{along}")
     for jump in grid.jumps:
         moved = ", ".join(f"{one.joint} by {format_rounded(one.step, one.unit)}" for one in jump.joints)
@@ -82,7 +82,7 @@ def too_slow(joints: PathJoints, law: TimeLaw, usage: LimitUtilisation, factor: 
     Source: [Iso9283]_ section 4, step 18.
     """
     name = joints.chain.coordinates[usage.joint]
-    words = f"{name} allows {100.0 * factor:.2g} % of the speed, allowed: {100.0 * WORTH_MOVING:g} % or more"
+    words = f"{name} limits the speed to {100.0 * factor:.2g} %, allowed: {100.0 * WORTH_MOVING:g} % or more"
     return _obstacle(joints, law, usage.s, "too-slow", words, name)
 
 

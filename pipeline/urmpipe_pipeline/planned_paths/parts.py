@@ -29,9 +29,9 @@ Cells = Callable[[int], Cell]
 
 def facts(plan: PlannedPath) -> Iterator[Fact]:
     """Yield how long the path is and takes, by which law, what limits the arm, and what is in its way."""
-    yield from (Fact("In the way", obstacle_words(one)) for one in plan.infeasibilities[:MANY])
+    yield from (Fact("Infeasible", obstacle_words(one)) for one in plan.infeasibilities[:MANY])
     if (more := len(plan.infeasibilities) - MANY) > 0:
-        yield Fact("In the way", f"and {more} more")
+        yield Fact("Infeasible", f"and {more} more")
     stops_often = len(plan.path.stop_row) == len(plan.rows) > 2  # as where the name of a radius is misspelt
     yield Fact("Rows", _rows_words(plan), brief=stops_often)
     yield Fact("Length", f"{plan.path.total:.6f} m")

@@ -80,8 +80,8 @@ def _read_document(store: Store) -> dict[str, Any]:
     if version != LAYOUT_VERSION:
         writer = "a newer" if is_newer else "an older"
         raise store.error(
-            f"found layout version {version}, allowed: {LAYOUT_VERSION}; {writer} urmpipe wrote it:"
-            f" make it again{_format_command(document)}"
+            f"found layout version {version} (of {writer} urmpipe), allowed: {LAYOUT_VERSION};"
+            f" write it again{_format_command(document)}"
         )
     if store.checksum != checksum(store.metadata):
         raise store.error("found damaged metadata (by their checksum), allowed: what urmpipe wrote")
@@ -93,9 +93,9 @@ def _format_command(document: dict[str, Any]) -> str:
     try:
         provenance = document["result"]["provenance"]
         inputs = " ".join(shell_quote(file["name"]) for file in provenance["inputs"])
-        return f": urmpipe {provenance['command']} {inputs} and its options"
+        return f": urmpipe {provenance['command']} {inputs} with the same options"
     except (KeyError, TypeError):
-        return " from what it was made of"
+        return " from its input files"
 
 
 def _array_reader(store: Store, lazy: bool, document: Mapping[str, Any]) -> ArrayReader:
@@ -307,9 +307,8 @@ class Store:
             return reader.store(store=entries[0])
         except (RuntimeError, ValueError) as error:
             raise self.error(
-                "found a recording that was cut off (no footer), allowed: a whole one;"
-                " what is left of it can be looked at after:"
-                f" rerun rrd optimize {shell_quote(self.path)} -o mended.rrd"
+                "found an incomplete recording (no footer), allowed: a complete one; write it again, or"
+                f" recover what is readable: rerun rrd optimize {shell_quote(self.path)} -o recovered.rrd"
             ) from error
 
     def _read_property(self, name: str) -> str | int | None:

@@ -81,10 +81,11 @@ def check_display(
         return
     files = " ".join(map(shell_quote, paths))
     raise ViewerError(
-        f"found no display (neither {' nor '.join(DISPLAYS)} is set), allowed: a copy on a computer with one,"
-        f" there: urmpipe view {files}; or a browser there, here: rerun --serve-web --bind {LOOPBACK}"
-        f" {files}, there: ssh -L 9090:{LOOPBACK}:9090 -L 9876:{LOOPBACK}:9876 THIS-HOST,"
-        " and the address that rerun prints"
+        f"found no display (neither {' nor '.join(DISPLAYS)} is set), allowed: a computer with a display;"
+        f" copy the files to it and run there: urmpipe view {files}; or use a browser there: 1. on this"
+        f" computer: rerun --serve-web --bind {LOOPBACK} {files}; 2. on the other one:"
+        f" ssh -L 9090:{LOOPBACK}:9090 -L 9876:{LOOPBACK}:9876 THIS-HOST;"
+        " 3. open there the address that rerun prints"
     )
 
 

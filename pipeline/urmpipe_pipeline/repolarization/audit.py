@@ -361,16 +361,15 @@ def _in_between_warning(log: JointLog, steps: _Steps) -> Iterator[LogWarning]:
     names, worst, row = steps.joint_names(log), steps.largest, int(steps.rows[0]) + 1
     distance = f"{abs(steps.sizes[worst]):.4g} rad"
     if len(steps.rows) == 1:
-        message = (
-            f"{names} lies between the ends of a wrap, {distance} off the line of its neighbours, where a"
-        )
-        hints: tuple[Hint, ...] = (Hint("repair", True, "puts it there"),)
-        yield LogWarning("in-between", f"{message} linear resampling left it", row, hints=hints)
+        message = f"{names} lies inside a wrap, as after linear resampling: {distance} off the line between"
+        hints: tuple[Hint, ...] = (Hint("repair", True, "moves it onto this line"),)
+        yield LogWarning("in-between", f"{message} its neighbours", row, hints=hints)
         return
-    message = f"{len(steps.rows)} samples of {names} lie between the ends of wraps, where a linear resampling"
-    message += " left them, off the line of their neighbours, at most that of"
-    message += f" {log.joints[steps.joints[worst]]} in row {steps.rows[worst] + 1} by {distance}"
-    yield LogWarning("in-between", message, row, hints=(Hint("repair", True, "puts them there"), *_LIST_ALL))
+    message = f"{len(steps.rows)} samples of {names} lie inside wraps, as after linear resampling: up to"
+    message += f" {distance} off the line between their neighbours"
+    message += f" ({log.joints[steps.joints[worst]]} in row {steps.rows[worst] + 1})"
+    hints = (Hint("repair", True, "moves them onto this line"), *_LIST_ALL)
+    yield LogWarning("in-between", message, row, hints=hints)
 
 
 def _ambiguous_warning(log: JointLog, steps: _Steps, speeds: FloatArray) -> Iterator[LogWarning]:
@@ -380,12 +379,12 @@ def _ambiguous_warning(log: JointLog, steps: _Steps, speeds: FloatArray) -> Iter
     durations = ns_to_seconds(log.t_ns[gaps[:, 0]] - log.t_ns[gaps[:, 1]])
     longest, row = int(np.argmax(durations)), int(gaps[0, 0]) + 1
     fastest = {log.joints[j]: speeds[steps.joints == j].max() for j in np.unique(steps.joints).tolist()}
-    joints = ", ".join(f"{name} (at {speed:.3g} rad/s)" for name, speed in fastest.items())
-    turned = f"{joints} can have turned by more than half a period"
+    joints = ", ".join(f"{name} (moving at {speed:.3g} rad/s)" for name, speed in fastest.items())
+    turned = f"{joints} may have turned by more than half a period"
     if len(gaps) == 1:
-        message = f"no value for {durations[0]:.6g} s before this row: {turned}; the nearest turn is taken"
+        message = f"no value for {durations[0]:.6g} s before this row: {turned}; the nearest turn is assumed"
         yield LogWarning("ambiguous-turn", message, row)
         return
-    message = f"in {len(gaps)} gaps without values {turned}; the longest, {durations[longest]:.6g} s,"
-    message += f" ends at row {gaps[longest, 0] + 1}; the nearest turns are taken"
+    message = f"in {len(gaps)} gaps without values {turned}; the longest gap, {durations[longest]:.6g} s,"
+    message += f" ends at row {gaps[longest, 0] + 1}; the nearest turns are assumed"
     yield LogWarning("ambiguous-turn", message, row, hints=_LIST_ALL)

@@ -44,7 +44,7 @@ def check_joint_names(names: Iterable[str], revolute: Iterable[str]) -> None:
     revolute = list(dict.fromkeys(revolute))
     unknown = [name for name in names if name and name not in revolute]
     if unknown:
-        allowed = f"joints that turn: {', '.join(revolute) or 'none'}"
+        allowed = f"revolute joints: {', '.join(revolute) or 'none'}"
         raise OptionError(Finding(parameter="interval", found=", ".join(unknown), allowed=allowed))
 
 

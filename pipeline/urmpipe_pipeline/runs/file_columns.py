@@ -104,11 +104,11 @@ def _lost_warnings(log: JointLog, exported: Sequence[LogColumn]) -> Iterator[Log
     """Yield warnings about parts of the file that are not in the recording."""
     empty = [column.name for column in log.columns if column not in exported]
     if empty:
-        message = f"{', '.join(empty)}: not ingested, since a column of them was empty"
+        message = f"{', '.join(empty)}: not exported, since a column of the same quantity was empty"
         yield LogWarning("not-exported", message)
     for inference in log.inferences:
         if inference.kind == "columns not used":
-            message = f"{inference.value}: not ingested ({inference.evidence}), so they cannot be exported"
+            message = f"{inference.value}: not used by ingest ({inference.evidence}), so not exported"
             yield LogWarning("not-exported", message)
     for warning in log.warnings:
         if warning.kind == REBUILT:

@@ -82,7 +82,7 @@ class Grid(NamedTuple):
         inside = mark_spans(*self._between(unresolved), unresolved[:, 2], result.shape)
         count = int(np.count_nonzero((inside & ~np.isnan(result)).any(axis=1)))
         result[inside] = np.nan
-        message = f"{count} grid samples lie inside steps of a joint that no motion explains"
+        message = f"{count} grid samples lie inside unexplained steps of a joint"
         return result, (LogWarning("step-left-open", f"{message} and have no value"),) if count else ()
 
     def find_steps(self, row_steps: IntArray) -> IntArray:

@@ -100,7 +100,7 @@ def inference_table(run: Run, *, brief: bool = False) -> Table:
     rows = [(each.what, each.value, each.evidence, Advice(hints=each.hints)) for each in inferences]
     if "robot" not in {each.what for each in inferences} and run.robot is not None:
         rows.append(("robot", run.robot.name, run.robot.description, Advice(hints=(Hint("robot"),))))
-    heads = {"what": "Subject", "found": "Found", "evidence": "Why", "alternatives": "Otherwise"}
+    heads = {"what": "Subject", "found": "Found", "evidence": "Why", "alternatives": "To change"}
     table = table_of(f"What was inferred ({len(rows)})", heads, rows, brief=brief, folded=True)
     *columns, last = table.columns
     return replace(table, columns=(*columns, replace(last, brief=False)))

@@ -227,7 +227,7 @@ def repeated_sample_warnings(motion: JointMotion, repeats: float, tsp: float) ->
     repeated = _is_repeated(motion.q)
     message = f"the joint values change only every {repeats:.3g} rows ({time * 1e3:.4g} ms)"
     message += f", {int(repeated.sum())} of {len(motion.q)} rows repeat the row before"
-    message += ": a slow controller polled fast?"
+    message += ": the log may be sampled faster than the controller runs"
     hints = (Hint("tsp", period, "takes each value once"),)
     return [LogWarning("repeated-samples", message, int(np.argmax(repeated)) + 2, hints=hints)]
 

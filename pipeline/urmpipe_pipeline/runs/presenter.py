@@ -71,7 +71,7 @@ def present(run: Run) -> Presentation:
 
 def _headline(run: Run) -> str:
     if not run.timed:
-        return format_count(run.log.rows, "still pose")
+        return format_count(run.log.rows, "static pose")
     return f"{format_count(run.log.rows, 'row')}, {format_audit(run)}"
 
 

@@ -120,8 +120,10 @@ def _initial_outlier_warning(robot: Chain | None, log: JointLog) -> list[LogWarn
     place = "as 0, 0, 0"
     if not np.isinf(distance):
         place = f"{text.format_quantity(distance, 'm')} from where the others have it"
-    message = f"{first} of {log.rows} recorded the TCP {place}: no tool or pose known yet?"
-    return [LogWarning(RECORDED_START, f"{message} They are kept and judged with the others", row=1)]
+    message = (
+        f"{first} of {log.rows} recorded the TCP {place}: the controller may not have known tool or pose"
+    )
+    return [LogWarning(RECORDED_START, f"{message} yet. They are kept and judged with the others", row=1)]
 
 
 class PoseDifference(NamedTuple):
@@ -419,7 +421,7 @@ def _find_clearly_nearer(
     arms = [_with_error(error, robot, log, poses) for (error,) in robot_edits(robot)]
     if has_motion and difference.distance > MAX_CALIBRATION_DISTANCE:  # a base explains less by chance
         base = poses.base(robot)
-        hint = Hint("base", base, "puts the arm there", robot=_catalogue_name(robot, "base"))
+        hint = Hint("base", base, "sets it", robot=_catalogue_name(robot, "base"))
         moved = replace(robot, base=from_offset(base))
         arms.append(_Alternative("on another base they agree", hint, moved, poses.q))
     count = len(log.joints)
@@ -445,8 +447,8 @@ def _with_error(error: Edit, robot: Chain, log: JointLog, poses: RecordedPoses) 
     arm = robot if error.robot is None else error.robot.placed(robot.base, robot.tool)
     (q,) = error.of_joints(np.arange(len(poses.q)), poses.q.T)
     if error.kind == "other_robot":
-        hint = Hint("robot", error.name, "takes it")
-        return _Alternative(f"those of {error.name} agree", hint, arm, q.T)
+        hint = Hint("robot", error.name, "selects it")
+        return _Alternative(f"the kinematics of {error.name} agree", hint, arm, q.T)
     names = " and ".join(log.joints[j] for j in error.joints)
     if error.kind == "joint_sign":
         hint = Hint("map", None, f"sets sign = -1 for {names}")

@@ -184,11 +184,11 @@ def _order(units: Sequence[str], arm: Chain | None, place: str) -> list[int]:
     """
     wanted = _units(arm) if arm else list(units)
     if arm is None and len(set(units)) > 1:
-        said = "found joints that turn and others that slide, allowed: both with their arm"
+        said = "found revolute and prismatic joints without a robot, allowed: both with a robot"
         raise LogError(Finding(said, place, hints=(Hint("robot", None, "tells their order"),)))
     if arm is not None and sorted(wanted) != sorted(units):
         found, allowed = (
-            f"{one.count('rad')} joints that turn and {one.count('m')} that slide" for one in (units, wanted)
+            f"{one.count('rad')} revolute and {one.count('m')} prismatic joints" for one in (units, wanted)
         )
         raise LogError(Finding(f"found {found}, allowed: {allowed}, as robot {arm.name} has", place))
     places = {unit: iter([j for j, one in enumerate(units) if one == unit]) for unit in set(units)}

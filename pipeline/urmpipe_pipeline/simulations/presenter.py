@@ -98,7 +98,7 @@ def _decisive(simulation: Simulation) -> Iterator[Fact]:
         end = f"t = {text.format_seconds(float(simulation.t[-1]))} s" if len(simulation.t_ns) else "its start"
         yield Fact("Recorded until", end)
     elif (worst := simulation.judged_worst) is not None:
-        yield Fact("Furthest out" if worst.out_of_tolerance else "Closest to the limit", Ref(worst.block))
+        yield Fact("Decisive block", Ref(worst.block))
         yield Fact("Decided by", format_delta_meter(worst), page=False)
         yield Fact(
             "Decided by",

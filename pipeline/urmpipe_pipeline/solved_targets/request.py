@@ -171,7 +171,8 @@ def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[Finding]:
     for joint, value in zip(arm.moving, start.tolist(), strict=True):
         if not joint.lower - TYPED <= value <= joint.upper + TYPED:
             unit = "rad" if joint.kind == "revolute" else "m"
-            degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
+            is_large = unit == "rad" and abs(value) > 2.0 * math.pi
+            degrees = f"; write {value:g}deg if degrees are meant" if is_large else ""
             limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
             found = f"{joint.name} = {value:g} {unit}"
             yield Finding(parameter="start", found=found, allowed=f"{limits}{degrees}")

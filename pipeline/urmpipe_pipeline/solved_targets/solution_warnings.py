@@ -145,7 +145,7 @@ def far_warnings(
     if far.any():
         said = (
             f"{format_rows(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name}"
-            f" reaches no farther than {reach:.4g} m: in mm?"
+            f" reaches no farther than {reach:.4g} m: they may be in mm"
         )
         hints = (Hint("unit", {"": "mm"}, "applies this"),) if of_file else ()
         yield LogWarning("too-far", said, allowed="m", hints=hints)

@@ -244,7 +244,7 @@ def _times(
 ) -> tuple[IntArray, int, tuple[Inference, ...], Sequence[LogWarning]]:
     """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say.
 
-    Of still poses their numbers stand for times.
+    Of static poses their numbers stand for times.
     """
     if content.still:
         return np.arange(content.rows, dtype=np.int64) * ROW_NS, 0, (), ()

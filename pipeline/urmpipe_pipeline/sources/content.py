@@ -42,7 +42,7 @@ class Content:
         numbers: Their numbers, by table.
         clock: Times of the rows in [ns] on the file's clock, shape (n,); None without one.
         rows: How many rows there are.
-        still: Whether they are still poses.
+        still: Whether they are static poses.
         roles: The columns, without those that could not be joined.
         inferences: What was found out while reading the times and joining.
         warnings: What was left out, and what a person should know about the times.

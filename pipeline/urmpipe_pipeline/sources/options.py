@@ -15,7 +15,7 @@ from urmpipe_models.measure_units import compatible_units, quantity_to_si
 
 COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
 UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
-INTERVALS = "two ends for all joints that turn, or ends by joint, such as q1=-180:180"
+INTERVALS = "two ends for all revolute joints, or ends by joint, such as q1=-180:180"
 
 GivenInterval: TypeAlias = tuple[float | str, float | str]
 """LOW and HIGH of a joint: numbers in the file's own unit, or both angles as texts with units."""
@@ -50,7 +50,7 @@ class ReadOptions:
             a table that holds both what was asked for and what was done.
         repair: Whether samples that a linear resampling left on a wrap are put on the line through their
             neighbours.
-        poses: Whether the rows are still poses, which no motion joins: a clock of theirs is a label.
+        poses: Whether the rows are static poses, which no motion joins: a clock of theirs is a label.
         measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of
             its own, and behind them of its orientation, if it was.
         shared: Whether they hold for several logs: the unit of a column or the interval of a joint that this

@@ -44,7 +44,7 @@ class Plan:
         roles: The columns that matter.
         units: Units given by the user, by the column's number; by 0 that of every angle.
         time_file: Index of the table that holds the times of the others, if one does nothing else.
-        poses: Whether the rows are still poses; None where they are to tell.
+        poses: Whether the rows are static poses; None where they are to tell.
     """
 
     tables: Tables

@@ -1,4 +1,4 @@
-"""Rows that are still poses: calibration grids, random configurations, points measured one by one.
+"""Rows that are static poses: calibration grids, random configurations, points measured one by one.
 
 No motion joins them, so a clock of theirs is a label. They are known by their steps: no joint makes them in
 the time that is assumed, and they go on in no direction. A motion is smooth, however coarse its clock.
@@ -24,10 +24,10 @@ from urmpipe_pipeline.sources.units.unit_evidence import FASTEST, peak
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 STEP = FASTEST * PAPER_PERIOD
-"""The median step of still poses, in [rad] or [m], is larger: none is made in the period that is assumed."""
+"""The median step of static poses, in [rad] or [m], is larger: none is made in the period that is assumed."""
 
 TURNED = 0.8
-"""Still poses change their steps by this share of them at least: of a motion with n samples in its shortest
+"""Static poses change their steps by this share of them at least: of a motion with n samples in its shortest
 period it is 2 sin(pi / n), of random configurations 1.4 or more."""
 
 TURNING = 0.75
@@ -47,7 +47,7 @@ SAMPLED = 4000
 
 
 def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers:
-    """Return numbers as still poses without a clock, if the user says so or they show it; else as they are.
+    """Return numbers as static poses without a clock, if the user says so or they show it; else as they are.
 
     Args:
         plan: What is read: `poses` says whether they are, or None where the rows are to tell.
@@ -60,12 +60,12 @@ def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers
     clock = plan.clock.columns
     moving = Hint("time", clock[0].called) if clock else Hint("period")
     hints = () if plan.poses else (replace(moving, effect="reads them as a motion"),)
-    found = Inference("rows", "still poses", why, hints=hints)
+    found = Inference("rows", "static poses", why, hints=hints)
     return replace(numbers, clock=None, texts=(), still=True, inferences=(found,), warnings=())
 
 
 def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
-    """Return why the rows of a table are still poses; empty if they are not, or it cannot be told."""
+    """Return why the rows of a table are static poses; empty if they are not, or it cannot be told."""
     if plan.poses is None and _written_untimed(plan):
         return "urmpipe wrote them without times"
     joints = [columns.index(joint) for joint in plan.roles.joints if joint in columns]
@@ -93,7 +93,7 @@ def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
 
 
 def _written_untimed(plan: Plan) -> bool:
-    """Return whether urmpipe wrote joints without times: it does so of still poses alone."""
+    """Return whether urmpipe wrote joints without times: it does so of static poses alone."""
     known, clock = plan.tables.known, plan.clock
     named = any(one.evidence == GIVEN for one in clock.inferences)  # left out on request
     return known is not None and known.own and bool(plan.roles.joints) and not (clock.columns or named)

@@ -77,7 +77,7 @@ class Clock:
 
     @property
     def as_label(self) -> Clock:
-        """The same as what still poses have for one: columns whose times are not read."""
+        """The same as what static poses have for one: columns whose times are not read."""
         return Clock(self.columns, inferences=self.inferences[:1])
 
     @property
@@ -223,8 +223,8 @@ def unused_period(keyword: str) -> LogWarning:
 
 
 def unused_for_poses(given: Mapping[str, object]) -> list[LogWarning]:
-    """Return a warning for each keyword with a value, all about motions, since the rows are still poses."""
-    said = "no effect: the rows are still poses, which have no time"
+    """Return a warning for each keyword with a value, all about motions, since the rows are static poses."""
+    said = "no effect: the rows are static poses, which have no time"
     return [LogWarning("not-for-poses", said, parameter=name) for name, value in given.items() if value]
 
 

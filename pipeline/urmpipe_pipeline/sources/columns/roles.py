@@ -318,7 +318,7 @@ def _with_rest(
     pairs += [(one, same_quantities(one, rest)) for one in (roles.rates, roles.accelerations, roles.rotation)]
     passed = _passed_over(pairs, used)
     hints = _sides_of(passed[0]) if passed else ()
-    said += [replace(one, hints=hints) for one in not_used(rest, "no role is known for them")]
+    said += [replace(one, hints=hints) for one in not_used(rest, "unknown role")]
     warnings = about_odd_rows(rest, layouts) or ([] if roles.position else about_tcp(rest))
     return replace(roles, inferences=tuple(said), warnings=(*_about_passed_over(passed, roles), *warnings))
 

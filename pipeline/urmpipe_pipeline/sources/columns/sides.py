@@ -35,7 +35,9 @@ def of_side(columns: Sequence[Column], side: tuple[str, str] | None, file: str) 
         count = Counter(one for column in columns for one in column.words if one.isalpha())
         shared = [name for name, columns_with in count.most_common(SHARED) if columns_with > 1]
         allowed = (
-            f"a word of them, such as {', '.join(shared)}" if shared else "a table with names of columns"
+            f"words in the names of columns, such as {', '.join(shared)}"
+            if shared
+            else "a table with names of columns"
         )
         with_word = "" if word == REST else f"with the word {word} and "
         found = f"found no column {with_word}without {other} in its name"

@@ -80,7 +80,7 @@ class Numbers:
         texts: The cells of the clock's columns, if they are text.
         inferences: What the clock's rows told about it.
         warnings: What a person should know about it.
-        still: Whether the rows are still poses, and a clock of theirs was a label.
+        still: Whether the rows are static poses, and a clock of theirs was a label.
     """
 
     values: FloatArray

@@ -32,7 +32,7 @@ ORDERS: Mapping[Role, tuple[str, str]] = {
 """What stands before the name of a joint and behind its unit, by the role of a column."""
 
 POINT = [("px", "m"), ("py", "m"), ("pz", "m"), ("rz", "rad"), ("ry", "rad"), ("rx", "rad")]
-"""The tool centre point of still poses on their grid."""
+"""The tool centre point of static poses on their grid."""
 
 RECORDED = "recorded_"
 """What stands before the name of a column that the log recorded itself."""
@@ -78,7 +78,7 @@ def grid_roles(head: Head) -> dict[int, Role]:
     """Return what the columns of a run on its grid hold, by their index; nothing of other tables.
 
     Behind t stand the joints, their rates and their second derivatives, each with its unit in SI: no other
-    program writes all three so. Behind the number of a still pose stand the joints and the point of the tool.
+    program writes all three so. The number of a static pose precedes the joints and the point of the tool.
     """
     if len(head) < 2 or head[0] not in (("t", "s"), ("row", "")):
         return {}
