@@ -43,7 +43,7 @@ def test_the_demo_goes_the_whole_way(demo: tuple[Path, str]) -> None:
         "matlab",
         "solidworks",
     ]
-    assert fourth == "  counter_rotating: module 3 (phi3) counter-rotates: rms 416.57 mm -> 0.0001 mm"
+    assert fourth == "  counter_rotating: module 3 (phi3) has a reversed sign: rms 416.57 mm -> 0.0001 mm"
     assert logs == f"Logs:      {LOGS}  (try the commands with them)"
     assert report == f"Report:    {Path('urmpipe-demo', 'report.html')}  (open it in any browser)"
     assert recording.startswith(f"Recording: {Path('urmpipe-demo', 'demo.rrd')}  (open it: ")

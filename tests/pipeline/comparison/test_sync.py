@@ -28,8 +28,8 @@ Motion = Callable[[FloatArray], FloatArray]
 
 JOINTS = tuple(f"q{k}" for k in range(1, 7))
 ALLOWED = (
-    "allowed: one motion that does not repeat itself, half of it in both; --sync start aligns the"
-    " first samples; --sync SECONDS sets the offset"
+    "allowed: one motion that does not repeat itself, at least half of it on both sides; --sync start aligns"
+    " the first samples; --sync SECONDS sets the offset"
 )
 CLEAN = 1e-5
 """In [s]: a fiftieth of the tenth of a period of 5 ms that is asked for. Lines between samples 5 to 10 ms
@@ -209,7 +209,7 @@ def test_the_standard_error_is_that_of_least_squares() -> None:
     assert np.mean(found) == pytest.approx(theory, rel=0.12)
 
 
-LOW = "log.csv: sync (--sync): auto: found low similarity of the "
+LOW = "log.csv: sync (--sync): auto: found too low a similarity of the "
 
 
 @pytest.mark.slow

@@ -36,8 +36,11 @@ def test_the_headline_says_what_moves_and_why_not_as_kutzbach_counts() -> None:
         "bars: assembled, a mechanism of mobility 1 (Kutzbach -2: 3 constraints are redundant)"
     )
     assert present(found("bars", every=True)).headline.startswith("bars: at least 2 assemblies, a mechanism")
-    assert present(found("rssr")).headline == "rssr: assembled, a mechanism of mobility 2, 1 idle spin of it"
-    assert told("rssr")["Idle spins"] in found("rssr").network.body_names
+    assert (
+        present(found("rssr")).headline
+        == "rssr: assembled, a mechanism of mobility 2, 1 passive rotation of it"
+    )
+    assert told("rssr")["Passive rotations"] in found("rssr").network.body_names
 
 
 def test_one_that_does_not_close_says_what_and_by_how_much() -> None:

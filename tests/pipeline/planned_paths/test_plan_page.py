@@ -77,7 +77,7 @@ def test_every_plan_has_a_page(name: str) -> None:
     drawings = [block for block in page.parts[0].blocks if isinstance(block, Drawing)]
     assert len(drawings) == (plan.robot is not None)
     if plan.infeasibilities:
-        assert "In the way" in [fact.name for fact in page.banner.facts]
+        assert "Infeasible" in [fact.name for fact in page.banner.facts]
         joints = next(one for _, one in page.figures if one.title == "Joints over time")
         lines = [one["label"]["text"] for one in joints.spec["layout"]["shapes"] if one["yref"] == "paper"]
         wanted = [f"{one.kind}, row {one.row}" for one in plan.infeasibilities]

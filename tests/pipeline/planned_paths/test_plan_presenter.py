@@ -151,7 +151,7 @@ def test_what_is_in_the_way_is_headline_fact_check_and_event(kind: ObstacleKind,
     cannot = f"path: {there(plan.robot).name} cannot run {way}"
     first = plan.infeasibilities[0]
     assert shown.headline == f"{cannot}: {first.kind} at t = {first.t:.3f} s (row {first.row})"
-    assert [fact.value for fact in shown.facts if fact.name == "In the way"] == words
+    assert [fact.value for fact in shown.facts if fact.name == "Infeasible"] == words
     assert not {fact.name for fact in shown.body.facts} & {"Limits", "Reduced"}  # of speeds that are not run
     assert not any(isinstance(fact.value, Value) and fact.value.limit for fact in shown.body.facts)
     found: dict[str, str] = {}
@@ -178,7 +178,7 @@ def test_what_is_in_the_way_is_headline_fact_check_and_event(kind: ObstacleKind,
 def test_of_many_things_in_the_way_the_rest_is_counted() -> None:
     plan = FAILED["unreachable"]()
     plan = replace(plan, infeasibilities=plan.infeasibilities[:1] * (MANY + 3))
-    told = [fact.value for fact in present(plan).facts if fact.name == "In the way"]
+    told = [fact.value for fact in present(plan).facts if fact.name == "Infeasible"]
     assert (len(told), told[-1]) == (MANY + 1, "and 3 more")
 
 

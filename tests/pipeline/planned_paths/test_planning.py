@@ -172,7 +172,7 @@ def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
     (obstacle,) = plan.infeasibilities
     assert (plan.verdict, plan.speed_factor, plan.duration) == ("fail", 1.0, free.duration)
     assert (obstacle.kind, obstacle.joint) == ("too-slow", "shoulder_pan_joint")
-    assert obstacle.message == "shoulder_pan_joint allows 0.4 % of the speed, allowed: 1 % or more"
+    assert obstacle.message == "shoulder_pan_joint limits the speed to 0.4 %, allowed: 1 % or more"
     sample = int(np.abs(joints_of(free).qd[:, 0]).argmax())
     assert obstacle.t == pytest.approx(free.t[sample], abs=free.tsp)
     assert obstacle.row == free.row[sample]
@@ -234,7 +234,7 @@ def test_samples_out_of_reach_between_rows_are_told() -> None:
     (obstacle,) = plan.infeasibilities
     assert (obstacle.kind, obstacle.row, obstacle.joint) == ("unreachable", 1, "")
     away = "the wrist is 0.1332 m from axis 1, allowed: at least 0.1333 m"
-    assert obstacle.message == f"{away}; so it is along 0.266 m"
+    assert obstacle.message == f"{away}; this holds for 0.266 m of the path"
     s = plan.motion.s[~plan.reached]
     assert s[-1] - s[0] == pytest.approx(0.266, abs=2 * 0.5 * plan.tsp)  # a sample at each end
 

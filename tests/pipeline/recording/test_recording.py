@@ -308,7 +308,7 @@ def test_the_recording_of_a_simulation_is_compared_as_it_is(
     refused = refusal(OptionError, load_runs, [path], block=["a", "b"])
     assert refused.startswith("block (--block): found 'a'")
     refused = refusal(OptionError, load_runs, [path], block=["chain", "log", "chain"])
-    assert "with 1 simulation, allowed: a block" in refused
+    assert "with 1 simulation, allowed: one block" in refused
     assert load_comparison(path) is None
 
 

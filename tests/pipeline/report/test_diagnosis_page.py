@@ -20,7 +20,10 @@ def test_its_parts_stand_where_they_are_read_first(comparison: Comparison) -> No
     said = there(result.worst.diagnosis).summary
     assert [fact.value for fact in page.banner.facts if fact.leads] == [said]  # seen without scrolling
     (part,) = (one for one in page.parts[0].parts if one.title == result.worst.name)
-    assert (part.facts[0].name, part.facts[0].value.split(" (")[0]) == ("Meaning", "count module 3")
+    assert (part.facts[0].name, part.facts[0].value.split(" (")[0]) == (
+        "Remedy",
+        "reverse the sign of module 3",
+    )
     assert said not in [fact.value for fact in part.facts]
     assert not part.folded
     assert isinstance(part.blocks[0], Figure)

@@ -110,4 +110,4 @@ def test_real_logs_differ_from_any_other_robot(file: str, shared: Path) -> None:
     for other in [] if "10rows" in file else sorted({*SIX} - {robot}):
         (warning,) = recorded_tcp_warnings(load_robot(other), run.log)
         assert [(hint.parameter, hint.value) for hint in warning.hints] == [("robot", robot)], other
-        assert f": those of {robot} agree within " in warning.message
+        assert f": the kinematics of {robot} agree within " in warning.message

@@ -81,8 +81,8 @@ def test_joints_that_slide_stand_in_the_order_of_the_arm(make_simulation: MakeSi
     assert run.log.joint_units == ("rad", "m", "rad")
     assert "tells their order" in refusal(LogError, run_of_block, both, "a")
     assert refusal(LogError, run_of_block, make_simulation(50), "log", SLIDES) == (
-        "log-to-delta: found 6 joints that turn and 0 that slide, allowed: 2 joints that turn and 1 that"
-        " slide, as robot slides has"
+        "log-to-delta: found 6 revolute and 0 prismatic joints, allowed: 2 revolute and 1 prismatic joints,"
+        " as robot slides has"
     )
 
 

@@ -48,7 +48,7 @@ def test_a_meter_in_doubt_says_so_where_its_verdict_stands(make_simulation: Make
     shown = present(replace(simulation, verdicts=(doubted,)))
     assert shown.verdict == "fail"
     assert shown.headline == f"meter of {simulation.name} within tolerance, but in doubt"
-    assert [one.name for one in shown.facts if one.brief] == ["Closest to the limit", "Decided by"]
+    assert [one.name for one in shown.facts if one.brief] == ["Decisive block", "Decided by"]
     section = block(shown, "meter")
     assert facts(section)["In doubt"] == "log.q was nan; it ended early"
     assert section.checks[0].words.endswith("; log.q was nan; it ended early")

@@ -108,7 +108,7 @@ def test_targets_in_mm_are_told_from_those_out_of_reach() -> None:
     (found,) = far_warnings(arm, Targets(position), np.arange(1, 5), reached, of_file=True)
     assert (found.kind, found.allowed) == ("too-far", "m")
     assert found.message == (
-        "row 1: up to 131.548 m from the base, while arm6 reaches no farther than 0.4001 m: in mm?"
+        "row 1: up to 131.548 m from the base, while arm6 reaches no farther than 0.4001 m: they may be in mm"
     )
     (hint,) = found.hints
     assert (hint.parameter, hint.value) == ("unit", {"": "mm"})

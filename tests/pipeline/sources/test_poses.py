@@ -103,7 +103,7 @@ def test_the_evidence_and_what_reads_the_rows_as_a_motion_are_told(read: Read) -
         (found,) = (one for one in log.inferences if one.what == "rows")
         steps = np.abs(np.remainder(np.diff(q[:-1], axis=0) + np.pi, 2 * np.pi) - np.pi).max()
         said = f"the joints step by up to {steps:.2g} rad from row to row, in no direction"
-        assert (found.value, found.evidence) == ("still poses", why.format(said))
+        assert (found.value, found.evidence) == ("static poses", why.format(said))
         assert found.alternatives() == otherwise
     assert read(table(q), unit="rad", period=0.01).timed
     assert read(table(q, STEPS["seconds apart"][:18]), unit="rad", time="time").timed

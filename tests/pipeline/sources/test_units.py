@@ -335,7 +335,7 @@ def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None
         f"position: found 3, {columns}",
         "unit (--unit): found 3, allowed: a unit of every angle, such as deg, or units by column, such as"
         " q1=deg",
-        "interval (--interval): found 2.0, allowed: two ends for all joints that turn, or ends by joint, such"
+        "interval (--interval): found 2.0, allowed: two ends for all revolute joints, or ends by joint, such"
         " as q1=-180:180",
     ]
 
