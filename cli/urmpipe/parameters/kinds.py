@@ -419,7 +419,7 @@ def file_or(metavar: str, typed: str, further: str, classes: Sequence[str], comp
     Args:
         metavar: The value in the help.
         typed: The names and files.
-        further: The objects of Python, behind those.
+        further: The objects of Python, in the sentence after those.
         classes: Their classes.
         complete: The completion.
     """

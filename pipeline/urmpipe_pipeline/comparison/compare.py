@@ -273,9 +273,7 @@ def check_static_poses(reference: Run, runs: Sequence[Run], options: CompareOpti
 
 def _no_motion(run: Run, motion: Run) -> Finding:
     if run.log.source == SOLVED:
-        message = (
-            "found targets without times, which are not a motion, allowed: a log or a path of its own times"
-        )
+        message = "found targets without times, which are not a motion, allowed: a log or a path with times"
         return run_finding(run, message, Hint("tsp", None, "sets their sample period", call="ik"))
     message = f"found static poses, but {motion.name} is a motion"
     hint = Hint("poses", True, "reads the rows of every log as static poses")

@@ -101,9 +101,11 @@ def parse_tolerance(
         if ambiguous := readings(value, unit) if math.isfinite(number) else ():
             prefix = f"{kinds[0]}=" if sign else ""
             possible = [
-                one for one in ambiguous if _is_in_range(kinds[0], quantity_to_si(one, WRITTEN[unit]), zero)
+                f"{prefix}{reading}"
+                for reading in ambiguous
+                if _is_in_range(kinds[0], quantity_to_si(reading, WRITTEN[unit]), zero)
             ]
-            allowed = f"a unit: {' or '.join(f'{prefix}{reading}' for reading in possible)}"
+            allowed = f"a unit: {' or '.join(possible)}"
             errors.append(Finding(parameter=parameter, found=part, allowed=allowed))
         fits = _is_in_range(kinds[0], number, zero)
         twice = " twice" if fits and not tolerance.keys().isdisjoint(kinds) else ""
@@ -315,7 +317,7 @@ def format_verdict(comparison: Comparison) -> str:
     """Return the logs out of tolerance, or that all are within, the reference, and the assumptions."""
     failed = [run for run in comparison.runs if run.verdict == "fail"]
     total = len(comparison.runs) + len(comparison.failed_logs)
-    is_out = any(one.verdict == "fail" for run in failed for one in run.all_statistics)
+    is_out = any(statistics.verdict == "fail" for run in failed for statistics in run.all_statistics)
     verdict = "within tolerance" if not failed else "out of tolerance" if is_out else "not fully judged"
     message = f"{_who(failed or comparison.runs, total)} {verdict} against {comparison.reference.name}"
     message += f"{_points(comparison)}{_part(comparison)}{_clocks(comparison)}"
