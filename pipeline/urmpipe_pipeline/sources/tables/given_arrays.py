@@ -137,10 +137,11 @@ def _numbers(parameter: str, given: Any, allowed: str) -> FloatArray:
 def _unfit(parameter: str, given: Any, allowed: str) -> OptionError:
     """Return the error about what is no array of a shape."""
     shape = getattr(given, "shape", None)
-    what = format_value(given)
+    found = format_value(given)
     if isinstance(given, np.ndarray):
-        what = "a complex array" if given.dtype.kind == "c" else "an array"
-    found = what if shape is None else f"{what} of shape {tuple(shape)}"
+        found = "a complex array" if given.dtype.kind == "c" else "an array"
+    if shape is not None:
+        found += f" of shape {tuple(shape)}"
     return OptionError(Finding(parameter=parameter, found=found, allowed=allowed))
 
 
