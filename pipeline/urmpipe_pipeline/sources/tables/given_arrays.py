@@ -137,12 +137,12 @@ def _numbers(parameter: str, given: Any, allowed: str) -> FloatArray:
 def _unfit(parameter: str, given: Any, allowed: str) -> OptionError:
     """Return the error about what is no array of a shape."""
     shape = getattr(given, "shape", None)
-    found = format_value(given)
+    text = format_value(given)
     if isinstance(given, np.ndarray):
-        found = "a complex array" if given.dtype.kind == "c" else "an array"
+        text = "a complex array" if given.dtype.kind == "c" else "an array"
     if shape is not None:
-        found += f" of shape {tuple(shape)}"
-    return OptionError(Finding(parameter=parameter, found=found, allowed=allowed))
+        text += f" of shape {tuple(shape)}"
+    return OptionError(Finding(parameter=parameter, found=text, allowed=allowed))
 
 
 def _refuse_lengths(arrays: dict[str, Array | None]) -> None:
