@@ -101,7 +101,7 @@ def test_what_cannot_be_read_back_is_named(tmp_path: Path) -> None:
     path = write_recording(run, tmp_path / "one.rrd")
     path.write_bytes(path.read_bytes()[:-20])
     said = refusal(OutputError, verify, path, Path("name.rrd"), encode(run), "{}")
-    assert said.startswith("name.rrd: could not be read back: found a recording that was cut off")
+    assert said.startswith("name.rrd: could not be read back: found an incomplete recording")
 
 
 def test_what_could_not_be_read_back_is_not_written(tmp_path: Path) -> None:
