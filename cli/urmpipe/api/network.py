@@ -18,7 +18,7 @@ from urmpipe.parameters.shared import Reading
 from urmpipe.parameters.systems import DRIVES, NetworkCheck, NetworkDrive, NetworkSolve
 from urmpipe.public_functions import PathLike, public_function, raise_warnings
 from urmpipe.reading import map_files, resolve_reading
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, map_collecting_errors
+from urmpipe_models.errors import Finding, LogError, OptionError, map_collecting_errors
 from urmpipe_models.networks import file as network_file
 from urmpipe_models.networks.file import Network
 from urmpipe_pipeline.networks.drawing import network_svg
@@ -215,11 +215,7 @@ def _check_log_parameters(values: Mapping[str, Any]) -> None:
         if has_log and value is not None
     ]
     faults += [
-        Finding(
-            "found without a log, allowed: only with a log",
-            parameter=name,
-            hints=(Hint("log", None, "gives one"),),
-        )
+        Finding("found without a log, allowed: together with a log", parameter=name)
         for name, value in of_logs.items()
         if not has_log and value is not None and value is not False and value not in ({}, (), [])
     ]
