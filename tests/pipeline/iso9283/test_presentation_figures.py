@@ -95,8 +95,8 @@ def test_of_many_poses_the_worst_are_drawn(iso: IsoTest) -> None:
     drawing = figures.pose_drawing(replace(iso, criteria=criteria), poses)
     assert len(dots(ET.fromstring(drawing.svg))) == 3 * figures.MAX_DRAWN
     assert "12 worst of 50 poses" in drawing.alt
-    told = {int(number) for number in re.findall(r"pose (\d+): AP", drawing.alt)}
-    assert told == {k + 1 for k in np.argsort(-ap)[: figures.MAX_DRAWN].tolist()}
+    numbers = {int(number) for number in re.findall(r"pose (\d+): AP", drawing.alt)}
+    assert numbers == {k + 1 for k in np.argsort(-ap)[: figures.MAX_DRAWN].tolist()}
 
 
 def lengths(root: ET.Element, name: str) -> Iterator[float]:
