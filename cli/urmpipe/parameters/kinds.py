@@ -529,6 +529,14 @@ LAYOUT = Kind(
     _reader("layout"),
     words("table", "transposed", "flat:", "flat-by-joint:"),
 )
+SHEET = Kind("SHEET", "a sheet by name or number", _reader("sheet"))
+TOPIC = Kind("TOPIC", "a non-empty text", _reader("topic"))
+EPISODE = Kind("N|[COLUMN=]NAME", "an episode by number or name, or COLUMN=VALUE", _reader("episode"))
+ROWS = Kind(
+    "FIRST:LAST[,...]",
+    "rows from 1, both ends included, such as 2:-1 or 1:99,101:-1; -1 is the last",
+    _reader("rows"),
+)
 UNIT = Kind(
     "[COLUMN=]UNIT",
     "a unit of every angle, such as deg, or units by column, such as q1=deg",

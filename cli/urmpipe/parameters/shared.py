@@ -110,6 +110,22 @@ class LogReading(TextTable, total=False):
             " per sample [default: table].",
         ),
     ]
+    sheet: Annotated[str | int | None, _reading(kinds.SHEET, "Sheet of a workbook: name, or number from 1.")]
+    topic: Annotated[
+        str | None, _reading(kinds.TOPIC, "Topic of a bag, or of a table with the columns of several.")
+    ]
+    episode: Annotated[
+        str | int | None,
+        _reading(kinds.EPISODE, "Episode of a file of several: its number or name, or COLUMN=VALUE."),
+    ]
+    rows: Annotated[
+        str | None,
+        _reading(
+            kinds.ROWS,
+            "Rows to read, from 1, both ends included; negative ones count from the end: 2:-1 leaves out the"
+            " first.",
+        ),
+    ]
     skip_bad: Annotated[
         bool, _reading(kinds.FLAG, "Skip unreadable rows, at most 1 %.", default=False, decides=True)
     ]

@@ -29,7 +29,7 @@ from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
 
 IN_MAP = {  # options of reading that a map states
     *("decimal", "delimiter", "interval", "joints", "layout", "period"),
-    *("poses", "rotation", "source", "time", "unit"),
+    *("episode", "poses", "rotation", "rows", "sheet", "source", "time", "topic", "unit"),
 }
 NOT_IN_MAP = ("derivative", "repair", "skip_bad", "tsp")  # the others
 

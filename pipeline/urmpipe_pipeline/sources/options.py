@@ -15,6 +15,8 @@ from urmpipe_models.measure_units import compatible_units, quantity_to_si
 
 COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
 UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
+EPISODES = "an episode by number or name, or COLUMN=VALUE"
+ROWS = "rows from 1, both ends included, such as 2:-1 or 1:99,101:-1; -1 is the last"
 INTERVALS = "two ends for all revolute joints, or ends by joint, such as q1=-180:180"
 
 GivenInterval: TypeAlias = tuple[float | str, float | str]
@@ -31,6 +33,11 @@ class ReadOptions:
         decimal: Decimal sign, or point, comma.
         layout: What a row of the table is: "table" a sample, "transposed" a joint; of a flat array, sample by
             sample or joint by joint, "flat:N" or "flat-by-joint:N" with N numbers a sample.
+        sheet: Name or number (from 1) of the sheet of a workbook.
+        topic: Name of the topic of a bag, or what the names of its columns begin with in a table of several.
+        episode: The episode of a file of several: its number or name, or "COLUMN=VALUE".
+        rows: Data rows to read, from 1, both ends included; negative ones count from the last, -1: "2:-1", or
+            several such ranges, "1:99,101:-1".
         time: Name or number (from 1) of the time column; FILE:COLUMN of one in another file, with as many
             rows; "none" if there is none.
         joints: Names or numbers (from 1) of the joint columns, in the robot's order.
@@ -61,6 +68,10 @@ class ReadOptions:
     delimiter: str | None = None
     decimal: str | None = None
     layout: str | None = None
+    sheet: str | None = None
+    topic: str | None = None
+    episode: str | None = None
+    rows: str | None = None
     time: str | None = None
     joints: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
@@ -102,7 +113,9 @@ class ReadOptions:
             object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
         for name in ("signs", "offsets"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        object.__setattr__(self, "time", None if self.time is None else str(self.time))
+        for name in ("sheet", "episode", "time"):
+            value = getattr(self, name)
+            object.__setattr__(self, name, None if value is None else str(value))
         object.__setattr__(self, "unit", {str(column): unit for column, unit in self.unit.items()})
 
 
@@ -139,10 +152,19 @@ def is_interval(value: Any) -> bool:
     return any(_are(fits)(value) for fits in kinds) and len(value) == 2
 
 
+def _is_name(value: Any) -> bool:
+    return _is_column(value) and value != ""
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, str) and re.fullmatch(_ROWS, value) is not None
+
+
 def _is_layout(value: Any) -> bool:
     return isinstance(value, str) and re.fullmatch(_LAYOUTS, value) is not None
 
 
+_ROWS = r"(-?[1-9]\d*)?:(-?[1-9]\d*)?(,(-?[1-9]\d*)?:(-?[1-9]\d*)?)*"
 _LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
 _TEXT = (_is_word, "a non-empty text")
 _COLUMNS = (_are(_is_column), COLUMNS)
@@ -153,7 +175,11 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "delimiter": _TEXT,
     "decimal": _TEXT,
     "layout": (_is_layout, "table, transposed, flat:N or flat-by-joint:N, with N numbers a sample"),
-    "time": (lambda value: _is_column(value) and value != "", "a column by name or number, or FILE:COLUMN"),
+    "sheet": (_is_name, "a sheet by name or number"),
+    "topic": _TEXT,
+    "episode": (_is_name, EPISODES),
+    "rows": (_is_rows, ROWS),
+    "time": (_is_name, "a column by name or number, or FILE:COLUMN"),
     "joints": _COLUMNS,
     "names": (_are(_is_column), "a list of names, such as ['q1', 'q2']"),
     "signs": (_are(_is_number), "a list of 1 or -1, such as [1, -1]"),
