@@ -59,6 +59,7 @@ class MemoryTable:
         named: Whether its columns have names; without them they are known by number, from 1.
         path: The file that it was read from; None of an object in memory.
         inferences: What was found out about it.
+        applied: The reading options that its file was read by, such as "episode": they are done with.
     """
 
     name: str
@@ -66,6 +67,7 @@ class MemoryTable:
     named: bool = True
     path: Path | None = None
     inferences: tuple[Inference, ...] = ()
+    applied: tuple[str, ...] = ()
 
     @property
     def place(self) -> Path:

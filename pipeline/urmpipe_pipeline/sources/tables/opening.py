@@ -120,7 +120,7 @@ def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTa
     """Return a table as it is in memory, a file of typed columns or a program read, any other as text."""
     if isinstance(one, MemoryTable):
         return one
-    if (typed := read_typed(one)) is not None:
+    if (typed := read_typed(one, options)) is not None:
         return typed
     text = open_text(one, any_suffix=options.source is not None)
     program = read_program(text, options)

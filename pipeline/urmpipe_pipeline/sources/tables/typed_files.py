@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
+from urmpipe_models.errors import Finding, Hint, LogError
+from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 
 HEAD = 128
 """Bytes at the start of a file that tell what it is."""
 
 
-def read_typed(path: Path) -> MemoryTable | None:
+def read_typed(path: Path, options: ReadOptions) -> MemoryTable | None:
     """Return the table of a file of typed columns; None of any other file, which may be text.
+
+    Args:
+        path: The file.
+        options: Which part of a file of several to read: `episode`, `sheet`, `topic`.
 
     Raises:
         LogError: If the file is damaged, or holds no table of columns.
@@ -34,6 +42,26 @@ def read_typed(path: Path) -> MemoryTable | None:
 
         return read_numpy(path)
     return None
+
+
+def import_optional(library: str, path: Path, what: str) -> Any:
+    """Return a library of the extra `logs`.
+
+    Args:
+        library: Its module.
+        path: The file to be read.
+        what: What the file is: "an HDF5 file".
+
+    Raises:
+        LogError: If the library is not installed.
+    """
+    try:
+        return import_module(library)
+    except ImportError:
+        package = library.partition(".")[0].replace("_", "-")
+        hint = Hint("", effect='install it: pip install "urmpipe[logs]"')
+        found = Finding(file=str(path), found=what, allowed=f"{what} with {package} installed", hints=(hint,))
+        raise LogError(found) from None
 
 
 def _head(path: Path) -> bytes:
