@@ -12,9 +12,8 @@ from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import GAP, Inference, LogWarning, has_gap_after
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
-from urmpipe_pipeline.sources.clocks.chunks import Spread, spread_over_chunks
 from urmpipe_pipeline.sources.clocks.clock import Clock
-from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
+from urmpipe_pipeline.sources.clocks.rounded import are_many, behind_repeated, spread_repeated
 from urmpipe_pipeline.sources.tables.numbers import NO_TIME, SHOWN_FINDINGS, UNREADABLE, Numbers
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -29,18 +28,10 @@ SKIPPED = "skipped-row"
 MOST_SKIPPED = 0.01
 """Share of the rows that may be left out because they cannot be read."""
 
-FEW_REPEATS = 5
-MANY_REPEATS = 0.1
-"""More repeats than these few, and than this share of the rows, are one finding: the clock is too coarse.
-More steps backwards are as well: the column is no clock."""
-
-REBUILT = "clock-rebuilt"
-SPREAD = "clock-spread"
-"""The kinds of the warnings about stamps that several rows share."""
+REBUILT, SPREAD, REPEATED = "clock-rebuilt", "clock-spread", "repeated-time"
+"""The kinds of the warnings about times that several rows share: all of a coarse clock, many, single ones."""
 
 INCREASING = "times that increase from row to row"
-_TOO_COARSE = "found {now} again, as {rows} repeat a time: too coarse to rebuild a clock"
-_NO_CLOCK = "found {now} after {before}, as {rows} run backwards: no clock"
 
 SHOWN_GAPS = 10
 """Gaps that are told with their rows; the others are counted."""
@@ -82,51 +73,38 @@ def may_skip(numbers: Numbers) -> bool:
 
 
 def rebuilt(numbers: Numbers) -> Numbers:
-    """Return the numbers, with a regular clock where the file's is too coarse for its rows."""
+    """Return the numbers with a time of its own for each row where rows of the file share one.
+
+    A regular clock that is coarser than its rows is rebuilt; other rows that share a time are spread.
+    """
     times = numbers.clock
-    if times is None or times.min(initial=0) <= UNREADABLE:
+    if times is None or times.min(initial=0) <= UNREADABLE or np.diff(times).min(initial=1) != 0:
         return numbers
-    steps = np.diff(times)
-    clock = behind_repeated(times) if len(steps) and steps.min() == 0 else None
-    if clock is None:
+    if (clock := behind_repeated(times)) is not None:
+        period, resolution = f"{clock.period / 1e9:.9g} s", f"{clock.resolution / 1e9:.9g} s"
+        seen = f"times in steps of {resolution} cover {clock.resolution / clock.period:.4g} rows each"
+        found = Inference("clock", f"rebuilt with a period of {period}", seen, hints=EVEN)
+        warning = LogWarning(REBUILT, f"{seen}: a regular clock of {period} is used instead")
+        return _with_clock(numbers, clock.t_ns, found, warning)
+    spread = spread_repeated(times)
+    if spread is None:
         return numbers
-    period, resolution = f"{clock.period / 1e9:.9g} s", f"{clock.resolution / 1e9:.9g} s"
-    seen = f"times in steps of {resolution} cover {clock.resolution / clock.period:.4g} rows each"
-    found = Inference("clock", f"rebuilt with a period of {period}", seen, hints=EVEN)
-    warning = LogWarning(REBUILT, f"{seen}: a regular clock of {period} is used instead")
-    found_out, warned = (*numbers.inferences, found), (*numbers.warnings, warning)
-    return replace(numbers, clock=clock.t_ns, inferences=found_out, warnings=warned)
+    repeat = "repeats" if spread.repeats == 1 else "repeat"
+    seen = f"{spread.repeats} of {len(times)} rows {repeat} the time of the row before"
+    side = "back to the time before" if spread.before else "up to the next time"
+    done = f"rows of one time are spread evenly {side}"
+    found = Inference("clock", f"{done}, usually {spread.period / 1e9:.6g} s apart", seen, hints=EVEN)
+    taken = "rows that share a time were sampled after it" if spread.assumed else ""
+    warning = LogWarning(
+        SPREAD if spread.many else REPEATED, f"{seen}: {done}", spread.first + 1,
+        hints=EVEN, assumption=taken, role="time",
+    )  # fmt: skip
+    return _with_clock(numbers, spread.t_ns, found, warning)
 
 
-def spread(numbers: Numbers) -> Numbers:
-    """Return the numbers with the times of chunks of rows spread over these, where many share a stamp."""
-    times = numbers.clock
-    if times is None or len(times) < 2 or times.min() <= UNREADABLE:
-        return numbers
-    steps = np.diff(times)
-    if steps.min() != 0 or not _many(int(np.count_nonzero(steps == 0)), len(times)):
-        return numbers
-    found = spread_over_chunks(times)
-    return numbers if found is None else _with_spread(numbers, found)
-
-
-def _with_spread(numbers: Numbers, found: Spread) -> Numbers:
-    """Return the numbers with spread times, and what that rests on."""
-    end, side = ("first", "behind") if found.first else ("last", "before")
-    why = f"the number of rows is proportional to the time {side} it" if found.evident else "assumed"
-    seen = f"up to {found.largest} rows share a time, {found.chunks} times in {len(found.t_ns)} rows"
-    told = f"each is assigned to the {end} of its rows ({why})"
-    done = f"spread over the rows, about {found.period / 1e9:.6g} s apart"
-    inference = Inference("clock", done, f"{seen}; {told}", hints=EVEN)
-    taken = "" if found.evident else f"a time that rows share belongs to the {end} one"
-    warning = LogWarning(SPREAD, f"{seen}: {done}; {told}", hints=EVEN, assumption=taken, role="time")
-    found_out, warned = (*numbers.inferences, inference), (*numbers.warnings, warning)
-    return replace(numbers, clock=found.t_ns, inferences=found_out, warnings=warned)
-
-
-def _many(count: int, rows: int) -> bool:
-    """Return whether so many rows repeat a time, or run backwards, that they are no single faults."""
-    return count > max(FEW_REPEATS, MANY_REPEATS * rows)
+def _with_clock(numbers: Numbers, times: IntArray, found: Inference, warning: LogWarning) -> Numbers:
+    inferences, warnings = (*numbers.inferences, found), (*numbers.warnings, warning)
+    return replace(numbers, clock=times, inferences=inferences, warnings=warnings)
 
 
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
@@ -207,26 +185,23 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
     yield from unknown_times(numbers, clock)
     valid = np.flatnonzero(times > UNREADABLE)
     steps = np.diff(times[valid])
-    begins = _second_logs(times[valid], steps)
-    if len(begins) > 1 and begins == set(np.flatnonzero(steps < 0).tolist()):
-        yield _several_logs(sorted(int(valid[k + 1]) for k in begins), name)
-        steps = np.where(steps < 0, 1, steps)
-    single = []
-    for is_wrong, what in ((steps == 0, _TOO_COARSE), (steps < 0, _NO_CLOCK)):
-        wrong = np.flatnonzero(is_wrong)
-        if not _many(len(wrong), len(times)):
-            single += wrong.tolist()
-            continue
-        row = int(valid[wrong[0] + 1])
-        now, before = (clock.shown(int(times[valid[wrong[0] + k]])) for k in (1, 0))
-        said = what.format(now=now, before=before, rows=f"{len(wrong)} of {len(times)} rows")
-        yield Finding(f"{said}, allowed: {INCREASING}", row=row + 1, column=name, hints=EVEN)
-    for k in sorted(single):
+    back, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
+    if len(back) and np.array_equal(back, begins := _second_logs(times[valid], steps)):
+        yield _several_logs(valid[np.array(begins) + 1], numbers, name)
+        return
+
+    def found(k: int, more: str, hints: tuple[Hint, ...]) -> Finding:
         now, before = (clock.shown(int(times[valid[i]])) for i in (k + 1, k))
-        found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
-        again = ": a second log begins here, from about the same time" if k in begins else ""
-        said = f"{found}, allowed: {INCREASING}{again}"
-        yield Finding(said, row=int(valid[k + 1]) + 1, column=name, hints=OTHER_TIME)
+        said = f"found {now} {'again' if steps[k] == 0 else f'after {before}'}{more}, allowed: {INCREASING}"
+        return Finding(said, row=int(valid[k + 1]) + 1, column=name, hints=hints)
+
+    if are_many(len(back), len(times)):
+        yield found(int(back[0]), f", as {len(back)} of {len(times)} rows run backwards: no clock", EVEN)
+    else:
+        yield from (found(k, "", OTHER_TIME) for k in back.tolist())
+    if len(repeated) and not len(back) and len(valid) == len(times):  # others are spread
+        more = f", as {len(repeated)} of {len(times)} rows repeat a time: too coarse to rebuild a clock"
+        yield found(int(repeated[0]), more, EVEN)
 
 
 def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
@@ -269,23 +244,25 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[Finding]:
     yield Finding(said, row=row + 2, column=clock.columns[0].header, hints=hints)
 
 
-def _several_logs(rows: Sequence[int], name: str) -> Finding:
+def _several_logs(starts: IntArray, numbers: Numbers, name: str) -> Finding:
     """Return the finding that a clock begins again at some rows, from 0: episodes or repetitions."""
-    begin = ", ".join(str(row + 1) for row in rows[:SHOWN_GAPS])
-    more = ", ..." if len(rows) > SHOWN_GAPS else ""
-    said = f"found {len(rows) + 1} logs in one file: the clock begins again in rows {begin}{more}"
-    hints = (Hint("", effect=f"keep the rows of one, such as the first {rows[0]}"), *OTHER_TIME)
-    return Finding(f"{said}, allowed: one log", row=rows[0] + 1, column=name, hints=hints)
+    rows = [numbers.file_row(int(row) + 1) for row in starts]
+    begin = ", ".join(map(str, rows[:SHOWN_GAPS])) + (", ..." if len(rows) > SHOWN_GAPS else "")
+    ends = [*(row - 1 for row in rows), numbers.file_row(len(numbers.values))]
+    logs = [f"{first}:{last}" for first, last in zip([1, *rows], ends, strict=True)]
+    hints = (*(Hint("rows", one, "reads one") for one in logs[:SHOWN_GAPS]), *OTHER_TIME)
+    said = f"found {len(logs)} logs in one file: the clock begins again in row{'s' * (len(rows) > 1)} {begin}"
+    return Finding(f"{said}, allowed: one log", row=int(starts[0]) + 1, column=name, hints=hints)
 
 
-def _second_logs(times: IntArray, steps: IntArray) -> set[int]:
-    """Return the steps back to about the first time, after which the times go on: two logs in one file."""
+def _second_logs(times: IntArray, steps: IntArray) -> list[int]:
+    """Return the steps back to about the first time, after which the times go on: several logs."""
     if len(steps) < 3:
-        return set()
+        return []
     period = np.median(np.abs(steps))
     far, near = steps < -FAR_BACK * period, np.abs(times[1:] - times[0]) <= GAP * period
     goes_on = np.append((steps[1:] > 0) & (steps[1:] <= GAP * period), False)
-    return set(np.flatnonzero(far & near & goes_on).tolist())
+    return np.flatnonzero(far & near & goes_on).tolist()
 
 
 def _infinities(numbers: Numbers, names: Sequence[str]) -> Iterable[Finding]:

@@ -17,7 +17,6 @@ from urmpipe_pipeline.sources.checks import (
     find_errors,
     may_skip,
     rebuilt,
-    spread,
     trimmed,
     without_unread,
 )
@@ -113,7 +112,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     numbers, padding = without_padding(numbers, lambda: plan.tables.whole[table].read.values)
     if clock.lasts:
         numbers = summed(numbers, clock.columns[0].name)
-    numbers = spread(as_poses(plan, columns, rebuilt(numbers)))
+    numbers = rebuilt(as_poses(plan, columns, numbers))
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, file))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from asserting import INCREASE, OTHER_TIME
+from asserting import OTHER_TIME
 from urmpipe_pipeline.joint_log import JointLog
 
 Read = Callable[..., JointLog]
@@ -244,20 +244,37 @@ def test_a_coarse_time_of_day_goes_over_midnight(read: Read) -> None:
     assert log.t[-1] == pytest.approx(19.9, rel=1e-9)
 
 
-def test_irregular_repeats_are_one_error(wrong: Wrong) -> None:
-    rows = [0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3]
-    assert wrong(clocked("t [s]", *map(str, rows))) == [
-        "log.csv:3, column t [s]: found 0 s again, as 10 of 14 rows repeat a time: too coarse to"
-        f" rebuild a clock, {INCREASE}; --period SECONDS sets the time between rows then"
-    ]
+@pytest.mark.parametrize(
+    ("stamps", "times", "kind", "assumed"),
+    [
+        ([0, 1, 2, 2, 4, 5], [0, 1, 2, 3, 4, 5], "repeated-time", False),
+        ([0, 1, 2, 2, 3, 4], [0, 1, 2, 2.5, 3, 4], "repeated-time", False),
+        ([0, 1, 2, 3, 3, 3], [0, 1, 2, 3, 4, 5], "repeated-time", False),
+        ([0, 0, 0, 6, 6, 12, 12, 12, 18], [0, 2, 4, 6, 9, 12, 14, 16, 18], "repeated-time", False),
+        ([0, 6, 15, 20, 28, 34] * 2, [0, 3, 6, 10.5, 15, 17.5, 20, 24, 28, 31, 34, 37], "clock-spread", True),
+        ([0] * 6 + [6] * 3 + [9] + [10] * 8 + [18], [*range(19)], "clock-spread", False),
+        ([0] + [6] * 6 + [9] * 3 + [10] + [18] * 8, [*range(19)], "clock-spread", False),
+    ],
+)
+def test_rows_that_share_a_time_are_spread(
+    read: Read, stamps: list[int], times: list[float], kind: str, assumed: bool
+) -> None:
+    """Up to the next one, or back to the one before where the numbers of rows show it (received chunks)."""
+    log = read(clocked("t [s]", *map(str, sorted(stamps))))
+    np.testing.assert_allclose(log.t, times, rtol=0, atol=1e-9)
+    (warning,) = (one for one in log.warnings if "repeat" in one.message)
+    assert (warning.kind, bool(warning.assumption)) == (kind, assumed)
 
 
-def test_one_repeat_stays_an_error(wrong: Wrong) -> None:
-    times = [0.005 * k for k in range(50)]
-    times[20] = times[19]
-    assert wrong(clocked("t", *(f"{time:.3f}" for time in times))) == [
-        f"log.csv:22, column t: found 0.095 s again, {INCREASE}"
-    ]
+@pytest.mark.parametrize("counts", [[1] * 50 + [500] + [1] * 50, [4, 1, 5]], ids=["stands still", "too few"])
+def test_too_few_times_are_refused_with_the_period_as_the_next_step(
+    read: Read, wrong: Wrong, counts: list[int]
+) -> None:
+    rows = [f"{k},{row % 7 / 100}" for k, count in enumerate(counts) for row in range(count)]
+    text = "\n".join(["t [s],q1", *rows, ""])
+    (said,) = wrong(text)
+    assert "rows repeat a time: too coarse to rebuild a clock" in said and "--period SECONDS sets" in said
+    assert read(text, time="none", period=0.01).rows == sum(counts)
 
 
 @pytest.mark.parametrize(("start", "step", "units"), [

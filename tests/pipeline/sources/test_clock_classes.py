@@ -18,7 +18,6 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
-from urmpipe_pipeline.sources.clocks.chunks import spread_over_chunks
 from urmpipe_pipeline.sources.clocks.steps import kind_of_steps
 from urmpipe_pipeline.sources.log_map import map_of, read_map
 
@@ -275,8 +274,7 @@ def test_a_stamp_of_a_chunk_is_spread_over_its_rows(
     log = read(table([seconds(chunked(COUNTS, first=first) + start)], names=names))
     np.testing.assert_allclose(np.diff(log.t_ns), 4 * MS, atol=1000)  # written in us
     (warning,) = (one for one in log.warnings if one.kind == "clock-spread")
-    end = "first" if first else "last"
-    assert f"assigned to the {end} of its rows (the number of rows" in warning.message
+    assert f"spread evenly {'up to the next' if first else 'back to the'} time" in warning.message
     assert [hint.parameter for hint in warning.hints] == ["time", "time", "period"]
 
 
@@ -285,18 +283,6 @@ def test_chunks_without_a_header_are_asked_about(wrong: Wrong, read: Read) -> No
     (said,) = wrong(text)
     assert "--time 1 or --time none specifies it" in said
     np.testing.assert_allclose(np.diff(read(text, time="1").t_ns), 4 * MS, atol=1000)
-
-
-@pytest.mark.parametrize(
-    "counts",
-    [
-        [1] * 50 + [500] + [1] * 50,  # the clock stood still
-        [4, 1, 5],  # too few to tell
-    ],
-)
-def test_a_clock_that_stands_still_is_not_spread(counts: list[int]) -> None:
-    own = np.arange(len(counts)) * 4 * MS
-    assert spread_over_chunks(np.repeat(own, counts)) is None
 
 
 @pytest.mark.parametrize(

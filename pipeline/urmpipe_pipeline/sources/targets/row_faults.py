@@ -76,8 +76,8 @@ def read_rows(plan: Plan, further: Mapping[str, ExtraColumn]) -> Rows:
     """Return the rows that a plan asks for, all in one table, with a fault where a row cannot be used.
 
     A fault is a row that is not written like the others, a cell of a pose without a finite number, a cell of
-    a further column with a wrong number, or a missing time. Times that repeat or run backwards are an error
-    of the file, as in a log: either of two rows may be the wrong one.
+    a further column with a wrong number, or a missing time. Times that run backwards are an error of the
+    file, as in a log: either of two rows may be the wrong one.
 
     Raises:
         LogError: If there is no row, if a fault remains without the wrong rows (the header again), or if the

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_pipeline.sources.clocks.quantised import behind_repeated, behind_rounded
+from urmpipe_pipeline.sources.clocks.rounded import behind_repeated, behind_rounded
 
 MS = 1_000_000
 SECOND = 1_000_000_000
