@@ -8,15 +8,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import numpy as np
 import pandas as pd
+import polars as pl
 import pyarrow as pa
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from asserting import refusal
-from urmpipe_models.errors import LogError, UrmpipeError
+from urmpipe import ingest
+from urmpipe_models.errors import LogError, OptionError, UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import MemoryTable, ReadOptions, arrays_to_table, dataframe_to_table, read_log
@@ -115,6 +118,43 @@ def test_what_python_holds_reads_as_its_csv(frame: pd.DataFrame) -> None:
         }
         for what, one in held.items():
             assert outcome(one) == wanted, what
+
+
+class Stream:
+    """A table of a library that is not known: it only gives itself as a stream."""
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        return pl.DataFrame(COLUMNS).__arrow_c_stream__(requested_schema)
+
+
+COLUMNS = {"t [s]": T, **{f"q{k + 1} [rad]": Q[:, k] for k in range(3)}, "mode": ["run"] * len(T)}
+TABLES: dict[str, Callable[[], Any]] = {
+    "polars": lambda: pl.DataFrame(COLUMNS),
+    "categories of polars": lambda: pl.DataFrame(COLUMNS).cast({"mode": pl.Categorical}),
+    "a lazy frame of polars": lambda: pl.LazyFrame(COLUMNS),
+    "a relation of DuckDB": lambda: duckdb.from_arrow(pa.table(COLUMNS)),
+    "batches of Arrow": lambda: pa.table(COLUMNS).to_reader(max_chunksize=7),
+    "any stream": Stream,
+}
+
+
+@pytest.mark.parametrize("what", TABLES)
+def test_tables_of_other_libraries(what: str) -> None:
+    wanted = outcome(dataframe_to_table(pd.DataFrame(COLUMNS), "log"))
+    assert outcome(dataframe_to_table(TABLES[what](), "log")) == wanted
+    assert (ingest(TABLES[what]()).q == Q).all()
+
+
+def test_a_query_that_fails_is_one_line() -> None:
+    for query in (
+        pl.LazyFrame(COLUMNS).select("q7"),
+        duckdb.sql("select cast(x as double) from (select 'a' x)"),
+    ):
+        found = refusal(LogError, dataframe_to_table, query, "log")
+        assert found.startswith(f"log: found a {type(query).__name__} that cannot be read (")
+        assert "\n" not in found
+    for column in (pl.Series([1.0, 2.0]), pa.chunked_array([[1.0, 2.0]])):
+        assert "allowed: a file, several of one log" in refusal(OptionError, ingest, column)
 
 
 def log_of(frame: Any, **options: Any) -> JointLog:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -19,7 +20,7 @@ from urmpipe_pipeline.sources.tables.column_facts import is_number
 from urmpipe_pipeline.sources.tables.form import spread_names
 from urmpipe_pipeline.sources.tables.limits import MOST_COLUMNS, refuse_wide
 
-MOST_ALIKE = 0.9
+USUAL_SHARE = 0.9
 """Share of the lists of a column that have one length where the others are damaged."""
 
 _DAY_NS = 86_400 * 10**9
@@ -64,7 +65,8 @@ def _flat(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Name
     if isinstance(kind, pa.BaseExtensionType):
         yield from _flat(field, column.cast(kind.storage_type), place)
     elif pa.types.is_dictionary(kind):
-        yield from _flat(field, column.cast(kind.value_type), place)
+        values = [_without_view(chunk.dictionary).take(chunk.indices) for chunk in column.chunks]
+        yield from _flat(field, pa.chunked_array(values, None if values else pa.null()), place)
     elif pa.types.is_struct(kind):
         for inner, values in zip(kind, column.flatten(), strict=True):
             yield from _flat(inner.with_name(f"{field.name}.{inner.name}"), values, place)
@@ -80,7 +82,7 @@ def _spread(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Na
     there = lengths[lengths >= 0]
     usual = int(np.bincount(there).argmax()) if len(there) else 0
     other = np.flatnonzero((lengths >= 0) & (lengths != usual))
-    if not usual or len(other) > (1.0 - MOST_ALIKE) * len(there):
+    if not usual or len(other) > (1.0 - USUAL_SHARE) * len(there):
         return
     if len(other):
         row = int(other[0])
@@ -90,6 +92,11 @@ def _spread(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Na
     refuse_wide(usual, place)
     for k, name in enumerate(spread_names([field.name], [usual])):
         yield from _flat(field.with_name(name), pc.list_element(column, k), place)
+
+
+def _without_view(values: Any) -> Any:
+    """Return texts of the type `string_view`, which many functions of Arrow do not take, as `string`."""
+    return values.cast(pa.string()) if pa.types.is_string_view(values.type) else values
 
 
 def _plain(column: pa.ChunkedArray) -> pa.ChunkedArray:
@@ -141,6 +148,7 @@ _MADE: Sequence[tuple[Callable[[pa.DataType], bool], Callable[[pa.ChunkedArray],
     (pa.types.is_float16, lambda column: column.cast(pa.float32())),
     (is_number, lambda column: column),
     (pa.types.is_null, lambda column: column.cast(pa.float64())),
+    (pa.types.is_string_view, lambda column: pc.utf8_trim_whitespace(_without_view(column))),
     (pa.types.is_string, pc.utf8_trim_whitespace),
     (pa.types.is_large_string, pc.utf8_trim_whitespace),
     (pa.types.is_boolean, lambda column: pc.if_else(column, "True", "False")),

@@ -1,4 +1,4 @@
-"""Tables in Python: a DataFrame of pandas, or what hands itself over as Arrow, as a table in memory."""
+"""Tables in Python, a DataFrame of pandas or what becomes an Arrow stream, as a table in memory."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 
 import pyarrow as pa
 
+from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result, told_in
 
@@ -16,39 +17,54 @@ if TYPE_CHECKING:
 
 
 class TableLike(Protocol):
-    """A DataFrame of pandas, a table of Arrow, or another table that hands itself over as Arrow."""
-
-    @property
-    def columns(self) -> Any:
-        """Its columns, or their names."""
+    """A table that gives itself as an Arrow stream: pandas, polars, DuckDB, Arrow and others."""
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
-        """Return itself as a stream of Arrow."""
+        """Return the table as a stream of Arrow."""
 
 
 def is_table(value: object) -> TypeGuard[TableLike]:
-    """Return whether a value is a table: a DataFrame, a table of Arrow, or another that becomes one."""
-    return hasattr(value, "columns") and hasattr(value, "__arrow_c_stream__")
+    """Return whether a value is a table: it gives itself as an Arrow stream, or is a LazyFrame of polars.
+
+    A single column (Series, ChunkedArray) is no table.
+    """
+    kind = type(value)  # attributes of a LazyFrame and of a query would run it
+    if not hasattr(kind, "__arrow_c_stream__"):
+        return hasattr(kind, "collect_schema")
+    return hasattr(kind, "columns") or not hasattr(kind, "__array__")
 
 
 def dataframe_to_table(table: Any, name: str) -> MemoryTable:
     """Return a table of Python as one in memory.
 
-    Of a DataFrame an index that may be a time becomes the first column: dates, lengths of time, texts,
+    Of a DataFrame of pandas, an index that may be a time becomes the first column: dates, durations, texts,
     floats, and whole numbers with a name. Two levels of names are GROUP/NAME.
 
     Args:
-        table: What `is_table` takes.
-        name: What to call the log.
+        table: A value for which `is_table` is true. A stream is consumed.
+        name: Name of the log.
+
+    Raises:
+        LogError: If a stream, or the query behind it, fails.
     """
     if not _is_frame(table):
-        arrow = pa.table(table)
+        arrow = _read_stream(table, name)
         return MemoryTable(name, of_result(index_first(arrow), attributes_of(arrow.schema.metadata)))
     columns = [*_index(table), *((_name(column), table.iloc[:, k]) for k, column in enumerate(table.columns))]
     arrays = [_array(values) for _, values in columns]
     arrow = pa.Table.from_arrays(arrays, names=[label for label, _ in columns])
-    told = table.attrs.get(MARK) or {}
-    return MemoryTable(name, of_result(arrow, told), named=not _is_numbered(table.columns))
+    attributes = table.attrs.get(MARK) or {}
+    return MemoryTable(name, of_result(arrow, attributes), named=not _is_numbered(table.columns))
+
+
+def _read_stream(table: Any, name: str) -> pa.Table:
+    """Return a table, a stream or the result of a query as an Arrow table."""
+    try:
+        return pa.table(table if hasattr(type(table), "__arrow_c_stream__") else table.collect())
+    except Exception as error:  # queries of polars and DuckDB raise their own
+        reason = str(error).partition("\n")[0].strip(" .")
+        query = f"a {type(table).__name__} that cannot be read ({reason})"
+        raise LogError(Finding(file=name, found=query, allowed="a table")) from error
 
 
 def _is_frame(table: object) -> TypeGuard[pd.DataFrame]:
@@ -91,10 +107,10 @@ def _array(values: pd.Series) -> pa.Array:
 
 def index_first(table: pa.Table) -> pa.Table:
     """Return a table that pandas made with its index in front, without a name where that has none."""
-    told = told_in(table.schema.metadata, "pandas").get("index_columns")
+    levels = told_in(table.schema.metadata, "pandas").get("index_columns")
     index = [
         name
-        for name in (told if isinstance(told, list) else ())
+        for name in (levels if isinstance(levels, list) else ())
         if isinstance(name, str) and name in table.column_names
     ]
     others = [name for name in table.column_names if name not in index]

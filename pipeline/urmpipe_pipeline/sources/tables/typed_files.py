@@ -11,7 +11,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 
 HEAD = 128
-"""Bytes at the start of a file that tell what it is."""
+"""Bytes at the start of a file that show its format."""
 
 
 def read_typed(path: Path, options: ReadOptions) -> MemoryTable | None:
@@ -60,8 +60,10 @@ def import_optional(library: str, path: Path, what: str) -> Any:
     except ImportError:
         package = library.partition(".")[0].replace("_", "-")
         hint = Hint("", effect='install it: pip install "urmpipe[logs]"')
-        found = Finding(file=str(path), found=what, allowed=f"{what} with {package} installed", hints=(hint,))
-        raise LogError(found) from None
+        finding = Finding(
+            file=str(path), found=what, allowed=f"{what} with {package} installed", hints=(hint,)
+        )
+        raise LogError(finding) from None
 
 
 def _head(path: Path) -> bytes:
