@@ -21,6 +21,7 @@ from urmpipe_models.errors import Finding, OutputError, UrmpipeError, closest_na
 MAX_SCANNED = 2000  # files of a folder that are compared with a name
 MAX_SUGGESTED = 3  # files in a suggestion
 MAX_BYTES = 10e6  # of a description; the largest published arms take a hundredth of it
+COMPRESSED = (".gz", ".bz2", ".xz", ".zst")  # suffixes of compressed files
 EXPORT_MARK = "urmpipe robot export"  # in a comment at the top of every robot file that urmpipe wrote
 
 _HEADER = re.compile(r"\s*\[([^\[\]]+)\]")
@@ -70,6 +71,11 @@ def _similar_names(path: Path) -> list[str]:
 def _stem(name: str) -> str:
     """Return a name without its suffixes, in lower case: log of LOG.csv.gz."""
     return name.casefold().split(".", 1)[0]
+
+
+def log_stem(path: Path) -> str:
+    """Return the name of a log's file without its suffixes: log of log.csv and of log.csv.gz."""
+    return Path(path.stem).stem if path.suffix.lower() in COMPRESSED else path.stem
 
 
 def read_contents(path: Path, error: type[UrmpipeError], suffixes: Collection[str]) -> bytes:

@@ -29,6 +29,7 @@ from urmpipe_models.errors import (
     format_value,
     map_collecting_errors,
 )
+from urmpipe_models.files import log_stem
 from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.repolarization.audit import is_revolute
@@ -142,7 +143,7 @@ def _ingest(
     files = [log] if isinstance(log, MemoryTable) else log_files(log)
     name = log.resolve().name if isinstance(log, Path) and log.is_dir() else None
     if read.side is not None:
-        name = f"{log.name if isinstance(log, MemoryTable) else log.resolve().stem} ({read.side[0]})"
+        name = f"{log.name if isinstance(log, MemoryTable) else log_stem(log.resolve())} ({read.side[0]})"
     return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
 
 
@@ -258,7 +259,7 @@ def _check_intervals(read: ReadOptions, runs: Sequence[Run]) -> None:
 def _unique_names(operands: Sequence[Operand], results: Sequence[Run | UrmpipeError]) -> list[str]:
     """Return unique names of runs: of files with the same name by their stems, or also by their folders."""
     files = [operand.resolve() if isinstance(operand, Path) else None for operand in operands]
-    stems = ["" if file is None else file.name if file.is_dir() else file.stem for file in files]
+    stems = ["" if file is None else file.name if file.is_dir() else log_stem(file) for file in files]
     names = [
         result.name if isinstance(result, Run) else stem or operand.name
         for operand, result, stem in zip(operands, results, stems, strict=True)

@@ -15,6 +15,7 @@ from urmpipe.parameters import kinds
 from urmpipe.parameters.comparing import Baseline, Compare
 from urmpipe.parameters.param import params_of
 from urmpipe.parameters.shared import ROBOT, Debugging, Printing, Strict
+from urmpipe_models.files import log_stem
 
 OF_RESULTS = {*params_of(Baseline, Strict, Printing, Debugging), "junit", "csv"}  # of finished comparisons
 
@@ -119,8 +120,8 @@ def load_finished(call: Call, reference: Path, *also: str) -> Any:
 
 def _output_name(reference: Path, logs: tuple[Path, ...]) -> str:
     """Return LOG-against-REFERENCE; of several logs the name of the first."""
-    stem = reference.resolve().stem
+    stem = log_stem(reference.resolve())
     if not logs:
         return f"{stem}-against-itself"
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    return f"{logs[0].resolve().stem}{more}-against-{stem}"
+    return f"{log_stem(logs[0].resolve())}{more}-against-{stem}"

@@ -13,6 +13,7 @@ from urmpipe.commands.compare import iter_lines, load_finished
 from urmpipe.parameters import kinds
 from urmpipe.parameters.comparing import Diagnose
 from urmpipe.parameters.shared import ROBOT
+from urmpipe_models.files import log_stem
 
 
 @command(Diagnose, robot=ROBOT)
@@ -46,7 +47,7 @@ def diagnose(
     if not options["baseline"] and not call.explicit_options("noise".__eq__):
         options["noise"] = None  # urmpipe.toml sets it for the calls with a baseline
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    output = output or default_output(f"{(logs or (reference,))[0].resolve().stem}{more}-diagnosed")
+    output = output or default_output(f"{log_stem((logs or (reference,))[0].resolve())}{more}-diagnosed")
     is_replaced = output.exists()
     defaults = call.deciding_defaults(options)
     operands = logs[0] if len(logs) == 1 else list(logs)

@@ -14,6 +14,7 @@ from urmpipe.parameters.comparing import Ingest
 from urmpipe.parameters.shared import ROBOT
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.files import log_stem
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.runs.run import Run
@@ -45,7 +46,7 @@ def ingest(call: Call, logs: tuple[Path, ...], output: Path | None, explain: boo
     options = call.without_log_options(logs, options)
     if not explain and output is None and any(map(is_log, logs)):  # a recording is one already
         first = logs[0].resolve()
-        output = default_output(first.parent.name if len(logs) > 1 else first.stem)
+        output = default_output(first.parent.name if len(logs) > 1 else log_stem(first))
     is_replaced = output is not None and output.exists()
     with call.progress(f"Writing {output}", shown=output is not None) as progress:
         run = urmpipe.ingest(logs, output=output, progress=progress, **options)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.sources.assemble import assemble, recorded
 from urmpipe_pipeline.sources.clocks.time_file import named_file
@@ -102,6 +103,6 @@ def _fingerprint(file: Path | MemoryTable) -> SourceFile:
 
 def _name(files: Sequence[Path | MemoryTable]) -> str:
     """Return the stem of the only file, or what the stems of several share at their beginning."""
-    stems = [file.name if isinstance(file, MemoryTable) else file.stem for file in files]
+    stems = [file.name if isinstance(file, MemoryTable) else log_stem(file) for file in files]
     shared = os.path.commonprefix(stems)  # noqa: RUF071 (stems, not paths)
     return stems[0] if len(stems) == 1 else shared.strip(" _-.,()[]#") or stems[0]

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import bz2
-import gzip
 import json
-import lzma
 import os
 import pickle
 import re
@@ -23,7 +20,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 import pytest
 import xlwt
 from rosbags.rosbag1 import Writer as Ros1Writer
@@ -165,10 +161,6 @@ WRITERS: Mapping[str, Write] = {
     "a.ulg": ulog,
     "a.tar.gz": tar,
     "a.zip": zipped,
-    "a.gz": lambda path: path.write_bytes(gzip.compress(CSV)),
-    "log.csv.bz2": lambda path: path.write_bytes(bz2.compress(CSV)),
-    "a.xz": lambda path: path.write_bytes(lzma.compress(CSV)),
-    "a.zst": lambda path: path.write_bytes(pa.compress(CSV, "zstd", asbytes=True)),
 }
 COMMAND = re.compile(r"(?:python -|ulog2csv ).*?(?= \(with a password|$)")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import sqlite3
 import subprocess
 import sys
@@ -36,14 +35,14 @@ def test_a_robot_is_no_log(wrong: Wrong, name: str, said: str) -> None:
 
 
 def test_real_containers_are_known(tmp_path: Path) -> None:
-    paths = [tmp_path / f"{name}.csv" for name in ("db3", "gz")]
+    paths = [tmp_path / f"{name}.csv" for name in ("db3", "pdf")]
     connection = sqlite3.connect(paths[0])
     connection.execute("create table messages (id integer)")
     connection.close()
-    paths[1].write_bytes(gzip.compress(b"t,q1\n0,1\n"))
+    paths[1].write_bytes(b"%PDF-1.7\n")
     with pytest.raises(LogError) as caught:
         read_log(paths)
-    kinds = ["a ROS bag", "a gzip archive"]
+    kinds = ["a ROS bag", "a PDF"]
     assert [str(f).partition("found ")[2].partition(",")[0] for f in caught.value.findings] == kinds
 
 

@@ -32,7 +32,7 @@ def row_blocks(layout: Layout) -> Iterator[bytes]:
     wide = segment.encoding.startswith("utf-16")
     decoder = codecs.getincrementaldecoder(segment.encoding)(errors="replace") if wide else None
     cut_row = b""
-    with segment.path.open("rb", buffering=0) as file:
+    with segment.open() as file:
         file.seek(layout.offset)
         while left > 0:
             raw = file.read(min(BLOCK_BYTES, left))

@@ -110,7 +110,7 @@ def _may_hold_markers(segment: Segment) -> bool:
     """
     marks = [(sign.encode(), (sign * _WIDTH).encode(segment.encoding)) for sign in _MEANING]
     longest, end = max(len(mark) for _, mark in marks), b""
-    with segment.path.open("rb", buffering=0) as file:
+    with segment.open() as file:
         while read := file.read(_READ_BYTES):
             wanted = [mark for sign, mark in marks if sign in read]
             block = end + read if wanted else b""

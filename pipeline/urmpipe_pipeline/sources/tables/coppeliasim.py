@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import mmap
 import re
+from contextlib import ExitStack
 
 from urmpipe_pipeline.sources.cells.cell import printable
 from urmpipe_pipeline.sources.tables.text import Segment
@@ -25,7 +26,9 @@ def is_export(segment: Segment) -> bool:
 def graphs(segment: Segment) -> list[tuple[str, Segment]]:
     """Return the graphs of an export: the path of each, and where it stands."""
     result = []
-    with segment.path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+    with ExitStack() as opened:
+        file = opened.enter_context(segment.open())
+        content = segment.data or opened.enter_context(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
         starts = _starts(content, segment.start)
         line, counted = segment.first_line, segment.start
         for start, end in zip(starts, [*starts[1:], segment.end], strict=False):
@@ -37,7 +40,7 @@ def graphs(segment: Segment) -> list[tuple[str, Segment]]:
     return result
 
 
-def _starts(content: mmap.mmap, first: int) -> list[int]:
+def _starts(content: mmap.mmap | bytes, first: int) -> list[int]:
     """Return where each graph begins: at its path above the header, or at the header if there is no path."""
     starts = []
     place = content.find(_HEADER, first)
@@ -51,6 +54,6 @@ def _starts(content: mmap.mmap, first: int) -> list[int]:
     return starts
 
 
-def _count_lines(content: mmap.mmap, start: int, end: int, step: int = 1 << 20) -> int:
+def _count_lines(content: mmap.mmap | bytes, start: int, end: int, step: int = 1 << 20) -> int:
     """Return the line feeds of a stretch, a part at a time so that a large file is not copied."""
     return sum(content[at : min(at + step, end)].count(b"\n") for at in range(start, end, step))

@@ -22,6 +22,9 @@ UNPACKED = 64 << 20
 RATIO = 50
 """A larger file may unpack to so many times its size: logs of doubles unpack to 2 to 10 times theirs."""
 
+MEMORY_LIMIT = 4 << 30
+"""Bytes that a compressed text may unpack to: they are kept in memory."""
+
 _ROW_A_SAMPLE = Hint("", effect="write one row per sample, one column per joint")
 
 
@@ -38,10 +41,15 @@ def long_line(file: str, line: int) -> LogError:
     return LogError(Finding(file=file, line=line, found=found, allowed=allowed, hints=(_ROW_A_SAMPLE,)))
 
 
+def unpacked_limit(size: int) -> int:
+    """Return how many bytes a file of this size may unpack to."""
+    return max(UNPACKED, RATIO * size)
+
+
 def refuse_unpacked(path: Path, unpacked: int) -> None:
     """Raise a `LogError` if a file unpacks to more bytes than its size lets expect."""
     size = path.stat().st_size
-    most = max(UNPACKED, RATIO * size)
-    if unpacked > most:
-        found = f"{size} bytes that unpack to {unpacked}"
-        raise LogError(Finding(file=str(path), found=found, allowed=f"{most} at most"))
+    limit = unpacked_limit(size)
+    if unpacked > limit:
+        fault = f"{size} bytes that unpack to {unpacked}"
+        raise LogError(Finding(file=str(path), found=fault, allowed=f"{limit} at most"))

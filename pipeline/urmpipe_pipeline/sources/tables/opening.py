@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
+from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference
 from urmpipe_pipeline.sources.cells.cell import is_number
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -86,7 +87,7 @@ def open_tables(
     texts = [one for one in opened if isinstance(one, Segment)]
     markers = map_collecting_errors(refuse_conflict, texts)
     titled = [
-        (file.stem if isinstance(file, Path) else file.name, one)
+        (log_stem(file) if isinstance(file, Path) else file.name, one)
         for file, one in zip(files, opened, strict=True)
     ]
     forced, graphs = options.source == COPPELIASIM, list[tuple[str, Segment]]()
@@ -138,8 +139,9 @@ def _shaped(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:
 
 
 def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
-    """Yield the encoding of a text."""
+    """Yield the encoding of a text, and how its file was read."""
     for text in texts:
+        yield from text.inferences
         mark = "byte order mark" if text.start else "its bytes"
         utf_8 = (Hint("", effect="save the file as UTF-8"),)
         yield Inference("encoding", text.encoding, mark, hints=utf_8)

@@ -76,7 +76,7 @@ def cut_cell(layout: Layout) -> str | None:
     segment, usual = layout.segment, layout.cells(len(layout.names) - 1)
     if layout.form is not None or layout.across or len(usual) < _FIXED_ROWS:
         return None
-    with segment.path.open("rb") as file:
+    with segment.open() as file:
         file.seek(max(segment.start, segment.end - _LAST_BYTES))
         text = file.read(segment.end - file.tell()).decode(segment.encoding, errors="replace")
     last = text.rpartition(segment.newline)[2]

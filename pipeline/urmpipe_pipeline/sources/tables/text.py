@@ -6,13 +6,15 @@ import codecs
 import hashlib
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
+from typing import BinaryIO
 
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.files import suggest_path
-from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.joint_log import Inference, SourceFile
+from urmpipe_pipeline.sources.tables.compressed import Compression, find_compression, unpack
 from urmpipe_pipeline.sources.tables.limits import LONGEST_LINE, long_line
 from urmpipe_pipeline.sources.vocabulary import Container, vocabulary
 
@@ -48,9 +50,12 @@ class Segment:
         path: The file, as the user named it.
         encoding: Python's name of its encoding.
         start: Offset of the first byte, after a byte order mark.
-        end: Offset behind the last byte.
+        end: Offset after the last byte.
         first_line: Line of the file that the segment begins with, from 1.
         head: Its beginning as text, cut at the end of a line.
+        data: The bytes of the text, if they are not those of the file: unpacked, or the cells of a sheet.
+        delimiter: Sign between cells, if the reader of the file put it there; else empty.
+        inferences: What was found out about the file.
     """
 
     path: Path
@@ -59,6 +64,13 @@ class Segment:
     end: int
     first_line: int
     head: str
+    data: bytes | None = field(default=None, repr=False)
+    delimiter: str = ""
+    inferences: tuple[Inference, ...] = ()
+
+    def open(self) -> BinaryIO:
+        """Return the bytes of the text as an open file."""
+        return self.path.open("rb") if self.data is None else io.BytesIO(self.data)
 
     @property
     def newline(self) -> str:
@@ -67,26 +79,26 @@ class Segment:
 
     @property
     def has_more(self) -> bool:
-        """Whether more stands behind its head."""
+        """Whether the text continues after its head."""
         return len(self.head.encode(self.encoding, _errors(self.encoding))) < self.end - self.start
 
     def cut(self, start: int, end: int, first_line: int) -> Segment:
         """Return a stretch of the same file, with its own head."""
-        head = _head(self.path, self.encoding, start, end)
-        return replace(self, start=start, end=end, first_line=first_line, head=head)
+        cut = replace(self, start=start, end=end, first_line=first_line)
+        return replace(cut, head=_head(cut))
 
     def text(self) -> str:
         """Return all of it."""
-        with self.path.open("rb") as file:
+        with self.open() as file:
             file.seek(self.start)
             return file.read(self.end - self.start).decode(self.encoding, _errors(self.encoding))
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Yield each line with its number in the file, without its end."""
-        with self.path.open("rb") as file:
+        with self.open() as file:
+            whole = self.end == file.seek(0, io.SEEK_END)
             file.seek(self.start)
             text = io.TextIOWrapper(file, self.encoding, _errors(self.encoding), newline=self.newline)
-            whole = self.end == self.path.stat().st_size
             left = self.end - self.start
             for number, line in enumerate(text, start=self.first_line):
                 if left <= 0:
@@ -130,19 +142,30 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
             it), or binary.
     """
     size = _size(path)
+    with path.open("rb") as file:
+        raw = file.read(HEAD_BYTES)
+    container, compression, data = _container(path, raw, any_suffix), find_compression(raw), None
+    if container is None and compression is not None:
+        data = unpack(path, compression)
+        size, raw = len(data), data[:HEAD_BYTES]
+        name = path.with_suffix(".tar" if raw[257:262] == b"ustar" else "")
+        container = _container(name, raw, any_suffix)
     if size == 0:
         raise LogError(
             Finding("found an empty file, allowed: a table with one row per sample", file=str(path))
         )
-    with path.open("rb") as file:
-        raw = file.read(HEAD_BYTES)
-    container = _container(path, raw, any_suffix)
+    mark, encoding = _encoding(raw)
+    if data is not None and compression is not None and (container or encoding is None):
+        raise LogError(_about_packed(container, compression, path))
     if container is not None:
         raise LogError(_about(container, path))
-    mark, encoding = _encoding(raw)
     if encoding is None:
         raise LogError(_no_text(path, raw))
-    return Segment(path, encoding, mark, size, 1, _head(path, encoding, mark, size))
+    inferences = (
+        () if compression is None else (Inference("compression", compression.name, "its first bytes"),)
+    )
+    segment = Segment(path, encoding, mark, size, 1, "", data, inferences=inferences)
+    return replace(segment, head=_head(segment))
 
 
 def refuse_long_lines(segment: Segment) -> None:
@@ -153,7 +176,7 @@ def refuse_long_lines(segment: Segment) -> None:
     if segment.end <= LONGEST_LINE:
         return
     sign, since = segment.newline.encode(), 0
-    with segment.path.open("rb", buffering=0) as file:
+    with segment.open() as file:
         while block := file.read(LONGEST_LINE // 8):
             first = block.find(sign)
             if since + (len(block) if first < 0 else first) > LONGEST_LINE:
@@ -164,7 +187,7 @@ def refuse_long_lines(segment: Segment) -> None:
 def _lines_before(segment: Segment, offset: int) -> int:
     """Return the line, from 1, that begins at an offset in bytes."""
     sign, line = segment.newline.encode(), 1
-    with segment.path.open("rb", buffering=0) as file:
+    with segment.open() as file:
         while offset > 0 and (block := file.read(min(offset, LONGEST_LINE))):
             line, offset = line + block.count(sign), offset - len(block)
     return line
@@ -217,6 +240,13 @@ def _about(container: Container, path: Path) -> Finding:
     return Finding(found, str(path), hints=(*([Hint("", effect=advice)] if advice else []), *hints))
 
 
+def _about_packed(container: Container | None, compression: Compression, path: Path) -> Finding:
+    """Return the finding about a compressed file that holds no text."""
+    content = f"{container.what if container else 'a binary file'} in a {compression.name} archive"
+    hint = Hint("", effect=f'unpack it: {compression.program} -dk "{path.as_posix()}"')
+    return Finding(file=str(path), found=content, allowed="a text table in it", hints=(hint,))
+
+
 def _no_text(path: Path, raw: bytes) -> Finding:
     """Return what is said of bytes that no text has: with their line if text stands above it."""
     place = next(k for k, byte in enumerate(raw) if byte in _CONTROL)
@@ -254,14 +284,14 @@ def _errors(encoding: str) -> str:
     return "surrogateescape" if encoding == "utf-8" else "replace"
 
 
-def _head(path: Path, encoding: str, start: int, end: int) -> str:
-    """Return the beginning of a stretch of a file as text: enough lines to show what they are."""
-    head, size = "", HEAD_BYTES
-    with path.open("rb") as file:
+def _head(segment: Segment) -> str:
+    """Return the beginning of a segment as text: enough lines to show what they are."""
+    head, size, length = "", HEAD_BYTES, segment.end - segment.start
+    with segment.open() as file:
         while size <= MOST_HEAD:
-            file.seek(start)
-            head = _decoded_head(file.read(min(size, end - start)), encoding, whole=size >= end - start)
-            if size >= end - start or _shows_rows(head):
+            file.seek(segment.start)
+            head = _decoded_head(file.read(min(size, length)), segment.encoding, whole=size >= length)
+            if size >= length or _shows_rows(head):
                 return head
             size *= 4
     return head if "\n" in head or "\r" in head else head[:HEAD_BYTES]
