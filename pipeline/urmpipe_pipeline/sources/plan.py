@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.clocks.clock import Clock, find_clocks
+from urmpipe_pipeline.sources.clocks.clock import Clock, by_joints, find_clocks
 from urmpipe_pipeline.sources.clocks.time_file import clocks_apart, time_file, with_time_file
 from urmpipe_pipeline.sources.columns.columns import (
     Column,
@@ -110,6 +110,8 @@ def make_plan(
     roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
     roles = replace(roles, further=beside)
     _refuse_many(roles, tables)
+    if not options.poses:
+        clocks = tuple(by_joints(clock, tables, roles.joints, units) for clock in clocks)
     for table in {column.table for column in roles.joints}:
         own = [column for column in rest if column.table == table]
         refuse_long_form(roles.joints, own, clocks[table].columns, tables.layouts[table])

@@ -17,11 +17,11 @@ from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD
 from urmpipe_pipeline.sources.clocks.clock_columns import GIVEN
+from urmpipe_pipeline.sources.clocks.clock_units import in_si
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
-from urmpipe_pipeline.sources.units.unit_evidence import FASTEST, peak
-from urmpipe_pipeline.sources.vocabulary import vocabulary
+from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
 
 STEP = FASTEST * PAPER_PERIOD
 """The median step of static poses, in [rad] or [m], is larger: none is made in the period that is assumed."""
@@ -75,7 +75,7 @@ def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
     at = np.arange(0, count - 2, max(1, count // SAMPLED))
     rows = np.stack([at, at + 1, at + 2])
     q = numbers.values[rows[:, :, np.newaxis], joints]
-    q, turns = _in_si(plan, q)
+    q, turns = in_si(q, plan.roles.joints, plan.units, plan.tables.known)
     known = np.isfinite(q).all(axis=(0, 2))
     if np.count_nonzero(known) < LEAST_ROWS - 2:
         return ""
@@ -89,7 +89,7 @@ def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
     said = f"the joints step by up to {size.max():.2g} {unit} from row to row, in no direction"
     if numbers.clock is None:
         return f"no clock, and {said}"
-    return _label(plan, numbers.clock[rows[:2, known]], size, said)
+    return _label(plan, numbers.clock[rows[:2, known]], said)
 
 
 def _written_untimed(plan: Plan) -> bool:
@@ -99,11 +99,10 @@ def _written_untimed(plan: Plan) -> bool:
     return known is not None and known.own and bool(plan.roles.joints) and not (clock.columns or named)
 
 
-def _label(plan: Plan, times: IntArray, size: FloatArray, said: str) -> str:
+def _label(plan: Plan, times: IntArray, said: str) -> str:
     """Return why a clock is a label; empty if it may be that of a motion.
 
-    Its times before and after some steps of the joints, in [rad] or [m], shape (n,), are in integer [ns],
-    shape (2, n).
+    Its times before and after some steps of the joints are in integer [ns], shape (2, n).
     """
     timed = (times > UNREADABLE).all(axis=0)
     passed, name = np.diff(times[:, timed], axis=0)[0], plan.clock.columns[0].name
@@ -113,27 +112,7 @@ def _label(plan: Plan, times: IntArray, size: FloatArray, said: str) -> str:
     if stands >= IMPOSSIBLE:
         return f"{said}, and {name} repeats or runs backwards in {stands:.0%} of them"
     apart = _quantile(np.abs(passed), 0.5)
-    speeds = size[timed] / np.maximum(np.abs(passed), 1)
-    if not plan.clock.told and _quantile(speeds, 0.5) > FASTEST / 1e9:
-        apart *= 10.0 ** (9 - plan.clock.exponent)  # in s: the unit that its steps told is none of a motion
     return f"{said}, and {name} says that {apart / 1e9:.3g} s pass" if apart >= APART else ""
-
-
-def _in_si(plan: Plan, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return joint values in [rad] or [m], and a turn of each joint, shape (joints,): 0 where it slides.
-
-    By the units that the columns tell; without one values beyond a turn in rad are taken as deg. They are in
-    the file's own units, shape (..., joints).
-    """
-    source = plan.tables.known.units.get("angle") if plan.tables.known else None
-    beyond = peak(values.reshape(-1, values.shape[-1])) > FULL_TURN
-    usual = vocabulary().units["deg" if beyond else "rad"]
-    units = [
-        plan.units.get(one.number) or plan.units.get(0) or one.unit or source or usual
-        for one in plan.roles.joints
-    ]
-    slides = np.array([unit.quantity == "length" for unit in units])
-    return values * [unit.factor for unit in units], np.where(slides, 0.0, FULL_TURN)
 
 
 def _quantile(values: FloatArray, share: float) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from asserting import OTHER_TIME
+from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 
 Read = Callable[..., JointLog]
@@ -36,7 +37,6 @@ def test_names_of_the_time(read: Read, name: str) -> None:
         ("t_ms", ["0", "5", "10"], [5_000_000, 5_000_000], "ms"),
         ("time [us]", ["0", "5", "10"], [5000, 5000], "us"),
         ("t (ns)", ["0", "5", "10"], [5, 5], "ns"),
-        ("t", ["0", "5", "10"], [5_000_000, 5_000_000], "ms"),
         ("t", ["0", "0.005", "0.01"], [5_000_000, 5_000_000], "s"),
         ("t", ["0", "5000", "10000"], [5_000_000, 5_000_000], "us"),
         ("t", ["0", "5000000", "10000000"], [5_000_000, 5_000_000], "ns"),
@@ -101,10 +101,38 @@ def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> 
     assert read(text, unit={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
 
 
-def test_a_step_of_one_is_taken_as_a_second_and_said(read: Read) -> None:
-    log = read(clocked("t", "0", "1", "2"))
-    assert log.period == 1.0
-    assert log.warnings[0].message == "the time 't' steps by 1: taken as s"
+@pytest.mark.parametrize(
+    ("step", "turn", "unit"),
+    [
+        (1, 0.1, "s"),  # 100 rad/s as ms: of no arm
+        (3, 0.2, "s"),
+        (17, 0.9, "s"),
+        (1.008, 0.02, "s"),  # UR RTDE at 1 Hz
+        (5, 0.01, "ms"),
+        (20, 0.02, "ms"),  # 1 mrad/s as s
+        (20, 0.0, "ms"),
+        (1, 0.01, None),  # 10 rad/s or 10 mrad/s
+        (4, 0.0, None),
+        (17, 0.2, None),
+        (2.5, 0.002, None),
+    ],
+)
+@pytest.mark.parametrize("name", ["t", "duration"])
+def test_steps_without_a_unit_are_s_or_ms_by_how_fast_the_joints_turn(
+    read: Read, name: str, step: float, turn: float, unit: str | None
+) -> None:
+    times = [step] * 40 if name == "duration" else [step * k for k in range(40)]
+    rows = "".join(f"{time:g},{turn * abs(k % 10 - 5):g}\n" for k, time in enumerate(times))
+    text = f"{name},q1 [rad]\n{rows}"
+    if unit is None:
+        with pytest.raises(LogError, match="which may be s or ms") as asked:
+            read(text)
+        hints = [hint.value for hint in asked.value.findings[0].hints[:2]]
+        assert hints == [{name: "s"}, {name: "ms"}]
+        return
+    log = read(text)
+    assert log.period == pytest.approx(step * {"s": 1.0, "ms": 1e-3}[unit])
+    assert [one.assumption for one in log.warnings if one.role == "time"] == [f"the times are in {unit}"]
 
 
 def test_without_a_time_the_period_is_given_or_that_of_the_paper(read: Read, wrong: Wrong) -> None:

@@ -184,7 +184,7 @@ def test_fortran_exponents(read: Read) -> None:
 
 
 def test_whole_numbers_are_not_taken_for_decimals(read: Read) -> None:
-    log = read("t,q1\n0,1\n5,2\n10,3\n")
+    log = read("t [ms],q1\n0,1\n5,2\n10,3\n")
     assert log.t_ns.tolist() == [0, 5_000_000, 10_000_000]
     assert log.q.tolist() == [[1.0], [2.0], [3.0]]
 

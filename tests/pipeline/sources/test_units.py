@@ -288,8 +288,8 @@ def test_recorded_rotation_vectors_follow_their_unit(read: Read, wrong: Wrong) -
 @pytest.mark.filterwarnings("error")
 def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wrong) -> None:
     rows = "0,1e308\n1,-1e308\n2,0\n"
-    assert read(f"t,q1 [rad]\n{rows}").q[0, 0] == 1e308
-    assert wrong(f"t,q1\n{rows}") == [
+    assert read(f"t [s],q1 [rad]\n{rows}").q[0, 0] == 1e308
+    assert wrong(f"t [s],q1\n{rows}") == [
         "log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; convert ticks and counts;"
         " --unit rad or --unit deg specifies it"
     ]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 import numpy as np
 
 from urmpipe_models.elementwise import IntArray
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
@@ -24,7 +25,7 @@ from urmpipe_pipeline.sources.cells.text_clock import (
 )
 from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, OTHER_TIME, Chosen
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
-from urmpipe_pipeline.sources.clocks.clock_units import unit_of
+from urmpipe_pipeline.sources.clocks.clock_units import in_si, speed_of, unit_by_speed, unit_of
 from urmpipe_pipeline.sources.clocks.digits import all_are
 from urmpipe_pipeline.sources.clocks.steps import steps_of
 from urmpipe_pipeline.sources.clocks.text_times import known_forms, read_cells
@@ -33,7 +34,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn
 from urmpipe_pipeline.sources.tables.opening import Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
+from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
 
 PAPER_PERIOD = 0.005
 """Tsp of the paper in [s]: taken where nothing tells the time. Source: [UrmArm2021]_ eq. 22."""
@@ -161,12 +162,50 @@ def clock_of(
         return Clock(columns, parts, "s", inferences=(found,))
     unit, evidence, warnings = unit_of(time, layout, source, units, lasts=chosen.lasts)
     _refuse_ages(time, layout, unit)
-    parts = (ClockColumn(time.index, EXPONENTS[unit]),)
-    other = (Hint("unit", {time.called: "s" if unit != "s" else "ms"}),)
-    said = (found, Inference("unit of the time", unit, evidence, columns=names, hints=other))
     told = time.number in units or time.unit is not None
     by_source = not told and source is not None and "time" in source.units
-    return Clock(columns, parts, unit, told, said, warnings, by_source, chosen.lasts)
+    clock = Clock(columns, told=told, inferences=(found,), by_source=by_source, lasts=chosen.lasts)
+    return _with_unit(clock, unit, evidence, warnings)
+
+
+def _with_unit(clock: Clock, unit: str, evidence: str, warnings: tuple[LogWarning, ...]) -> Clock:
+    """Return a clock of one column of numbers with its unit."""
+    (time,) = clock.columns
+    other = (Hint("unit", {time.called: "s" if unit != "s" else "ms"}),)
+    why = Inference("unit of the time", unit, evidence, columns=(time.name,), hints=other)
+    parts, inferences = (ClockColumn(time.index, EXPONENTS[unit]),), (clock.inferences[0], why)
+    return replace(clock, parts=parts, unit=unit, inferences=inferences, warnings=warnings)
+
+
+def by_joints(clock: Clock, tables: Tables, joints: Sequence[Column], units: Mapping[int, Unit]) -> Clock:
+    """Return a clock with the unit in which the joints turn at usual speeds, if only its steps show one.
+
+    Raises:
+        LogError: If it may be s or ms.
+    """
+    if len(clock.parts) != 1 or clock.parts[0].forms or clock.told or clock.by_source:
+        return clock
+    (time,) = clock.columns
+    layout = tables.layouts[time.table]
+    if vocabulary().unit(time.key) is not None:  # "seconds" has no other name
+        return clock
+
+    @np.errstate(over="ignore", invalid="ignore")  # huge numbers
+    def speed() -> float | None:
+        if not joints:
+            return None
+        main = [joint for joint in joints if joint.table == joints[0].table]
+        times = tables.whole[time.table].values([time.index])[:, 0]
+        q = tables.whole[main[0].table].values([joint.index for joint in main])
+        if len(q) != len(times) or len(q) < 2:
+            return None
+        q, turns = in_si(q, main, units, tables.known)
+        steps = np.diff(q, axis=0)
+        steps -= np.rint(steps / FULL_TURN) * turns
+        return speed_of(steps, times[1:] if clock.lasts else np.diff(times))
+
+    unit = unit_by_speed(time, layout, speed, lasts=clock.lasts)
+    return clock if unit is None else _with_unit(clock, *unit)
 
 
 def _forms_of_numbers(

@@ -1,16 +1,24 @@
-"""The unit of a clock of numbers: given, in its name, known of the source, or told by its values."""
+"""The unit of a clock of numbers: given, in its name, known of the source, or shown by its values.
+
+Steps of 1 to 500 without a unit may be in s or in ms: how fast the joints would turn decides.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.halves import EPOCH
 from urmpipe_pipeline.sources.clocks.steps import steps_of
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.units.unit_evidence import peak
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
 
@@ -19,6 +27,12 @@ SHORTEST, LONGEST = 0.0005, 1.0
 
 _UNUSUAL, _IMPOSSIBLE = 0.0002, 1e-5
 """Periods in [s] below which a log is unusual, and below which no joint is sampled: days or hours look so."""
+
+FAST = 30.0  # no joint turns faster [rad/s]
+USUAL = 5.0  # joints of logs seldom do [rad/s]: in s instead of ms they would turn at 0.3 deg/s at most
+RESTS = 0.01  # share of the largest step of all joints below which they rest
+SHORTEST_MS = 5.0  # a log in ms has seldom shorter steps: 200 Hz
+_S_OR_MS = (1.0, 500.0)  # steps of these lengths may be in s or in ms
 
 _DAYS = {
     "Excel's days since 1900": ((36_526.0, 73_051.0), "(t - 25569) * 86400 is Unix time in s"),
@@ -96,11 +110,72 @@ def _by_values(time: Column, layout: Layout, *, lasts: bool) -> Found:
     if step <= SHORTEST:
         return _short(time, layout, step)
     evidence = f"its steps of {step:g}"
+    if likely == ["ms"] and any(number % 1 for number in times):
+        return "s", evidence, (_assumed(time, step),)
     if len(likely) == 1:
         return likely[0], evidence, ()
     if "s" in likely:
         return "s", evidence, (_assumed(time, step),)
     raise _question(time, layout, f"steps of {step:g}", likely or list(EXPONENTS))
+
+
+def unit_by_speed(
+    time: Column, layout: Layout, speed: Callable[[], float | None], *, lasts: bool
+) -> Found | None:
+    """Return s or ms by how fast the joints would turn; None if the steps show it.
+
+    Args:
+        time: The column; only its steps show its unit.
+        layout: How its table is written.
+        speed: Returns the joints' speed as if it were in s, in [rad/s]; None if none of them moves.
+        lasts: Whether it holds durations, not times.
+
+    Raises:
+        LogError: If it may be either.
+    """
+    times = layout.numbers(time.index)
+    steps = sorted(step for step in (times if lasts else steps_of(times)) if step > 0)
+    step = steps[len(steps) // 2] if steps else 0.0
+    since_1970 = not lasts and bool(times) and _since_1970(times[0], step)
+    if since_1970 or not _S_OR_MS[0] <= step <= _S_OR_MS[1]:
+        return None
+    integers, in_s = not any(number % 1 for number in times), speed()
+    if in_s is None:
+        turn, unit = "no joint moves", "ms" if integers else "s"
+    else:
+        turn = f"the joints turn at up to {1e3 * in_s:.2g} rad/s as ms, at {in_s:.2g} rad/s as s"
+        usual = 1e3 * in_s <= USUAL
+        unit = "s" if 1e3 * in_s > FAST or not (integers or usual) else "ms" if integers and usual else ""
+    if not unit or (unit == "ms" and step < SHORTEST_MS):
+        raise _question(time, layout, f"{'whole ' * integers}steps of {step:g} ({turn})", ["s", "ms"])
+    return unit, f"its steps of {step:g}, and {turn}", (_assumed(time, step, unit, f", since {turn}"),)
+
+
+def speed_of(q: FloatArray, passed: FloatArray) -> float | None:
+    """Return how fast the joints turn in nine of ten rows in which they move, in [rad/s]; None if none moves.
+
+    Their steps are in [rad], shape (n, joints), and take so many [s], shape (n,).
+    """
+    size = np.fmax.reduce(np.abs(q), axis=1, initial=0.0)
+    moves = (size > RESTS * np.fmax.reduce(size, initial=0.0)) & (passed > 0)
+    speeds = np.sort(size[moves] / passed[moves])
+    return float(speeds[int(0.9 * (len(speeds) - 1))]) if len(speeds) else None
+
+
+def in_si(
+    values: FloatArray, joints: Sequence[Column], units: Mapping[int, Unit], source: KnownSource | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return joint values in [rad] or [m], and a turn of each joint, shape (joints,): 0 where it slides.
+
+    By the units of the columns; without one, values beyond a turn in rad are taken as deg. They are in
+    the file's own units, shape (..., joints).
+    """
+    angle = source.units.get("angle") if source else None
+    beyond = peak(values.reshape(-1, values.shape[-1])) > FULL_TURN
+    usual = angle or vocabulary().units["deg" if beyond else "rad"]
+    each = [units.get(joint.number) or units.get(0) or joint.unit or usual for joint in joints]
+    slides = np.array([unit.quantity == "length" for unit in each])
+    return values * [unit.factor for unit in each], np.where(slides, 0.0, FULL_TURN)
 
 
 def _refuse_other_epochs(time: Column, layout: Layout, start: float, step: float) -> None:
@@ -133,9 +208,9 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
     return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
 
 
-def _assumed(time: Column, step: float) -> LogWarning:
-    said = f"the time {format_value(time.name)} steps by {step:.6g}: taken as s"
-    hints, taken = (*unit_hints([time], "s", "confirms it"), *OTHER_TIME), "the times are in s"
+def _assumed(time: Column, step: float, unit: str = "s", why: str = "") -> LogWarning:
+    said = f"the time {format_value(time.name)} steps by {step:.6g}: taken as {unit}{why}"
+    hints, taken = (*unit_hints([time], unit, "confirms it"), *OTHER_TIME), f"the times are in {unit}"
     return LogWarning("assumed-unit", said, hints=hints, assumption=taken, role="time")
 
 
