@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import compress
@@ -49,6 +50,8 @@ BLOCK_HINT = Hint("block", None, "takes the motion of a block", call="compare")
 BASELINE_HINT = Hint("baseline", None, "compares it, alone, with an earlier one")
 
 Operand: TypeAlias = Path | MemoryTable | RunLike | Simulation
+
+_NUMBERS = re.compile(r"\d+(-\d+)?")  # of columns
 
 MAX_VALUE = 1e12  # m or rad; larger doubles have a last digit of 0.1 mm, and powers that overflow
 
@@ -96,7 +99,7 @@ def load_runs(
             operand = _read_run_like(operand, comparison_hints)
         try:
             if isinstance(operand, (Path, MemoryTable)):
-                run = _ingest(operand, replace(read, side=side), robot, tsp, derivative)
+                run = _ingest(operand, replace(read, pair=side), robot, tsp, derivative)
             elif isinstance(operand, Simulation):
                 from urmpipe_pipeline.simulations.motion import run_of_block  # few operands are simulations
 
@@ -122,7 +125,7 @@ def load_runs(
     blocks.check_all_used()
     runs = [result for result in results if isinstance(result, Run)]
     if shared and len(runs) == len(results):
-        _check_units(read, runs)
+        _check_columns(read, runs)
         _check_intervals(read, runs)
     named = list(zip(_unique_names(operands, results), results, strict=True))
     if failed is not None:
@@ -142,8 +145,8 @@ def _ingest(
     """Return the run of a log, a folder, or a side of a log."""
     files = [log] if isinstance(log, MemoryTable) else log_files(log)
     name = log.resolve().name if isinstance(log, Path) and log.is_dir() else None
-    if read.side is not None:
-        name = f"{log.name if isinstance(log, MemoryTable) else log_stem(log.resolve())} ({read.side[0]})"
+    if read.pair is not None:
+        name = f"{log.name if isinstance(log, MemoryTable) else log_stem(log.resolve())} ({read.pair[0]})"
     return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
 
 
@@ -228,25 +231,31 @@ def _check_sides(operands: Sequence[Operand], sides: tuple[str, str]) -> None:
     raise OptionError(Finding(parameter="sides", found=f"{','.join(sides)}{fault}", allowed=allowed))
 
 
-def _check_units(read: ReadOptions, runs: Sequence[Run]) -> None:
-    """Raise an `OptionError` with each column that has a unit among the options, and that no log uses."""
+def _check_columns(read: ReadOptions, runs: Sequence[Run]) -> None:
+    """Raise an `OptionError` with each column that the options name, and that no log uses."""
     columns = [column for run in runs for column in run.log.columns]
     used = {
         name
         for column in columns
         for name in (column.name, column.header, key(column.name), str(column.number))
     }
-    unused = [name for name in read.unit if name and not {name, key(name)} & used]
+    named = {"unit": [name for name in read.unit if name]} | {
+        field: [name for name in getattr(read, field) if not _NUMBERS.fullmatch(name)]
+        for field in ("joints", "position", "orientation", "measured")
+    }
+    unused = [
+        (field, name) for field, names in named.items() for name in names if not {name, key(name)} & used
+    ]
     if unused:
         read_names = [column.name for column in columns]
         raise OptionError(
             *(
                 Finding(
-                    parameter="unit",
+                    parameter=field,
                     found=f"no column {format_value(name)}",
                     allowed=format_names(name, read_names),
                 )
-                for name in unused
+                for field, name in unused
             )
         )
 

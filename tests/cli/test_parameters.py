@@ -59,6 +59,7 @@ SAMPLES = {  # by the metavar
     "table|transposed|flat:N|flat-by-joint:N": same("flat:6"),
     "SHEET": Sample("2", 2, 2),
     "TOPIC": same("/joint_states"),
+    "WORD": same("arm2_solved"),
     "N|[COLUMN=]NAME": Sample("3", 3, 3),
     "FIRST:LAST[,...]": same("2:-1,-1:"),
     "[COLUMN=]UNIT": Sample("q1=deg,q2=rad", {"q1": "deg", "q2": "rad"}, {"q1": "deg", "q2": "rad"}),

@@ -531,6 +531,11 @@ LAYOUT = Kind(
 )
 SHEET = Kind("SHEET", "a sheet by name or number", _reader("sheet"))
 TOPIC = Kind("TOPIC", "a non-empty text", _reader("topic"))
+SIDE = Kind(
+    "WORD",
+    "a word in the names of columns, such as actual, or several, such as arm2_solved",
+    _reader("side"),
+)
 EPISODE = Kind("N|[COLUMN=]NAME", "an episode by number or name, or COLUMN=VALUE", _reader("episode"))
 ROWS = Kind(
     "FIRST:LAST[,...]",

@@ -114,6 +114,14 @@ class LogReading(TextTable, total=False):
     topic: Annotated[
         str | None, _reading(kinds.TOPIC, "Topic of a bag, or of a table with the columns of several.")
     ]
+    side: Annotated[
+        str | None,
+        _reading(
+            kinds.SIDE,
+            "Read the columns with this word in their names, and not those of another side: actual, arm1,"
+            " arm2_solved.",
+        ),
+    ]
     episode: Annotated[
         str | int | None,
         _reading(kinds.EPISODE, "Episode of a file of several: its number or name, or COLUMN=VALUE."),

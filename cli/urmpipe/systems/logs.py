@@ -29,7 +29,7 @@ from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
 
 IN_MAP = {  # options of reading that a map states
     *("decimal", "delimiter", "interval", "joints", "layout", "period"),
-    *("episode", "poses", "rotation", "rows", "sheet", "source", "time", "topic", "unit"),
+    *("episode", "poses", "rotation", "rows", "sheet", "side", "source", "time", "topic", "unit"),
 }
 NOT_IN_MAP = ("derivative", "repair", "skip_bad", "tsp")  # the others
 

@@ -94,7 +94,7 @@ def ingest_log(
     log = numbers.log(robot)
     if inference:
         log = replace(log, inferences=(*log.inferences, inference))
-    if options.shared or options.side:  # intervals of joints of another log, or of the other side
+    if options.shared or options.pair:  # intervals of joints of another log, or of the other side
         names = {"", *compress(log.joints, is_revolute(log, robot))}
         interval = {joint: ends for joint, ends in options.interval.items() if joint in names}
         options = replace(options, interval=interval)

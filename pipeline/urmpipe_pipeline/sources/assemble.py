@@ -297,6 +297,8 @@ def _like_a_time(plan: Plan, used: Sequence[Column]) -> Column | None:
 
 def _corrections(options: ReadOptions, joints: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """Return the sign and the offset of each joint, having refused others than one a joint."""
+    if options.shared and not joints:
+        return (), ()
     for what, given in (("signs", options.signs), ("offsets", options.offsets)):
         if given and len(given) != joints:
             raise OptionError(f"{what}: found {len(given)}, allowed: one for each of the {joints} joints")

@@ -15,6 +15,7 @@ from urmpipe_models.measure_units import compatible_units, quantity_to_si
 
 COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
 UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
+SIDE = "a word in the names of columns, such as actual, or several, such as arm2_solved"
 EPISODES = "an episode by number or name, or COLUMN=VALUE"
 ROWS = "rows from 1, both ends included, such as 2:-1 or 1:99,101:-1; -1 is the last"
 INTERVALS = "two ends for all revolute joints, or ends by joint, such as q1=-180:180"
@@ -53,15 +54,15 @@ class ReadOptions:
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
         interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
             of all joints that turn; in the file's own unit, or angles as texts with units.
-        side: A word in the names of the columns to read, or "rest", and that of the columns to leave out, in
-            a table that holds both what was asked for and what was done.
+        side: A word in the names of the columns to read, "actual" or "arm1", or several, "arm2_solved":
+            columns with a word of another side are left out.
         repair: Whether samples that a linear resampling left on a wrap are put on the line through their
             neighbours.
         poses: Whether the rows are static poses, which no motion joins: a clock of theirs is a label.
         measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of
             its own, and behind them of its orientation, if it was.
-        shared: Whether they hold for several logs: the unit of a column or the interval of a joint that this
-            one lacks is another's.
+        shared: Whether they apply to several logs: columns and joints that a log lacks belong to another.
+        pair: Of a comparison of two sides of a table, the word of this side, or "rest", and of the other.
     """
 
     source: str | None = None
@@ -85,10 +86,11 @@ class ReadOptions:
     skip_bad: bool = False
     interval: Mapping[str, GivenInterval] = field(default_factory=dict)
     repair: bool = False
-    side: tuple[str, str] | None = None
+    side: str | None = None
     poses: bool = False
     measured: tuple[str, ...] = ()
     shared: bool = False
+    pair: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
@@ -166,6 +168,7 @@ def _is_layout(value: Any) -> bool:
 
 _ROWS = r"(-?[1-9]\d*)?:(-?[1-9]\d*)?(,(-?[1-9]\d*)?:(-?[1-9]\d*)?)*"
 _LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
+_WORDS = re.compile(r"[^\W_]")
 _TEXT = (_is_word, "a non-empty text")
 _COLUMNS = (_are(_is_column), COLUMNS)
 _FLAG = (lambda value: isinstance(value, bool), "True or False")
@@ -193,10 +196,8 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "interval": (_are_named(is_interval), INTERVALS),
     "repair": _FLAG,
     "shared": _FLAG,
-    "side": (
-        lambda value: _are(_is_word)(value) and len(value) == 2,
-        "two words, such as ('target', 'actual')",
-    ),
+    "side": (lambda value: _is_word(value) and _WORDS.search(value) is not None, SIDE),
+    "pair": (lambda value: _are(_is_word)(value) and len(value) == 2, "two words"),
     "poses": _FLAG,
     "measured": _COLUMNS,
 }

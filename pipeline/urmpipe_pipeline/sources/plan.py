@@ -21,7 +21,7 @@ from urmpipe_pipeline.sources.columns.long_form import refuse_long_form
 from urmpipe_pipeline.sources.columns.own_log import own_joints, written_roles
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
-from urmpipe_pipeline.sources.columns.sides import of_side
+from urmpipe_pipeline.sources.columns.sides import columns_of_side, without_other_side
 from urmpipe_pipeline.sources.columns.simulated import joints_of_blocks
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
@@ -94,20 +94,21 @@ def make_plan(
     units = given_units(columns, options)
     beside = columns_named(columns, tables.layouts, further or {})
     columns = tuple(column for column in columns if column not in beside.values())
-    apart = apart if options.time else time_file(tables, columns)
+    own_side = without_other_side(columns, options)
+    apart = apart if options.time else time_file(tables, own_side)
     if apart is None:
         joints = len(robot.coordinates) if robot else None
-        clocks = find_clocks(tables, columns, options, units, joints)
+        clocks = find_clocks(tables, own_side, options, units, joints)
     else:
-        clocks = clocks_apart(tables, columns, apart, options, units)
+        clocks = clocks_apart(tables, own_side, apart, options, units)
     for i, clock in enumerate(() if options.time or apart is not None else clocks):
-        own = [column for column in columns if column.table == i]
+        own = [column for column in own_side if column.table == i]
         refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "selects one: give its number"))
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in columns if column not in times and column.table != apart]
-    rest = of_side(rest, options.side, tables.layouts[0].file)
+    rest = columns_of_side(rest, options, tables.layouts[0].file)
     only = None if apart is None else 1 - apart
-    roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
+    roles = _renamed(_roles(rest, tables, options, robot, only), options)
     roles = replace(roles, further=beside)
     _refuse_many(roles, tables)
     if not options.poses:
@@ -140,9 +141,10 @@ def _unused_files(tables: Tables, roles: Roles) -> Iterator[LogWarning]:
             yield LogWarning("file-not-used", f"none of the columns of {path.name} is used", hints=hints)
 
 
-def _renamed(roles: Roles, names: Sequence[str]) -> Roles:
+def _renamed(roles: Roles, options: ReadOptions) -> Roles:
     """Return the roles with the joint names that the user gives: one for each joint, all different."""
-    if not names:
+    names = options.names
+    if not names or (options.shared and not roles.joints):
         return roles
     if len(names) != len(roles.joints) or len(set(names)) < len(names):
         allowed = f"a name for each of the {len(roles.joints)} joints, each once"
@@ -161,7 +163,8 @@ def _roles(
     """Return the roles of the columns of all tables, or of the only one that matters."""
     main = tables.layouts[only or 0]
     several = only is None and len(set(tables.paths)) > 1
-    given = options.joints or options.position or options.measured or options.source or options.side
+    given = options.joints or options.position or options.measured or options.source
+    given = given or options.side or options.pair
     if (
         len(tables.layouts) == 1
         and not given

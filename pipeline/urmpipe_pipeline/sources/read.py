@@ -7,12 +7,16 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from urmpipe_models.arm.chain import Chain
+from urmpipe_models.errors import LogError
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.sources.assemble import assemble, recorded
 from urmpipe_pipeline.sources.clocks.time_file import named_file
+from urmpipe_pipeline.sources.columns.columns import columns_of, lacks_columns
+from urmpipe_pipeline.sources.columns.pose import find_pose
 from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
@@ -62,9 +66,15 @@ def read_numbers(
     used = [*files, named[0]] if named else files
     with unchanged(used), ThreadPoolExecutor(max_workers=1) as beside:
         tables = open_tables(files, options)
-        options = _with_own_clock(tables, options)
+        given = _with_own_clock(tables, options)
+        options = _without_foreign(tables, given)
         hashed = [beside.submit(_fingerprint, file) for file in used]
-        plan = make_plan(tables, options, robot)
+        try:
+            plan = make_plan(tables, options, robot)
+        except LogError:
+            if options != given:
+                make_plan(tables, given, robot)  # its error states the columns that are not there
+            raise
         content = read_content(plan, skip_bad=options.skip_bad)
         return Reading(plan, content, options, _name(files), tuple(future.result() for future in hashed))
 
@@ -95,6 +105,31 @@ def _with_own_clock(tables: Tables, options: ReadOptions) -> ReadOptions:
     name = key(split_unit(tables.layouts[0].names[times[0]])[0])
     called = any(pattern.search(name) for pattern in vocabulary().time)
     return options if called else replace(options, time=str(times[0] + 1))
+
+
+def _without_foreign(tables: Tables, options: ReadOptions) -> ReadOptions:
+    """Return options for several logs without the columns that this one lacks: they are those of another.
+
+    Columns by number that are x, y, z by their names are no joints and no time, either.
+    """
+    if not options.shared:
+        return options
+    columns = columns_of(tables.layouts, tables.titles)
+    numeric = [column for column in columns if not column.text]
+    named = tables.layouts[0].header is not None
+    position = {str(one.number) for one in find_pose(numeric, tables.layouts).position} if named else set()
+
+    def is_foreign(texts: Sequence[str]) -> bool:
+        return lacks_columns(columns, texts) or bool(position & {*texts})
+
+    fields = ("joints", "position", "orientation", "measured")
+    foreign = [name for name in fields if getattr(options, name) and is_foreign(getattr(options, name))]
+    foreign += ["names", "signs", "offsets"] if "joints" in foreign else []
+    time = options.time
+    if time not in (None, "none") and not named_file(time) and is_foreign([time]):
+        options = replace(options, time=None)
+    changes: dict[str, Any] = dict.fromkeys(foreign, ())
+    return replace(options, **changes)
 
 
 def _fingerprint(file: Path | MemoryTable) -> SourceFile:

@@ -114,6 +114,8 @@ class Vocabulary:
     grippers: frozenset[str]
     measured_markers: frozenset[str]
     commanded: frozenset[str]
+    arms: re.Pattern[str]
+    stems: frozenset[str]
     present: re.Pattern[str]
     marked: re.Pattern[str]
     glued: re.Pattern[str]
@@ -175,6 +177,8 @@ def vocabulary() -> Vocabulary:
         grippers=frozenset(joint["grippers"]),
         measured_markers=frozenset(joint["measured"]),
         commanded=frozenset(joint["commanded"]),
+        arms=re.compile(joint["arms"]),
+        stems=frozenset(joint["stems"]),
         present=re.compile(joint["present"]),
         marked=re.compile(rf"{_BEGINS}({marks}){_ENDS}"),
         glued=re.compile(rf"{_BEGINS}(({stems})(?=({longer}){_ENDS})|({longer})(?=({stems}){_ENDS}))"),

@@ -221,7 +221,7 @@ def test_a_missing_name_is_named(wrong: Wrong, arm: Arm) -> None:
 def test_two_groups_are_ambiguous_unless_one_fits_the_robot(wrong: Wrong, read: Read, arm: Arm) -> None:
     names = ["left_q1", "left_q2", "right_q1", "right_q2"]
     said = "found several groups of joint columns: left_q1, left_q2; right_q1, right_q2, allowed: one"
-    answers = "--joints left_q1,left_q2 or --joints right_q1,right_q2 takes these"
+    answers = "--side left or --side right takes these"
     assert wrong(table(["t", *names])) == [f"log.csv: {said}; {answers}; {OPTION}"]
     assert read(table(["t", *names, "right_q3"]), arm(3)).joints == ("right_q1", "right_q2", "right_q3")
 

@@ -57,6 +57,8 @@ class Column:
         key: The name for comparison with the vocabulary.
         unit_text: Its unit as the file has it, None if it has none.
         text: Whether it holds text instead of numbers.
+        matched: Its name without the words of the side that the user chose, where it has them.
+        side: These words, where `side` chose them.
     """
 
     number: int
@@ -67,6 +69,8 @@ class Column:
     key: str
     unit_text: str | None
     text: bool
+    matched: str = ""
+    side: frozenset[str] = frozenset()
 
     @property
     def unit(self) -> Unit | None:
@@ -81,13 +85,21 @@ class Column:
     @property
     def marked(self) -> MarkedName:
         """Its key, and what it says of its values: measured or commanded."""
-        return mark_name(self.name if key(self.name) == self.key else split_unit(self.header)[0])
+        label = self.name if key(self.name) == self.key else split_unit(self.header)[0]
+        return mark_name(self.matched or label)
 
     @property
     def words(self) -> frozenset[str]:
         """The words of its name."""
         marked = self.marked
         return marked.measured | marked.commanded | frozenset(marked.key.split("_"))
+
+    @property
+    def words_of_side(self) -> frozenset[str]:
+        """The words of its name that are of a side: measured, commanded, or one of several arms."""
+        marked = self.marked
+        arms = frozenset(word for word in marked.key.split("_") if vocabulary().arms.fullmatch(word))
+        return marked.measured | marked.commanded | arms
 
     @property
     def kind(self) -> Kind:
@@ -123,10 +135,10 @@ def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column
         titles: A title for each, told before the name where two tables have columns of one name,
             other than a time.
     """
-    found: list[Column] = []
+    result: list[Column] = []
     for table, layout in enumerate(layouts):
         refuse_wide(len(layout.names), layout.file, layout.header_line)
-        earlier = {column.name for column in found}
+        earlier = {column.name for column in result}
         for index, header in enumerate(layout.names):
             label, unit = split_unit(header) if layout.header else (header, None)
             if layout.units and index < len(layout.units):
@@ -134,10 +146,10 @@ def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column
             time = any(pattern.search(key(label)) for pattern in vocabulary().time)
             name = f"{titles[table]}/{label}" if label in earlier and not time else label
             text = _holds_text(layout.cells(index), layout.decimal)
-            number = len(found) + 1
+            number = len(result) + 1
             name = name or f"column {number}"
-            found.append(Column(number, table, index, header, name, key(label), unit, text))
-    return _named_in_cells(found, layouts)
+            result.append(Column(number, table, index, header, name, key(label), unit, text))
+    return _named_in_cells(result, layouts)
 
 
 def _named_in_cells(columns: Sequence[Column], layouts: Sequence[Layout]) -> tuple[Column, ...]:
@@ -174,12 +186,12 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
     Raises:
         LogError: If no column or more than one is meant.
     """
-    found = columns_called(columns, text)
-    if len(found) == 1:
-        return found[0]
+    matches = columns_called(columns, text)
+    if len(matches) == 1:
+        return matches[0]
     none, allowed = f"no column {format_value(text)}", listed(columns)
-    if found:
-        numbers = ", ".join(str(column.number) for column in found)
+    if matches:
+        numbers = ", ".join(str(column.number) for column in matches)
         none, allowed = f"{format_value(text)} as columns {numbers}", "one; give its number"
     raise LogError(Finding(found=none, allowed=allowed, **place))  # type: ignore[arg-type]
 
@@ -187,8 +199,15 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
 def columns_called(columns: Sequence[Column], text: str) -> list[Column]:
     """Return the columns that a text may mean: by their names, with or without unit, else by number."""
     exact = [column for column in columns if text in (column.header, column.name)]
-    found = exact or [column for column in columns if key(text) == column.key != ""]
-    return found or [column for column in columns if text == str(column.number)]
+    matches = exact or [column for column in columns if key(text) == column.key != ""]
+    return matches or [column for column in columns if text == str(column.number)]
+
+
+def lacks_columns(columns: Sequence[Column], texts: Sequence[str]) -> bool:
+    """Return whether no column has one of some names, or one of some numbers is beyond the columns."""
+    called = {text: columns_called(columns, text) for name in texts for text in _each(columns, name)}
+    numbers = [text for text in called if text.isdigit()]
+    return not any(called.values()) or (len(numbers) == len(called) and not all(called.values()))
 
 
 def chosen_columns(columns: Sequence[Column], texts: Sequence[str], **place: str) -> tuple[Column, ...]:
@@ -264,35 +283,39 @@ def refuse_twins(
 ) -> None:
     """Raise if a column that is to be used shares its name with another one.
 
-    A rate of the same name is no twin, nor is an angle "t (rad)" one of the time "t (s)": the unit says what
-    it is.
+    A rate of the same name is no duplicate, nor is an angle "t (rad)" one of the time "t (s)": the unit
+    states what it is.
 
     Raises:
         LogError: With a finding for each such column.
     """
     named: dict[str, list[Column]] = {}
-    for one in columns:
-        if one.key and not one.text:
-            named.setdefault(one.key, []).append(one)
+    for column in columns:
+        if column.key and not column.text:
+            named.setdefault(column.key, []).append(column)
     findings = []
     for column in used:
-        twins = [one for one in named.get(column.key, ()) if one is not column and _alike(one, column)]
-        if twins:
-            numbers = sorted(c.number for c in (column, *twins))
+        duplicates = [
+            other
+            for other in named.get(column.key, ())
+            if other is not column and _may_be_equal(other, column)
+        ]
+        if duplicates:
+            numbers = sorted(c.number for c in (column, *duplicates))
             more = f" and {len(numbers) - SHOWN_TWINS} more" if len(numbers) > SHOWN_TWINS else ""
-            said = f"found as columns {', '.join(map(str, numbers[:SHOWN_TWINS]))}{more}, allowed: once"
+            message = f"found as columns {', '.join(map(str, numbers[:SHOWN_TWINS]))}{more}, allowed: once"
             layout = layouts[column.table]
             place = (layout.file, layout.header_line, None, column.header)
-            findings.append(Finding(said, *place, hints=(remedy,)))
+            findings.append(Finding(message, *place, hints=(remedy,)))
     if findings:
         raise LogError(*capped(findings, layouts[used[0].table].file))
 
 
-def _alike(one: Column, other: Column) -> bool:
-    """Tell whether two columns may hold the same quantity, by their units; one without may be anything."""
-    if one.unit and other.unit and one.unit.quantity != other.unit.quantity:
+def _may_be_equal(first: Column, other: Column) -> bool:
+    """Return whether two columns may hold the same quantity, by their units or without them."""
+    if first.unit and other.unit and first.unit.quantity != other.unit.quantity:
         return False
-    return (one.unit.order if one.unit else 0) == (other.unit.order if other.unit else 0)
+    return (first.unit.order if first.unit else 0) == (other.unit.order if other.unit else 0)
 
 
 def _holds_text(cells: Sequence[str], decimal: str) -> bool:

@@ -249,7 +249,7 @@ def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column,
 def _refuse_groups(groups: Sequence[Sequence[Column]], file: str) -> NoReturn:
     """Raise the question which of several groups are the joints."""
     found = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
-    raise which_joints(file, found, groups, "one")
+    raise which_joints(file, found, groups, "one", by_side=True)
 
 
 def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> tuple[Column, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.columns.sides import side_of
 
 RECORD = Hint("", effect="record the missing one")
 OTHER_ROBOT = Hint("robot", None, "gives another arm")
@@ -60,6 +61,7 @@ def which_joints(
     groups: Sequence[Sequence[Column]],
     allowed: str = UNKNOWN,
     *hints: Hint,
+    by_side: bool = False,
 ) -> LogError:
     """Return the question which columns are the joints, with the groups that they may be.
 
@@ -69,9 +71,14 @@ def which_joints(
         groups: Columns that may be all joints; the likeliest first.
         allowed: What is allowed.
         hints: What else helps.
+        by_side: Whether the words of a side select a group, where there are such words.
     """
     different = list(dict.fromkeys(tuple(group) for group in groups if group))
-    answers = map(take, different[:MOST_ANSWERS])
+    sides = {group: side_of(group, different) for group in different} if by_side else {}
+    answers = [
+        Hint("side", side, "takes these") if (side := sides.get(group)) else take(group)
+        for group in different[:MOST_ANSWERS]
+    ]
     return LogError(
         Finding(f"found {found}, allowed: {allowed}", file, hints=(*hints, *answers, NAME_JOINTS))
     )
