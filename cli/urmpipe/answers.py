@@ -142,7 +142,6 @@ class Answer(NamedTuple):
         to_dict: Returns the JSON object; None for that of the result.
         print_text: Prints the answer; None for the presentation of the result.
         verdict: "pass" or "fail" where the result has none.
-        all_columns: Whether all columns of the result's tables are printed.
     """
 
     result: Any = None
@@ -153,7 +152,6 @@ class Answer(NamedTuple):
     to_dict: Callable[[], Any] | None = None
     print_text: Callable[[], None] | None = None
     verdict: str | None = None
-    all_columns: bool = False
 
 
 def exit_code(answer: Answer) -> int:
@@ -211,7 +209,7 @@ def _print_text(answer: Answer) -> None:
         from urmpipe_pipeline.results import is_result, present
 
         if is_result(answer.result):
-            print_presentation(present(answer.result), all_columns=answer.all_columns)
+            print_presentation(present(answer.result))
     for line in answer.lines:
         print_line(line)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from urmpipe.arm_placing import Robot, place_robot
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import map_collecting_errors
 from urmpipe_models.math3d import from_offset
-from urmpipe_pipeline.sources import LogMap, ReadOptions, read_map
+from urmpipe_pipeline.sources import LogMap, read_map
 from urmpipe_pipeline.sources.options import read_options
 
 
@@ -27,18 +27,15 @@ class ResolvedReading:
 
     arm: Chain | None
     robot: Robot | None
-    options: ReadOptions
+    options: LogMap
 
 
-def resolve_reading(
-    options: Mapping[str, Any], robot: Robot | None = None, names: Sequence[str] | None = None
-) -> ResolvedReading:
+def resolve_reading(options: Mapping[str, Any], robot: Robot | None = None) -> ResolvedReading:
     """Return the arm and the reading that options and their map state; the options come before the map.
 
     Args:
         options: Values of the parameters `Placing` and `Reading`.
         robot: Name, file or chain of the arm.
-        names: Names of the joints.
 
     Raises:
         UrmpipeError: With everything that is wrong with the map, the arm or an option.
@@ -52,19 +49,19 @@ def resolve_reading(
     links = {"base_link": options.get("base_link"), "tip_link": options.get("tip_link")}
     parts: tuple[Callable[[], Any], ...] = (
         lambda: place_robot(arm, base, tool, **links),
-        lambda: read_options({**options, "names": names}, log_map.read),
+        lambda: read_options(options, replace(log_map, robot=None, base=(), tool=())),
     )
     chain, read = map_collecting_errors(lambda part: part(), parts)
     return ResolvedReading(chain, arm, read)
 
 
-def to_read_options(options: Mapping[str, Any]) -> ReadOptions:
+def to_log_map(options: Mapping[str, Any]) -> LogMap:
     """Return how a table is read, as options and their map state, without their arm.
 
     Raises:
         UrmpipeError: With everything that is wrong with the map or an option.
     """
-    return read_options(options, _read_map(options).read)
+    return read_options(options, _read_map(options))
 
 
 def _read_map(options: Mapping[str, Any]) -> LogMap:

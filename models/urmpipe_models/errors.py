@@ -47,10 +47,15 @@ _PLACEHOLDERS: Mapping[str, Any] = {  # of other parameters: the name in capital
     "joints": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
     "map": Placeholder("FILE.toml"),
     "measured": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
+    "names": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
+    "orientation": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
     "output": Placeholder("FILE"),
     "period": Placeholder("SECONDS"),
+    "position": [Placeholder("X"), Placeholder("Y"), Placeholder("Z")],
     "robot": Placeholder("NAME|FILE"),
     "rotation": Placeholder("FORM"),
+    "offsets": [Placeholder("OFFSET"), Placeholder("...")],
+    "signs": [Placeholder("1|-1"), Placeholder("...")],
     "source": Placeholder("NAME"),
     "step": Placeholder("SECONDS"),
     "sync": Placeholder("SECONDS"),
@@ -63,9 +68,9 @@ _PLACEHOLDERS: Mapping[str, Any] = {  # of other parameters: the name in capital
 }
 
 _NO_OPTION = {  # keywords that are positional arguments of commands, or of Python alone
-    *("defaults", "drives", "font", "inputs", "lazy", "logs", "name", "name_or_path", "names", "network"),
-    *("offsets", "on_message", "orientation", "path", "position", "progress", "q", "recorded_tcp"),
-    *("recordings", "reference", "result", "results", "run", "shared", "side", "signs", "starts", "system"),
+    *("defaults", "drives", "font", "inputs", "lazy", "logs", "name", "name_or_path", "network"),
+    *("on_message", "path", "progress", "q", "recorded_tcp"),
+    *("recordings", "reference", "result", "results", "run", "shared", "side", "starts", "system"),
     *("t", "targets", "title", "width"),
 }
 

@@ -105,7 +105,7 @@ def test_the_map_and_the_defaults_of_the_page_are_sound(tmp_path: Path) -> None:
     lab, defaults = (block.split("```")[0] for block in PAGE.split("```toml\n")[1:])
     (tmp_path / "lab.toml").write_text(lab, encoding="utf-8")
     said = read_map(tmp_path / "lab.toml")
-    assert (said.robot, said.read.names, said.read.rotation) == ("ur5e", ("shoulder",), "zyx")
+    assert (said.robot, said.names, said.rotation) == ("ur5e", ("shoulder",), "zyx")
     (tmp_path / "urmpipe.toml").write_text(defaults, encoding="utf-8")
     names = ("ingest", "compare")
     commands = {name: getattr(import_module(f"urmpipe.commands.{name}"), name) for name in names}

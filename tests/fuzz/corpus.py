@@ -54,26 +54,22 @@ base = [0, 0, 0]
 tool = [0, 0, 0.1, 0, 0, 0]
 delimiter = " "
 
-[clock]
-column = "timestamp"
-unit = "s"
-
-[tcp]
+time = "timestamp"
+joints = [JOINTS]
+names = ["a", "b", "c", "d", "e", "f"]
+signs = [-1, -1, -1, -1, -1, -1]
+offsets = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]
 position = ["actual_TCP_pose_0", "actual_TCP_pose_1", "actual_TCP_pose_2"]
 orientation = ["actual_TCP_pose_3", "actual_TCP_pose_4", "actual_TCP_pose_5"]
-form = "vector"
-""" + "".join(
-    f"""
-[[joints]]
-column = "actual_q_{i}"
-name = "shoulder {i}"
-unit = "rad"
-sign = -1
-offset = 0.1
-interval = [-3.2, 3.2]
-"""
-    for i in range(6)
-)
+rotation = "vector"
+
+[unit]
+timestamp = "s"
+actual_q_0 = "rad"
+
+[interval]
+a = [-3.2, 3.2]
+""".replace("JOINTS", ", ".join(f'"actual_q_{i}"' for i in range(6)))
 
 DEFAULTS = """robot = "ur5e"
 tool = [0, 0, 0.15]

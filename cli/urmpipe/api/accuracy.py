@@ -15,7 +15,7 @@ from urmpipe.output_files import guarded_outputs
 from urmpipe.parameters import kinds
 from urmpipe.parameters.motions import Accuracy as AccuracyParameters
 from urmpipe.public_functions import PathLike, as_paths, public_function, raise_warnings, reject_recording
-from urmpipe.reading import map_files, resolve_reading, to_read_options
+from urmpipe.reading import map_files, resolve_reading, to_log_map
 from urmpipe.systems.blocks import ON_PYTHON
 from urmpipe.systems.units import Backend
 from urmpipe_fmus.build.fmu import select_backend
@@ -156,7 +156,7 @@ def _read_rows(path: PathLike | PathRows, options: Mapping[str, Any]) -> GivenPa
         if PATH_ROW.encode() in header:
             allowed = "the path (CSV of x, y, z, ...) from which it was planned"
             raise LogError(Finding(file=str(path), found="the motion of a plan", allowed=allowed))
-    return given_path(path, to_read_options(options))
+    return given_path(path, to_log_map(options))
 
 
 def _check_velocities(velocities: Sequence[float]) -> list[float]:

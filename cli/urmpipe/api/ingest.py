@@ -40,7 +40,6 @@ def ingest(
     t: ArrayLike | None = None,
     q: ArrayLike | None = None,
     recorded_tcp: ArrayLike | None = None,
-    names: Sequence[str] | None = None,
     name: str | None = None,
     **options: Unpack[Ingest],
 ) -> Run:
@@ -54,7 +53,6 @@ def ingest(
         q: Joint values in [rad] or [m], shape (n, joints); `unit` states another unit of angles.
         recorded_tcp: The recorded tool centre point in [m], shape (n, 3), with quaternions x, y, z, w after
             it, shape (n, 7), or as matrices, shape (n, 4, 4).
-        names: Names of the joints, in their order; default: those of their columns, of arrays q1, q2, ...
         name: Name of the log; default: its file's stem, else "log".
         **options: How the log is read, where the arm is placed, what is written: the options of
             `urmpipe ingest`, by their names.
@@ -64,7 +62,7 @@ def ingest(
     """
     values: Mapping[str, Any] = options  # as their kinds read them
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: resolve_reading(values, robot, names),
+        lambda: resolve_reading(values, robot),
         lambda: _files_and_name(log, {"t": t, "q": q, "recorded_tcp": recorded_tcp}),
     )
     resolved, (files, folder) = map_collecting_errors(lambda part: part(), parts)
@@ -77,7 +75,7 @@ def ingest(
     }  # fmt: skip
     kept = [*(file for file in files if isinstance(file, Path)), *map_files(values), *values["inputs"]]
     with guarded_outputs(outputs, kept) as written:
-        of_logs = {key: values[key] for key in LOG_PARAMETERS} | {"names": names, "name": name}
+        of_logs = {key: values[key] for key in LOG_PARAMETERS} | {"name": name}
         run = recording_to_run(files, resolved.arm, of_logs) or ingest_log(
             files,
             robot=resolved.arm,

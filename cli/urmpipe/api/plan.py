@@ -14,7 +14,7 @@ from urmpipe.output_files import output_kind
 from urmpipe.parameters import kinds
 from urmpipe.parameters.motions import Plan
 from urmpipe.public_functions import PathLike, as_paths, public_function, raise_warnings, reject_recording
-from urmpipe.reading import map_files, resolve_reading, to_read_options
+from urmpipe.reading import map_files, resolve_reading, to_log_map
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
@@ -115,7 +115,7 @@ def _start(arm: Chain | None, start: JointValues | None) -> FloatArray | None:
 def _read_rows(path: PathLike | PathRows, options: Mapping[str, Any]) -> GivenPath:
     """Return the rows of a path; raise a `LogError` if it is a recording."""
     reject_recording(path, "a table (CSV) of rows, or a test cube (cube:...)")
-    return given_path(path, to_read_options(options))
+    return given_path(path, to_log_map(options))
 
 
 def _write_log(result: PlannedPath, path: Path, kept: Sequence[Path]) -> None:

@@ -12,7 +12,7 @@ from urmpipe_pipeline.sources import LogMap
 
 @public_function(path=kinds.MAP_FILE)
 def read_map(path: PathLike) -> LogMap:
-    """Return what a map (TOML) says: `read`, how to read a log, and its `robot`, `base` and `tool`.
+    """Return a map (TOML): how to read a log, and its `robot`, `base` and `tool`.
 
     Args:
         path: The file.

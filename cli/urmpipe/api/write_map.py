@@ -1,4 +1,4 @@
-"""`urmpipe.write_map`: what was inferred of a log, saved for the next ones."""
+"""The map of a log, saved for the next ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urmpipe.public_functions import PathLike, as_paths, public_function
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import map_of, read_map
+from urmpipe_pipeline.sources import LogMap, format_map, map_of, read_map
 
 
 @public_function(run=kinds.RUN, output=kinds.MAP_FILE, robot=kinds.ROBOT_FILE, inputs=kinds.PATHS)
@@ -37,14 +37,18 @@ def write_map(
 
 
 def write_map_part(run: Run, part: Path, path: Path, robot: str | None) -> None:
-    """Write the map of a run to a part that is to have a name, and read it back."""
+    """Write the map of a run to a part of a file, and read it back."""
+    part.write_text(format_map(map_of_run(run, path, robot)), encoding="utf-8", newline="\n")
+    read_map(part)
+
+
+def map_of_run(run: Run, path: Path, robot: str | None) -> LogMap:
+    """Return the map of the log of a run, for a file; `robot` as in `write_map`."""
     arm = run.robot
     if robot is None:
         robot = arm.name if arm and arm.name in robot_names() else None
     elif Path(robot).suffix:
         robot = os.path.relpath(robot, path.parent)
     frames = (arm.base, arm.tool) if arm else ()
-    options = run.provenance.options.get("read") or {}
-    text = map_of(run.log, robot, *(offset_of(frame) for frame in frames), given=options)
-    part.write_text(text, encoding="utf-8", newline="\n")
-    read_map(part)
+    given = LogMap(**(run.provenance.options.get("read") or {}))
+    return map_of(run.log, given, robot, *(offset_of(frame) for frame in frames))

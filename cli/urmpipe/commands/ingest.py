@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +15,12 @@ from urmpipe.parameters import kinds
 from urmpipe.parameters.comparing import Ingest
 from urmpipe.parameters.shared import ROBOT
 from urmpipe_models.display import format_count
-from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.files import log_stem
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.runs.run import Run
+    from urmpipe_pipeline.sources import LogMap
 
 
 @command(Ingest, robot=ROBOT)
@@ -49,8 +52,40 @@ def ingest(call: Call, logs: tuple[Path, ...], output: Path | None, explain: boo
         output = default_output(first.parent.name if len(logs) > 1 else log_stem(first))
     is_replaced = output is not None and output.exists()
     with call.progress(f"Writing {output}", shown=output is not None) as progress:
-        run = urmpipe.ingest(logs, output=output, progress=progress, **options)
-    return Answer(run, _iter_lines(run, is_replaced, options), all_columns=explain)
+        try:
+            run = urmpipe.ingest(logs, output=output, progress=progress, **options)
+        except LogError as error:
+            asked = _open_map(logs, options, error) if explain and not call.json else None
+            if asked is None or not asked.questions:
+                raise
+            return Answer(print_text=partial(_print_map, asked), errors=error.findings)
+    text = partial(_print_run_map, run, options["robot"]) if explain else None
+    return Answer(run, _iter_lines(run, is_replaced, options), print_text=text)
+
+
+def _print_run_map(run: Run, robot: str | None) -> None:
+    from urmpipe.api.write_map import map_of_run
+    from urmpipe_pipeline.results import present
+
+    _print_map(map_of_run(run, Path("map.toml"), robot), present(run).headline)
+
+
+def _print_map(log_map: LogMap, headline: str = "") -> None:
+    from urmpipe.printing.terminal import print_line
+    from urmpipe_pipeline.sources import format_map
+
+    for line in (*([f"# {headline}"] if headline else ()), *format_map(log_map).splitlines()):
+        print_line(line)
+
+
+def _open_map(logs: tuple[Path, ...], options: Mapping[str, Any], error: LogError) -> LogMap:
+    """Return what is known of logs that cannot be read, and the questions."""
+    from urmpipe.reading import to_log_map
+    from urmpipe_pipeline.operands import log_files
+    from urmpipe_pipeline.sources.read import open_map
+
+    files = [file for log in logs for file in log_files(log)]
+    return open_map(files, replace(to_log_map(options), robot=options["robot"]), error)
 
 
 def _iter_lines(run: Run, is_replaced: bool, options: Mapping[str, Any]) -> Iterator[str]:

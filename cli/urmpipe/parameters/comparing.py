@@ -44,7 +44,7 @@ class Ingest(Placing, Reading, Processing, Strict, Inputs, Progress, total=False
         bool,
         _output(
             kinds.FLAG,
-            "Print each decision with its evidence and the option that changes it; write no recording.",
+            "Print the map of the log, each entry with its evidence; write no recording.",
             default=False,
             python=False,
         ),

@@ -214,6 +214,12 @@ def _split_columns(value: Any) -> Any:
     return _read_list(value) if isinstance(value, str) and value else value
 
 
+def _split_numbers(value: Any) -> Any:
+    if not isinstance(value, (str, list, tuple)) or not value:
+        return value
+    return [float(part) if isinstance(part, str) else part for part in _read_list(value)]
+
+
 def _split_units(value: Any) -> Any:
     """Split UNIT, COLUMN=UNIT and lists of them by column; "" is all angles."""
     texts = [value] if isinstance(value, str) and value else value
@@ -522,6 +528,11 @@ COLUMNS = Kind(
     "columns by name or number, such as q1,q2 or 2,3",
     _reader("joints", _split_columns),
     columns(several=True),
+)
+JOINT_NAMES = Kind("NAME,...", "names, such as q1,q2", _reader("names", _split_columns))
+SIGNS = Kind("1|-1,...", "1 or -1 for each joint, such as 1,-1", _reader("signs", _split_numbers))
+OFFSETS = Kind(
+    "OFFSET,...", "numbers in the units of the columns, such as 0,90", _reader("offsets", _split_numbers)
 )
 LAYOUT = Kind(
     "table|transposed|flat:N|flat-by-joint:N",

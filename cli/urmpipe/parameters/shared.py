@@ -54,6 +54,14 @@ class TextTable(TypedDict, total=False):
         _reading(kinds.DELIMITER, "Column separator, by name or as the character itself in quotes."),
     ]
     decimal: Annotated[str | None, _reading(kinds.DECIMAL, "Decimal separator.")]
+    position: Annotated[
+        str | Sequence[str | int] | None,
+        _reading(kinds.COLUMNS, "Columns of the recorded tool position or of the targets: x, y, z."),
+    ]
+    orientation: Annotated[
+        str | Sequence[str | int] | None,
+        _reading(kinds.COLUMNS, "Columns of the orientation beside them, in the order of its form."),
+    ]
     rotation: Annotated[
         str | None,
         _reading(kinds.ROTATION, "Form of the recorded orientation, where the column names leave it open."),
@@ -142,6 +150,17 @@ class LogReading(TextTable, total=False):
 class Reading(LogReading, total=False):
     """How a log is read, and the intervals of its joints."""
 
+    names: Annotated[
+        str | Sequence[str] | None, _reading(kinds.JOINT_NAMES, "Names of the joints, in their order.")
+    ]
+    signs: Annotated[
+        str | Sequence[int] | None,
+        _reading(kinds.SIGNS, "1 or -1 for each joint: q = sign * value + offset."),
+    ]
+    offsets: Annotated[
+        str | Sequence[float] | None,
+        _reading(kinds.OFFSETS, "Offset of each joint, in the unit of its column."),
+    ]
     poses: Annotated[bool | None, _reading(kinds.FLAG, "The rows are static poses without time.")]
     measured: Annotated[
         str | Sequence[str | int] | None,

@@ -34,18 +34,11 @@ MAX_KEY_WIDTH = 32  # characters of a key or of words in a column; longer ones a
 COLUMN_GAP = 2  # blanks between two columns
 
 
-def print_presentation(presentation: Presentation, *, all_columns: bool = False) -> None:
-    """Print the brief content of a result.
-
-    Args:
-        presentation: The content.
-        all_columns: Print all columns of the tables of its body, brief or not.
-    """
+def print_presentation(presentation: Presentation) -> None:
+    """Print the brief content of a result."""
     console = new_console()
     _print_verdict(console, presentation)
-    _print_section(
-        console, presentation.body, {fact.name for fact in presentation.facts}, all_columns=all_columns
-    )
+    _print_section(console, presentation.body, {fact.name for fact in presentation.facts})
     sections = [
         section for section in presentation.body.sections if not section.errors
     ]  # those are on stderr
@@ -81,9 +74,7 @@ def _select_sections(sections: Sequence[Section]) -> Sequence[Section]:
     return [section for section in judged if section.verdict == "fail"][-MAX_SECTIONS:]
 
 
-def _print_section(
-    console: Console, section: Section, printed_facts: set[str] | None = None, *, all_columns: bool = False
-) -> None:
+def _print_section(console: Console, section: Section, printed_facts: set[str] | None = None) -> None:
     for table in brief_tables(section):
         rows = rows_within(table, LISTED)
         columns = [
@@ -93,7 +84,7 @@ def _print_section(
                 key=not number,
                 words=all(isinstance(cell, (str, Ref, Advice, type(None))) for cell in column.cells),
             )
-            for number, column in enumerate(brief_columns(table, every=all_columns))
+            for number, column in enumerate(brief_columns(table))
         ]
         print_columns(console, f"{section.title}: {table.title}", columns)
         if (hidden := len(table.columns[0].cells) - LISTED) > 0:

@@ -26,12 +26,9 @@ from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.grid import REGULAR
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
+from urmpipe_pipeline.sources.options import READING
 
-IN_MAP = {  # options of reading that a map states
-    *("decimal", "delimiter", "interval", "joints", "layout", "period"),
-    *("episode", "poses", "rotation", "rows", "sheet", "side", "source", "time", "topic", "unit"),
-}
-NOT_IN_MAP = ("derivative", "repair", "skip_bad", "tsp")  # the others
+NOT_IN_MAP = ("derivative", "tsp")  # options of logs that are no entries of a map
 
 
 class Quantity(NamedTuple):
@@ -158,7 +155,7 @@ def read_mapped_table(
 def _name_map(hints: Sequence[Hint]) -> Iterator[Hint]:
     """Yield hints with a map in place of options that it states, and without those that it cannot state."""
     for hint in hints:
-        if not hint.call and hint.parameter in IN_MAP:
+        if not hint.call and hint.parameter in READING:
             source = f"from urmpipe ingest {hint} {Hint('write_map')}"
             yield Hint("map", None, f"{source} {hint.effect}".strip())
         elif hint.call or hint.parameter not in NOT_IN_MAP:

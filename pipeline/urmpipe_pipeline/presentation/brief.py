@@ -19,11 +19,11 @@ def brief_tables(section: Section) -> list[Table]:
     return [one for one in section.tables if one.brief and one.columns and len(one.columns[0].cells)]
 
 
-def brief_columns(table: Table, *, every: bool = False) -> Iterator[Column]:
-    """Yield the first column and those that have a value, all or only the brief ones."""
+def brief_columns(table: Table) -> Iterator[Column]:
+    """Yield the first column and the brief ones that have a value."""
     for number, one in enumerate(table.columns):
         valued = not number or any(written(cell) != text.NOTHING for cell in one.cells)
-        if valued and (every or one.brief):
+        if valued and one.brief:
             yield one
 
 

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import compress
 from pathlib import Path
 from typing import get_args
@@ -44,6 +44,7 @@ from urmpipe_pipeline.runs.torques import (
 )
 from urmpipe_pipeline.sources import MemoryTable, ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
+from urmpipe_pipeline.sources.options import READING, LogMap
 from urmpipe_pipeline.sources.read import read_numbers
 
 MIN_TSP = 1e-9  # s, times of a log are whole nanoseconds
@@ -98,9 +99,12 @@ def ingest_log(
         names = {"", *compress(log.joints, is_revolute(log, robot))}
         interval = {joint: ends for joint, ends in options.interval.items() if joint in names}
         options = replace(options, interval=interval)
-    # `shared` does not change how this log is read
-    defaults = asdict(ReadOptions()) | {"shared": options.shared}
-    read_options = {key: value for key, value in asdict(options).items() if value != defaults[key]}
+    unread = LogMap()
+    read_options = {  # `shared` does not change how this log is read
+        key: value
+        for key in READING
+        if (value := getattr(options, key)) != getattr(unread, key) and key != "shared"
+    }
     run_options = {"robot": robot.name if robot else None, "tsp": tsp, "derivative": derivative}
     provenance = build_provenance("ingest", run_options | {"read": read_options or None}, log.files)
     return log_to_run(log, robot, options, tsp=tsp, derivative=derivative, name=name, provenance=provenance)

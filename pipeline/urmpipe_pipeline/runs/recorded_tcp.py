@@ -451,7 +451,7 @@ def _with_error(error: Edit, robot: Chain, log: JointLog, poses: RecordedPoses) 
         return _Alternative(f"the kinematics of {error.name} agree", hint, arm, q.T)
     names = " and ".join(log.joints[j] for j in error.joints)
     if error.kind == "joint_sign":
-        hint = Hint("map", None, f"sets sign = -1 for {names}")
+        hint = Hint("signs", None, f"sets -1 for {names}")
         return _Alternative(f"with {names} reversed in sign they agree", hint, arm, q.T)
     order, (first, second) = _joint_option(log), error.joints
     order[first], order[second] = order[second], order[first]

@@ -16,7 +16,7 @@ from urmpipe_pipeline.sources.columns.columns import listed
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.targets.pose_table import PoseTable, read_pose_table
-from urmpipe_pipeline.sources.targets.target_rotation import MAP
+from urmpipe_pipeline.sources.targets.target_rotation import NAMED
 
 FEWEST = 3
 """An orientation has at least so many columns."""
@@ -104,7 +104,7 @@ def _not_used(table: PoseTable, asked: ReadOptions) -> list[LogWarning]:
         return []
     targets = f"{listed(table.plan.roles.position)} are targets without an orientation"
     said = f"{targets}: {listed(table.unused_numbers, most=8)} are not used"
-    return [LogWarning("columns-not-used", said, hints=(MAP,))]
+    return [LogWarning("columns-not-used", said, hints=(NAMED,))]
 
 
 def _times(

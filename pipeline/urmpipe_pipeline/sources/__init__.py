@@ -5,8 +5,8 @@ columns?), `table` (its numbers, and where it is wrong, with line and column), `
 The words by which columns, units and sources are known are in `vocabulary.toml`.
 """
 
-from urmpipe_pipeline.sources.log_map import LogMap, map_of, read_map
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.log_map import format_map, map_of, read_map
+from urmpipe_pipeline.sources.options import LogMap, ReadOptions
 from urmpipe_pipeline.sources.read import read_log
 from urmpipe_pipeline.sources.tables.frames import TableLike, dataframe_to_table, is_table
 from urmpipe_pipeline.sources.tables.given_arrays import arrays_to_table
@@ -20,6 +20,7 @@ __all__ = [
     "TableLike",
     "arrays_to_table",
     "dataframe_to_table",
+    "format_map",
     "is_table",
     "map_of",
     "read_log",

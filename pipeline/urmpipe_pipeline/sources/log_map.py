@@ -1,258 +1,286 @@
-"""Maps: what a lab says once about its logs - columns, units, order, signs, offsets, clock, base, tool.
+"""Maps of logs as TOML: what was found of one log, or is known of a lab's logs, reads the next ones.
+
+- `read_map`: the map of a file.
+- `map_of`: the map by which a log reads as it was read, with the evidence of each entry.
+- `format_map`: a map as TOML with the evidence as comments; a unit that is only assumed is a comment.
 
 docs/logs.md has an example: "Maps and defaults".
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from urmpipe_models.display import format_count
-from urmpipe_models.errors import Finding, OptionError, escape_line, format_value
-from urmpipe_models.math3d import FORMS
+from urmpipe_models.errors import Finding, OptionError, escape_line
 from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
-from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
-from urmpipe_pipeline.sources.options import GivenInterval, ReadOptions, is_interval
+from urmpipe_pipeline.sources.options import READING, Basis, Evidence, LogMap
+from urmpipe_pipeline.sources.tables.opening import TABLE
 from urmpipe_pipeline.sources.units.rotation import PURE
+from urmpipe_pipeline.sources.vocabulary import key as compared
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
-T = TypeVar("T")
+TABLES = ("unit", "interval")
+KEYS = (
+    *(
+        "source",
+        "robot",
+        "base",
+        "tool",
+        "delimiter",
+        "decimal",
+        "layout",
+        "sheet",
+        "topic",
+        "episode",
+        "rows",
+        "side",
+    ),
+    *(
+        "time",
+        "period",
+        "poses",
+        "joints",
+        "names",
+        "signs",
+        "offsets",
+        "position",
+        "orientation",
+        "rotation",
+    ),
+    *("measured", "skip_bad", "repair"),
+)
+"""The keys of a map before its tables, in this order."""
+
+FRAME_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
 CORRECTIONS = (
-    "# Where the file counts a joint otherwise: sign = -1, offset = 90 (q = sign * value + offset).",
-    "# What the environment limits it to: interval = [-180, 180].",
+    "# signs = [1, -1, ...] and offsets = [0, 90, ...] correct the joints: q = sign * value + offset.",
+    "# interval.q1 = [-180, 180] is the interval to which the program limits a joint.",
 )
-"""What may be added to the joints of a map by hand."""
+"""What may be added to a map by hand."""
 
-TURNING = ("rad", "deg")
-"""Units of joints that turn: they alone have an interval."""
+NOTES = ("encoding", "header", "labels", "arrays", "program", "clock", "form of the time", "columns not used")
+"""Kinds of inferences that are no entries of a map."""
 
 
-@dataclass(frozen=True, slots=True)
-class LogMap:
-    """What a map says.
+THEIR_NAMES = "their names"
+"""Evidence of a form of orientation that the names of its columns state."""
 
-    Attributes:
-        read: How to read a log.
-        robot: Name or file of the arm, or None.
-        base: Where it stands: X, Y, Z[, RX, RY, RZ] in [m] and [rad], or nothing.
-        tool: Its tool centre point, in the same form.
-    """
+UNITS = ("unit", "form", "unit of the time")
+"""Kinds of inferences about units."""
 
-    read: ReadOptions = field(default_factory=ReadOptions)
-    robot: str | None = None
-    base: tuple[float, ...] = ()
-    tool: tuple[float, ...] = ()
+QUANTITIES = {"rad": "angle", "deg": "angle", "": "angle"}
 
 
 def read_map(path: Path) -> LogMap:
-    """Return what a map says.
+    """Return the map of a file.
 
     Raises:
         OptionError: With everything that is wrong with it.
     """
     faults: list[Finding] = []
     table = CheckedTable(read_toml(path, OptionError), faults, str(path))
-    clock, tcp = table.table("clock"), table.table("tcp")
-    joints = table.tables("joints") if table.has("joints") else []
-    units = table.mapping("units")
-    columns = [_joint(joint, units) for joint in joints]
-    names = tuple(name for _, name, _, _ in columns)
-    intervals = zip(names, (_interval(joint) for joint in joints), strict=True)
-    time = _time_beside(path, _given(clock, "column", clock.text))
-    apart = named_file(time)
-    _note_unit(clock, apart[1] if apart else time or None, units)
-    robot = _given(table, "robot", table.text)
-    position = _given(tcp, "position", tcp.texts) or ()
-    orientation = _given(tcp, "orientation", tcp.texts) or ()
-    outside = tcp.flag("measured")
-    result = LogMap(
-        ReadOptions(
-            source=_given(table, "source", table.text),
-            delimiter=_given(table, "delimiter", table.text),
-            decimal=_given(table, "decimal", table.text),
-            layout=_given(table, "layout", table.text),
-            time=time,
-            period=_given(clock, "period", partial(clock.number, si="s")),
-            joints=tuple(column for column, _, _, _ in columns),
-            names=names,
-            signs=tuple(sign for _, _, sign, _ in columns),
-            offsets=tuple(offset for _, _, _, offset in columns),
-            position=() if outside else position,
-            orientation=() if outside else orientation,
-            measured=(*position, *orientation) if outside else (),
-            rotation=tcp.choice("form", FORMS) if tcp.has("form") else None,  # type: ignore[arg-type]
-            unit=units,
-            interval={name: interval for name, interval in intervals if interval},
-            poses=clock.flag("poses"),
-        ),
-        robot=_beside(path, robot) if robot else None,
-        base=_frame(table, "base"),
-        tool=_frame(table, "tool"),
-    )
-    for part in (table, clock, tcp, *joints):
-        part.report_unknown_keys()
+    values: dict[str, Any] = {}
+    for key in (*KEYS, *TABLES):
+        if not table.has(key):
+            continue
+        if key == "period":
+            values[key] = table.number(key, si="s")
+        elif key in ("base", "tool"):
+            values[key] = [*table.numbers(key, None, si=FRAME_UNITS)]
+        else:
+            values[key] = table.value(key)
+        try:
+            LogMap(**{key: values[key]})
+        except OptionError as error:
+            del values[key]
+            for finding in error.findings:
+                table.add_error(key, f"found {finding.found}, allowed: {finding.allowed}")
+    table.report_unknown_keys()
     if faults:
         raise OptionError(*faults)
-    return result
+    result = LogMap(**values)
+    beside, file = f"{path.parent / str(result.time)}", result.robot and Path(result.robot)
+    return replace(
+        result,
+        time=beside if result.time and named_file(beside) else result.time,
+        robot=str(path.parent / file) if file and file.suffix else result.robot,
+    )
 
 
 def map_of(
     log: JointLog,
+    given: LogMap | None = None,
     robot: str | None = None,
     base: Sequence[float] = (),
     tool: Sequence[float] = (),
-    *,
-    given: Mapping[str, Any] | None = None,
-) -> str:
-    """Return the map by which a log reads as it was read, as TOML.
+) -> LogMap:
+    """Return the map by which a log reads as it was read, with the evidence of its entries.
 
     Args:
         log: The log.
+        given: The map with which it was read.
         robot: Name or file of the arm.
-        base: Where it stands, in [m] and [rad]; nothing for the origin.
+        base: Its frame: X, Y, Z[, RX, RY, RZ] in [m] and [rad]; nothing for the origin.
         tool: Its tool centre point, in the same form; nothing for the tip.
-        given: Fields of the `ReadOptions` it was read with; the intervals and the units of the clock stand
-            nowhere else.
     """
-    asked = given or {}
-    intervals = asked.get("interval", {})
-    found = {inference.kind: inference.value for inference in log.inferences}
-    top = {
-        "source": log.source,
-        "delimiter": found.get("delimiter"),
-        "decimal": {"point": ".", "comma": ","}.get(found.get("decimal sign", "")),
-        "layout": found.get("layout"),
-        "robot": robot,
-        "base": list(base) or None,
-        "tool": list(tool) or None,
+    given = given or LogMap()
+    found = {inference.kind: inference for inference in log.inferences}
+    values: dict[str, Any] = {
+        name: getattr(given, name) for name in READING if name not in ("shared", "pair")
     }
-    clock = _clock(log, found, asked.get("time"))
-    lines = [MAP_HEADER, "", *format_toml(top), "", "[clock]", *format_toml(clock)]
-    lines += ["", *CORRECTIONS] if log.joints else []
-    for column, name in zip(_of(log, "joint"), log.joints, strict=True):
-        said: dict[str, Any] = {"column": _called(log, column), "name": name}
-        said |= {} if column.uncertainty else {"unit": column.unit}
-        corrected = {"sign": column.sign, "offset": column.offset}
-        said |= corrected if corrected != {"sign": 1, "offset": 0.0} else {}
-        interval = intervals.get(name, intervals.get(""))
-        said |= {"interval": list(interval)} if interval and column.unit in TURNING else {}
-        lines += ["", "[[joints]]", *format_toml(said)]
-        lines += [_assumed("unit", column.unit, column.uncertainty)] if column.uncertainty else []
-    position, orientation = _of(log, "position"), _of(log, "rotation")
-    if position:
-        said = {"position": [_called(log, column) for column in position]}
-        turned = {"orientation": [_called(log, column) for column in orientation], "form": log.rotation_form}
-        said |= turned if orientation else {}
-        lines += ["", "[tcp]", *format_toml(said | ({"measured": True} if log.externally_measured else {}))]
-    measured = [column for column in (*position, *orientation) if column.unit != PURE.name]
-    units = {_called(log, column): column.unit for column in measured if not column.uncertainty}
-    timed = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
-    units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in timed}
-    told = [f"{quote_toml(one)} = {quote_toml(unit)}" for one, unit in units.items()]
-    told += [_assumed(quote_toml(_called(log, c)), c.unit, c.uncertainty) for c in measured if c.uncertainty]
-    lines += ["", "[units]", *told] if told else []
-    return "\n".join(lines) + "\n"
+    values |= {"robot": robot, "base": tuple(base), "tool": tuple(tool)}
+    values["source"] = log.source if given.source or log.source != TABLE else None
+    values |= shown_entries(log.inferences)
+    values |= _clock_entries(log, found, given)
+    joints, position, rotation = (_columns(log, role) for role in ("joint", "position", "rotation"))
+    signs, offsets = tuple(c.sign for c in joints), tuple(c.offset for c in joints)
+    values |= {"signs": signs if -1 in signs else (), "offsets": offsets if any(offsets) else ()}
+    values |= {"joints": _names(log, joints), "rotation": log.rotation_form if rotation else None}
+    place, turn, outside = _names(log, position), _names(log, rotation), log.externally_measured
+    values |= {"measured": place + turn if outside else ()}
+    values |= {"position": () if outside else place, "orientation": () if outside else turn}
+    values["unit"] = _unit_entries(log, found, given, values["time"])
+    intervals = {name: given.interval.get(name, given.interval.get("")) for name in log.joints}
+    turning = [column.unit in ("rad", "deg") for column in joints]
+    values["interval"] = {
+        name: ends for (name, ends), turns in zip(intervals.items(), turning, strict=False) if ends and turns
+    }
+    return LogMap(**values, evidence=dict(_evidence(log, found, given)))
 
 
-def _joint(table: CheckedTable, units: dict[str, str]) -> tuple[str, str, int, float]:
-    """Return column, name, sign and offset of a joint, and note its unit."""
-    column = table.text("column")
-    sign = table.number("sign", 1.0)
-    if sign not in (1.0, -1.0):
-        table.add_error("sign", f"found {sign:g}, allowed: 1 or -1")
-    _note_unit(table, column, units)
-    return column, table.text("name", column), int(sign), table.number("offset", 0.0)
+def shown_entries(inferences: Sequence[Inference]) -> dict[str, Any]:
+    """Return delimiter, decimal sign and layout of the files, and the notes, of what was inferred."""
+    found = {inference.kind: inference for inference in inferences}
+    kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout"}
+    entries: dict[str, Any] = {
+        key: found[kind].value if kind in found else None for key, kind in kinds.items()
+    }
+    notes = (found[kind] for kind in NOTES if kind in found)
+    return entries | {"notes": tuple(f"{note.what}: {note.value} ({note.evidence})" for note in notes)}
 
 
-def _interval(table: CheckedTable) -> GivenInterval | None:
-    """Return the interval of a joint, if the table has one."""
-    if not table.has("interval"):
-        return None
-    given = table.value("interval")
-    if is_interval(given):
-        return given[0], given[1]
-    table.add_error(
-        "interval", f"found {format_value(given)}, allowed: 2 finite numbers, or two angles with units"
-    )
-    return None
+def _clock_entries(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> dict[str, Any]:
+    """Return time, period and poses; a stamp in halves and a file of times are found anew.
+
+    A file whose column was given as the time is entered with its whole path.
+    """
+    columns = _columns(log, "time")
+    if not log.timed:
+        labels = found["time column"].columns if "time column" in found else ()
+        time = labels[0] if len(labels) == 1 else None if labels else "none"
+        return {"time": time, "period": None, "poses": True}
+    if not columns:
+        return {"time": "none", "period": log.period or None, "poses": False}
+    file = named_file(given.time)
+    if len(columns) > 1 or (TIME_FILE in found and not file):
+        return {"time": None, "period": None, "poses": False}
+    time = f"{file[0].resolve()}:{file[1]}" if file else _name(log, columns[0])
+    return {"time": time, "period": None, "poses": False}
 
 
-def _note_unit(table: CheckedTable, column: str | None, units: dict[str, str]) -> None:
-    """Note the unit of a column, if the table has both."""
-    unit = _given(table, "unit", table.text)
-    if column is not None and unit is not None:
-        units[column] = unit
+def _unit_entries(
+    log: JointLog, found: Mapping[str, Inference], given: LogMap, time: str | None
+) -> dict[str, str]:
+    """Return the units of the columns; of the clock where it is one column of numbers, or given."""
+    clock, file = _columns(log, "time"), named_file(time)
+    names = {name for c in clock for name in (c.name, c.header, str(c.number)) if name}
+    units = {name: unit for name, unit in given.unit.items() if name in names}
+    named = any(vocabulary().unit(split_unit(column.header)[1] or "") for column in clock)
+    if len(clock) == 1 and "unit of the time" in found and time and not named:
+        units = {file[1] if file else time: clock[0].unit}
+    used = [column for column in log.columns if column.role in ("joint", "position", "rotation")]
+    return units | {_name(log, column): column.unit for column in used if column.unit != PURE.name}
 
 
-def _given(table: CheckedTable, key: str, get: Callable[[str], T]) -> T | None:
-    """Return what is got of a table under a key, if it is there."""
-    return get(key) if table.has(key) else None
+def _evidence(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> Iterator[tuple[str, Evidence]]:
+    """Yield the evidence of the entries, by field or "unit.COLUMN"."""
+    whose = "measured" if log.externally_measured else "recorded"
+    kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout", "source": "source"}
+    kinds |= {"time": "time column", "period": "period", "poses": "rows", "joints": "joint columns"}
+    kinds |= {"position": f"{whose} TCP", "measured": f"{whose} TCP", "orientation": f"{whose} orientation"}
+    kinds |= {"rotation": "form", "robot": "robot"}
+    words = (*vocabulary().time, *vocabulary().dates)
+    clock = [compared(split_unit(column.header)[0]) for column in _columns(log, "time")]
+    named = {"source", "delimiter", "decimal"}
+    named |= {"time"} if any(word.search(name) for name in clock for word in words) else set()
+    named |= {"joints"} if all(column.header for column in _columns(log, "joint")) else set()
+    named |= {"position", "orientation"} if all(c.header for c in _columns(log, "position")) else set()
+    named |= {"rotation"} if "form" in found and found["form"].evidence == THEIR_NAMES else set()
+    robot = found["robot"].value if "robot" in found else ""
+    named |= {"robot"} if all(robot in column.header for column in _columns(log, "joint")) else set()
+    for field, kind in kinds.items():
+        if kind in found:
+            basis: Basis = "given" if getattr(given, field) else "named" if field in named else "proved"
+            if (field == "period" and log.period_assumed) or (field, basis) == ("joints", "proved"):
+                basis = "assumed"
+            yield field, Evidence(basis, found[kind].evidence)
+    source = vocabulary().source(log.source)
+    assumed_time = [one.message for one in log.warnings if one.assumption and one.role == "time"]
+    why = {name: one.evidence for one in log.inferences if one.kind in UNITS for name in one.columns}
+    for column in log.columns:
+        quantity = column.role if column.role == "time" else QUANTITIES.get(column.unit, "length")
+        reason = why.get(column.name, "its name")
+        names = {column.name, column.header, str(column.number)} - {""}
+        by_source = source is not None and quantity in source.units
+        is_named = split_unit(column.header)[1] or by_source or reason.startswith("as ")  # as the others
+        basis = "named" if is_named else "proved"
+        if names & given.unit.keys() or (
+            quantity == "angle" and "" in given.unit and not split_unit(column.header)[1]
+        ):
+            basis = "given"
+        if column.role == "time" and assumed_time:
+            basis, reason = "assumed", assumed_time[0]
+        elif column.uncertainty:
+            basis, reason = "assumed", column.uncertainty
+        yield f"unit.{_name(log, column)}", Evidence(basis, reason)
 
 
-def _frame(table: CheckedTable, key: str) -> tuple[float, ...]:
-    """Return three or six numbers, or nothing."""
-    if not table.has(key):
-        return ()
-    values = table.numbers(key, None, si=("m", "m", "m", "rad", "rad", "rad"))
-    if len(values) not in (3, 6):
-        count = format_count(len(values), "number")
-        table.add_error(key, f"found {count}, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad")
-    return values
-
-
-def _beside(path: Path, robot: str) -> str:
-    """Return a robot's name, or its file as seen from the map's folder."""
-    return str(path.parent / robot) if Path(robot).suffix else robot
-
-
-def _time_beside(path: Path, time: str | None) -> str | None:
-    """Return a time column; of FILE:COLUMN the file as seen from the map's folder."""
-    beside = f"{path.parent / time}" if time else None
-    return beside if named_file(beside) else time
-
-
-def _of(log: JointLog, role: Role) -> list[LogColumn]:
+def _columns(log: JointLog, role: Role) -> list[LogColumn]:
     return [column for column in log.columns if column.role == role]
 
 
-def _called(log: JointLog, column: LogColumn) -> str:
-    """Return what tells a column from all others: its header, or its number where that does not."""
+def _names(log: JointLog, columns: Sequence[LogColumn]) -> tuple[str, ...]:
+    return tuple(_name(log, column) for column in columns)
+
+
+def _name(log: JointLog, column: LogColumn) -> str:
+    """Return what distinguishes a column: its header, or its number where several share that."""
     twins = [other for other in log.columns if other.header == column.header]
     return column.header if column.header and len(twins) == 1 else str(column.number)
 
 
-def _assumed(key: str, unit: str, doubt: str) -> str:
-    """Return the comment that stands for a unit that is only assumed: read by a map it would be given."""
-    return f"# {key} = {quote_toml(unit)}  # {escape_line(doubt)}"
+def format_map(log_map: LogMap) -> str:
+    """Return a map as TOML: each entry with its evidence behind it, what is only assumed as a comment."""
+    lines = [MAP_HEADER, *(f"# {note}" for note in log_map.notes), ""]
+    for key in KEYS:
+        value = getattr(log_map, key)
+        if value not in (None, (), False):
+            lines += _lines(key, value, log_map.evidence.get(key))
+    lines += ["", *CORRECTIONS] if log_map.joints and not (log_map.signs or log_map.offsets) else []
+    for table in TABLES:
+        entries = getattr(log_map, table)
+        lines += ["", f"[{table}]"] if entries else []
+        for name, value in entries.items():
+            lines += _lines(quote_toml(name), value, log_map.evidence.get(f"{table}.{name}"))
+    for question in log_map.questions:
+        lines += ["", f"# open: {replace(question, hints=())}"]
+        lines += [f"#   {hint}  # {hint.effect}" for hint in question.hints if str(hint)]
+    return "\n".join(lines) + "\n"
 
 
-def _clock(log: JointLog, found: Mapping[str, str], given: str | None = None) -> dict[str, Any]:
-    """Return what the table of the clock says; a stamp in halves and a file of times are found by themselves.
-
-    A file whose column was named as the time stands there with its whole path.
-
-    The unit is left out where the cells or the name of the column say it, and where it or the period is only
-    assumed: read by a map that would be given.
-    """
-    assumed = any(one.assumption and one.role == "time" for one in log.warnings)
-    columns = _of(log, "time")
-    if not log.timed:
-        labels = next((one.columns for one in log.inferences if one.what == "time column"), ())
-        return {"column": labels[0] if len(labels) == 1 else None if labels else "none", "poses": True}
-    if not columns:
-        return {"column": "none", "period": None if assumed else log.period or None}
-    apart = any(one.kind == TIME_FILE for one in log.inferences)
-    file = named_file(given)
-    if len(columns) > 1 or (apart and not file):
-        return {}
-    named = vocabulary().unit(split_unit(columns[0].header)[1] or "") is not None
-    unit = None if named or assumed else found.get("unit of the time")
-    column = f"{file[0].resolve()}:{file[1]}" if apart and file else _called(log, columns[0])
-    return {"column": column, "unit": unit}
+def _lines(key: str, value: Any, evidence: Evidence | None) -> Iterator[str]:
+    (text,) = format_toml({"": list(value) if isinstance(value, tuple) else value})
+    text = f"{key}{text}"
+    if evidence is None:
+        yield text
+        return
+    open_entry = evidence.basis == "assumed" and (key == "period" or key.startswith('"'))
+    why = evidence.basis if evidence.basis == "given" else f"{evidence.basis}: {evidence.why}"
+    yield f"{'# ' if open_entry else ''}{text}  # {escape_line(why)}"

@@ -1,4 +1,8 @@
-"""What the user says about a log."""
+"""The map of a log: its columns, and how each is known. Its fields are options, keywords and keys of TOML.
+
+- `LogMap`: the map, as given or as it was found.
+- `read_options`: the fields among named values, such as those of a command.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import Any, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.math3d import FORMS, RotationForm
@@ -24,9 +28,20 @@ GivenInterval: TypeAlias = tuple[float | str, float | str]
 """LOW and HIGH of a joint: numbers in the file's own unit, or both angles as texts with units."""
 
 
+Basis: TypeAlias = Literal["given", "named", "proved", "assumed"]
+"""How an entry of a map is known: by the user, by a name of the file, by its numbers, or not at all."""
+
+
+class Evidence(NamedTuple):
+    """How an entry of a map is known, and why."""
+
+    basis: Basis
+    why: str
+
+
 @dataclass(frozen=True)
-class ReadOptions:
-    """What the user says about a log where the file need not, or cannot, tell.
+class LogMap:
+    """The columns of a log, as the user gives them or as they were found.
 
     Attributes:
         source: Name of the source, as `source_names` lists them.
@@ -63,6 +78,12 @@ class ReadOptions:
             its own, and behind them of its orientation, if it was.
         shared: Whether they apply to several logs: columns and joints that a log lacks belong to another.
         pair: Of a comparison of two sides of a table, the word of this side, or "rest", and of the other.
+        robot: Name or file of the arm, or None.
+        base: Frame of the arm: X, Y, Z[, RX, RY, RZ] in [m] and [rad], or empty.
+        tool: Tool centre point in the same form, or empty.
+        evidence: How the entries are known: by field, the unit of a column by "unit.COLUMN".
+        notes: Properties of the file that are no entries, each with its value and reason.
+        questions: The entries that are open, with their choices as hints.
     """
 
     source: str | None = None
@@ -91,6 +112,12 @@ class ReadOptions:
     measured: tuple[str, ...] = ()
     shared: bool = False
     pair: tuple[str, str] | None = None
+    robot: str | None = None
+    base: tuple[float, ...] = ()
+    tool: tuple[float, ...] = ()
+    evidence: Mapping[str, Evidence] = field(default_factory=dict, compare=False, repr=False)
+    notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    questions: tuple[Finding, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
@@ -106,6 +133,7 @@ class ReadOptions:
         wrong = [
             Finding(parameter=one.name, found=format_value(value), allowed=allowed)
             for one in fields(self)
+            if one.name in _KINDS
             for value, (fits, allowed) in [(getattr(self, one.name), _KINDS[one.name])]
             if not ((value is None and one.default is None) or fits(value))
         ]
@@ -113,12 +141,15 @@ class ReadOptions:
             raise OptionError(*wrong)
         for name in ("joints", "names", "position", "orientation", "measured"):
             object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
-        for name in ("signs", "offsets"):
+        object.__setattr__(self, "signs", tuple(int(s) if s == int(s) else s for s in self.signs))
+        for name in ("offsets", "base", "tool"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         for name in ("sheet", "episode", "time"):
             value = getattr(self, name)
             object.__setattr__(self, name, None if value is None else str(value))
         object.__setattr__(self, "unit", {str(column): unit for column, unit in self.unit.items()})
+        intervals = {joint: (low, high) for joint, (low, high) in self.interval.items()}
+        object.__setattr__(self, "interval", intervals)
 
 
 def _is_word(value: Any) -> bool:
@@ -171,6 +202,10 @@ _LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
 _WORDS = re.compile(r"[^\W_]")
 _TEXT = (_is_word, "a non-empty text")
 _COLUMNS = (_are(_is_column), COLUMNS)
+_FRAME = (
+    lambda value: _are(_is_number)(value) and len(value) in (0, 3, 6),
+    "X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
+)
 _FLAG = (lambda value: isinstance(value, bool), "True or False")
 
 _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
@@ -200,8 +235,15 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "pair": (lambda value: _are(_is_word)(value) and len(value) == 2, "two words"),
     "poses": _FLAG,
     "measured": _COLUMNS,
+    "robot": _TEXT,
+    "base": _FRAME,
+    "tool": _FRAME,
 }
 """What each field takes, and what to say of anything else."""
+
+
+READING = tuple(name for name in _KINDS if name not in ("robot", "base", "tool"))
+"""The fields that say how a log is read, without its arm."""
 
 
 def _for_all(value: Any) -> Any:
@@ -209,8 +251,11 @@ def _for_all(value: Any) -> Any:
     return {"": value} if isinstance(value, (str, list, tuple)) and value else value
 
 
-def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:
-    """Return the reading options among some named values; None means not given.
+ReadOptions = LogMap
+
+
+def read_options(values: Mapping[str, Any], otherwise: LogMap | None = None) -> LogMap:
+    """Return the map that some named values give; None means not given.
 
     Args:
         values: Options by name, others among them.
@@ -218,9 +263,8 @@ def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None
             intervals of single joints add up; joints given anew leave behind what belonged to the others:
             names, signs, offsets and intervals.
     """
-    base = otherwise or ReadOptions()
-    known = {field.name for field in fields(ReadOptions)}
-    given = {name: value for name, value in values.items() if name in known and value is not None}
+    base = otherwise or LogMap()
+    given = {name: value for name, value in values.items() if name in READING and value is not None}
     given |= {name: _for_all(given[name]) for name in ("unit", "interval") if name in given}
     if isinstance(given.get("unit", {}), Mapping):
         given["unit"] = {**base.unit, **given.get("unit", {})}

@@ -18,7 +18,8 @@ from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.columns.columns import columns_of, lacks_columns
 from urmpipe_pipeline.sources.columns.pose import find_pose
 from urmpipe_pipeline.sources.content import Content, read_content
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.log_map import shown_entries
+from urmpipe_pipeline.sources.options import READING, LogMap, ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.held import MemoryTable, fingerprint_of
 from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
@@ -77,6 +78,23 @@ def read_numbers(
             raise
         content = read_content(plan, skip_bad=options.skip_bad)
         return Reading(plan, content, options, _name(files), tuple(future.result() for future in hashed))
+
+
+def open_map(files: Sequence[Path | MemoryTable], given: LogMap, error: LogError) -> LogMap:
+    """Return the map of a log that cannot be read yet: what is given, what its files show, and the questions.
+
+    Args:
+        files: The files.
+        given: The map with which they were read.
+        error: Why they cannot be read; findings with hints about entries of the map are questions.
+    """
+    asked = tuple(one for one in error.findings if any(hint.parameter in READING for hint in one.hints))
+    try:
+        tables = open_tables(files, given)
+    except LogError:
+        return replace(given, questions=asked)
+    found = [*tables.inferences, *(one for layout in tables.layouts for one in layout.inferences)]
+    return replace(given, **shown_entries(found), questions=asked)
 
 
 def read_log(

@@ -144,8 +144,8 @@ def test_half_an_orientation_is_refused_as_of_targets(wrong: Wrong) -> None:
 
 
 def test_a_map_names_the_columns_of_the_pose(read: Read, tmp_path: Path) -> None:
-    (tmp_path / "lab.toml").write_text('[tcp]\nposition = ["a", "b", "c"]\n[units]\na = "mm"\nr = "cm"\n')
-    asked = read_map(tmp_path / "lab.toml").read
+    (tmp_path / "lab.toml").write_text('position = ["a", "b", "c"]\n[unit]\na = "mm"\nr = "cm"\n')
+    asked = read_map(tmp_path / "lab.toml")
     found = read("c,a,b,r\n0,400,0,0\n0,500,0,1\n0,500,100,0\n", position=asked.position, unit=asked.unit)
     assert (found.rows.position[1].tolist(), found.rows.radius.tolist()) == (
         [0.5, 0.0, 0.0],

@@ -195,7 +195,7 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     assert said(vector) == []
 
 
-MAP = '--map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+NAMED = "--orientation A,B,C with --position and --rotation names them"
 
 
 def _forms(*forms: str) -> str:
@@ -217,7 +217,7 @@ def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
     assert wrong("x,y,z,W,P,R\n1,2,3,0,0,0\n", rotation="rpy") == [
         "targets.csv: rotation (--rotation): found rpy given for x, y, z and no orientation, allowed: its"
         " columns beside"
-        f" them; {MAP}"
+        f" them; {NAMED}"
     ]
     assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", orientation=("u", "v", "w")) == [
         "orientation: found without a position, allowed: beside x, y, z"
@@ -226,10 +226,10 @@ def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
 
 def test_a_map_names_the_columns(read: Read, tmp_path: Path) -> None:
     (tmp_path / "lab.toml").write_text(
-        '[tcp]\nposition = ["a", "b", "c"]\norientation = ["u", "v", "w"]\nform = "zyx"\n'
-        '[units]\na = "mm"\nu = "deg"\n[[joints]]\ncolumn = "J1"\n'
+        'joints = ["J1"]\nposition = ["a", "b", "c"]\norientation = ["u", "v", "w"]\nrotation = "zyx"\n'
+        '[unit]\na = "mm"\nu = "deg"\n'
     )
-    said = read_map(tmp_path / "lab.toml").read
+    said = read_map(tmp_path / "lab.toml")
     targets = read(f"c;a;b;u;v;w\n500;300;100;{DEGREES.replace(',', ';')}\n", **{
         name: getattr(said, name) for name in ("position", "orientation", "rotation", "unit", "joints")
     })  # fmt: skip

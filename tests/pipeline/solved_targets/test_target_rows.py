@@ -18,7 +18,7 @@ Read = Callable[..., TargetFile]
 Wrong = Callable[..., list[str]]
 
 
-MAP = '--map FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+NAMED = "--orientation A,B,C with --position and --rotation names them"
 
 
 def said(targets: TargetFile) -> list[tuple[str, str]]:
@@ -347,7 +347,7 @@ def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
             "t,q1,q2,q3\n0,1,2,3\n1,1,2,3\n",
             [
                 "targets.csv: found no position in q1, q2, q3, allowed: x, y, z; name them so in the"
-                ' header; --map FILE.toml names them: [tcp] position = ["A", "B", "C"]'
+                " header; --position X,Y,Z names them"
             ],
         ),
         (
@@ -361,14 +361,14 @@ def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
             "x,y,z,rz,ry\n1,2,3,4,5\n",
             [
                 "targets.csv: found rz, ry as a part of an orientation, allowed: all of rz, ry, rx or of"
-                f" qx, qy, qz, qw, or none; {MAP}"
+                f" qx, qy, qz, qw, or none; {NAMED}"
             ],
         ),
         (
             "x,y,z,quat_x,quat_y,rotvec_z,A\n1,2,3,4,5,6,7\n",
             [
                 "targets.csv: found quat_x, quat_y, rotvec_z as a part of an orientation, allowed: all of"
-                f" rz, ry, rx or of qx, qy, qz, qw, or none; {MAP}"
+                f" rz, ry, rx or of qx, qy, qz, qw, or none; {NAMED}"
             ],
         ),
         (

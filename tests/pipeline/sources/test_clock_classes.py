@@ -17,9 +17,9 @@ from asserting import refusal
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
 from urmpipe_pipeline.sources.clocks.steps import kind_of_steps
-from urmpipe_pipeline.sources.log_map import map_of, read_map
+from urmpipe_pipeline.sources.log_map import format_map, map_of, read_map
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -342,8 +342,8 @@ def test_a_map_keeps_the_file_of_the_times(write: Write, tmp_path: Path) -> None
     path, clock = write(table([], names=()), "q.csv"), write(TIMES, "times.csv")
     time = f"{clock}:stamp"
     log = read_log([path], ReadOptions(time=time))
-    for text in (map_of(log, given={"time": time}), '[clock]\ncolumn = "times.csv:stamp"\n'):
-        again = read_log([path], read_map(write(text, "lab.toml")).read)
+    for text in (format_map(map_of(log, LogMap(time=time))), 'time = "times.csv:stamp"\n'):
+        again = read_log([path], read_map(write(text, "lab.toml")))
         np.testing.assert_array_equal(again.t_ns, log.t_ns)
 
 

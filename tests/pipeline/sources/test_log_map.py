@@ -12,7 +12,7 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import LogMap, ReadOptions, map_of, read_log, read_map
+from urmpipe_pipeline.sources import LogMap, ReadOptions, format_map, map_of, read_log, read_map
 
 Write = Callable[..., Path]
 Read = Callable[..., JointLog]
@@ -31,29 +31,20 @@ base = [0, 0, 0.8]
 tool = [0, 0, 0.15, 0, 0, 1.5]
 robot = "arms/arm.toml"
 
-[clock]
-column = "Zeit"
-unit = "ms"
-
-[[joints]]
-column = "A2"
-name = "shoulder"
-unit = "deg"
-
-[[joints]]
-column = "A1"
-name = "base"
-unit = "deg"
-sign = -1
-offset = 90
-interval = [-180, 180]
-
-[tcp]
+time = "Zeit"
+joints = ["A2", "A1"]
+names = ["shoulder", "base"]
+signs = [1, -1]
+offsets = [0, 90]
 position = ["X_Act", "Y_Act", "Z_Act"]
 orientation = ["A_Act", "B_Act", "C_Act"]
-form = "zyx"
+rotation = "zyx"
+interval.base = [-180, 180]
 
-[units]
+[unit]
+Zeit = "ms"
+A1 = "deg"
+A2 = "deg"
 X_Act = "mm"
 Y_Act = "mm"
 Z_Act = "mm"
@@ -65,7 +56,7 @@ C_Act = "deg"
 
 def test_everything_that_a_map_says(write: Write) -> None:
     said = read_map(write(MAP, "lab.toml"))
-    log = read_log([write(KUKA)], said.read)
+    log = read_log([write(KUKA)], said)
     assert log.joints == ("shoulder", "base")
     np.testing.assert_allclose(np.degrees(log.q), [[10.5, 180.0], [11.0, 179.0], [12.0, 178.0]], atol=1e-13)
     assert log.t_ns.tolist() == [0, 12_000_000, 24_000_000]
@@ -74,7 +65,7 @@ def test_everything_that_a_map_says(write: Write) -> None:
     assert log.rotation_form == "zyx"
     assert log.tcp_rotation is not None
     np.testing.assert_allclose(np.degrees(log.tcp_rotation[0]), [10, 20, 30], atol=1e-13)
-    assert said.read.interval == {"base": (-180.0, 180.0)}
+    assert said.interval == {"base": (-180.0, 180.0)}
     assert (said.base, said.tool) == ((0, 0, 0.8), (0, 0, 0.15, 0, 0, 1.5))
     assert Path(said.robot or "").parts[-2:] == ("arms", "arm.toml")
     assert Path(said.robot or "").is_absolute()
@@ -96,8 +87,8 @@ def test_everything_that_a_map_says(write: Write) -> None:
 def test_what_was_inferred_reads_the_log_again(text: str, options: dict[str, object], write: Write) -> None:
     path = write(text)
     log = read_log([path], ReadOptions(**options))  # type: ignore[arg-type]
-    said = read_map(write(map_of(log), "lab.toml"))
-    again = read_log([path], said.read)
+    said = read_map(write(format_map(map_of(log)), "lab.toml"))
+    again = read_log([path], said)
     assert (again.joints, again.units, again.columns) == (log.joints, log.units, log.columns)
     for name in ("t_ns", "q", "qd", "tcp_position", "tcp_rotation"):
         np.testing.assert_array_equal(getattr(again, name), getattr(log, name))
@@ -106,18 +97,38 @@ def test_what_was_inferred_reads_the_log_again(text: str, options: dict[str, obj
         assert doubts == [(w.kind, w.assumption) for w in log.warnings if w.assumption]
 
 
-def test_a_written_map_says_what_may_be_added(write: Write) -> None:
-    text = map_of(read_log([write("t [s],q1 [deg]\n0,31\n0.1,32\n")]))
-    assert text.split("\n\n")[-2:] == [
-        "# Where the file counts a joint otherwise: sign = -1, offset = 90 (q = sign * value + offset).\n"
-        "# What the environment limits it to: interval = [-180, 180].",
-        '[[joints]]\ncolumn = "q1 [deg]"\nname = "q1"\nunit = "deg"\n',
+def test_a_written_map_has_the_evidence_of_its_entries(write: Write) -> None:
+    text = "t [s],q1 [deg],q2,x,y,z\n0,31,2,1,2,3\n0.1,32,3,1,2,3\n"
+    log = read_log([write(text)], LogMap(joints=("q1", "q2"), names=("a", "b")))
+    lines = format_map(map_of(log, LogMap(joints=("q1", "q2"), names=("a", "b")))).splitlines()
+    assert lines[4:] == [
+        'delimiter = "comma"  # named: it makes rows of 6 cells',
+        'decimal = "point"  # named: with it most cells are numbers',
+        'time = "t [s]"  # named: its name',
+        'joints = ["q1 [deg]", "q2"]  # given',
+        'names = ["a", "b"]',
+        'position = ["x", "y", "z"]  # named: their names',
+        "",
+        "# signs = [1, -1, ...] and offsets = [0, 90, ...] correct the joints: q = sign * value + offset.",
+        "# interval.q1 = [-180, 180] is the interval to which the program limits a joint.",
+        "",
+        "[unit]",
+        '"q1 [deg]" = "deg"  # named: its name',
+        '"q2" = "deg"  # named: as the other joint columns',
+        *(
+            f'# "{axis}" = "m"  # assumed: no unit is given for x, y, z: the positions are taken as m'
+            for axis in "xyz"
+        ),
     ]
 
 
 def test_robot_and_frames_come_back(write: Write) -> None:
     log = read_log([write("t [s],q1 [rad]\n0,1\n1,2\n")])
-    said = read_map(write(map_of(log, "ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0)), "lab.toml"))
+    said = read_map(
+        write(
+            format_map(map_of(log, None, "ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0))), "lab.toml"
+        )
+    )
     assert (said.robot, said.base, said.tool) == ("ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0))
 
 
@@ -125,17 +136,19 @@ def test_a_map_takes_units(write: Write) -> None:
     text = """
     base = [0, "1cm", "800mm", 0, 0, "90deg"]
     tool = [0, 0, "150mm"]
-    clock = {column = "none", period = "5ms"}
-    joints = [{column = "q1", interval = ["-180deg", "180deg"]}]
+    time = "none"
+    period = "5ms"
+    joints = ["q1"]
+    interval = {q1 = ["-180deg", "180deg"]}
     """
     said = read_map(write(text, "lab.toml"))
     assert (said.base, said.tool) == ((0.0, 0.01, 0.8, 0.0, 0.0, math.pi / 2), (0.0, 0.0, 0.15))
-    assert (said.read.period, said.read.interval) == (0.005, {"q1": ("-180deg", "180deg")})
+    assert (said.period, said.interval) == (0.005, {"q1": ("-180deg", "180deg")})
     with pytest.raises(OptionError) as error:
-        read_map(write('tool = [0, 0, "15deg"]\nclock.period = "5mm"\n', "lab.toml"))
+        read_map(write('tool = [0, 0, "15deg"]\nperiod = "5mm"\n', "lab.toml"))
     assert [one.message.partition(": ")[2] for one in error.value.findings[:2]] == [
-        "found '5mm', allowed: a time in s, such as 0.005 or 5ms",
         "found '15deg', allowed: a finite number",
+        "found '5mm', allowed: a time in s, such as 0.005 or 5ms",
     ]
 
 
@@ -148,27 +161,31 @@ def test_everything_that_is_wrong_with_a_map(write: Write, tmp_path: Path) -> No
 delimeter = ";"
 tool = [1, 2]
 robot = 5
-[clock]
-colum = "t"
-[[joints]]
-name = "q1"
-sign = 2
-[tcp]
-form = "zyy"
+signs = 2
+rotation = "zyy"
 position = "x"
+rows = "0:3"
+unit = 5
+[clock]
+column = "t"
 """
     said = refusal(OptionError, read_map, write(text, "lab.toml")).replace(f"{tmp_path}/", "")
-    assert said.split("\n") == [
-        "lab.toml: key joints[0].column: found nothing, allowed: a text",
-        "lab.toml: key joints[0].sign: found 2, allowed: 1 or -1",
-        "lab.toml: key robot: found 5, allowed: a text",
-        "lab.toml: key tcp.position: found 'x', allowed: a list of texts",
-        "lab.toml: key tcp.form: found 'zyy', allowed: one of vector, rpy, zyx, xyz, zyz, zxz, quat_xyzw,"
-        " quat_wxyz, matrix (did you mean zyz?)",
-        "lab.toml: key tool: found 2 numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
-        "lab.toml: key delimeter: unknown (did you mean delimiter?); allowed: clock, tcp, joints, units,"
-        " robot, source, delimiter, decimal, layout, base, tool",
-        "lab.toml: key clock.colum: unknown (did you mean column?); allowed: column, unit, period, poses",
+    wrong, unknown = said.split("\n")[:-2], said.split("\n")[-2:]
+    assert wrong == [
+        "lab.toml: key robot: found 5, allowed: a non-empty text",
+        "lab.toml: key tool: found [1.0, 2.0], allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
+        "lab.toml: key rows: found '0:3', allowed: rows from 1, both ends included, such as 2:-1 or"
+        " 1:99,101:-1; -1 is the last",
+        "lab.toml: key signs: found 2, allowed: a list of 1 or -1, such as [1, -1]",
+        "lab.toml: key position: found 'x', allowed: columns by name or number, such as q1,q2 or 2,3",
+        "lab.toml: key rotation: found 'zyy', allowed: vector, rpy, zyx, xyz, zyz, zxz, quat_xyzw, quat_wxyz,"
+        " matrix",
+        "lab.toml: key unit: found 5, allowed: a unit of every angle, such as deg, or units by column, such"
+        " as q1=deg",
+    ]
+    assert [one.partition("; allowed: source, robot,")[0] for one in unknown] == [
+        "lab.toml: key delimeter: unknown (did you mean delimiter?)",
+        "lab.toml: key clock: unknown",
     ]
 
 
@@ -213,7 +230,7 @@ SPECIMENS = Path(__file__).parents[2] / "specimens"
 ])  # fmt: skip
 def test_the_map_of_any_log_reads_it_again(write: Write, name: str) -> None:
     log = read_log([SPECIMENS / name])
-    again = read_log([SPECIMENS / name], read_map(write(map_of(log), "lab.toml")).read)
+    again = read_log([SPECIMENS / name], read_map(write(format_map(map_of(log)), "lab.toml")))
     np.testing.assert_array_equal(again.q, log.q)
     np.testing.assert_array_equal(again.t_ns, log.t_ns)
     assert again.joints == log.joints
@@ -221,12 +238,12 @@ def test_the_map_of_any_log_reads_it_again(write: Write, name: str) -> None:
 
 def test_the_map_of_a_log_of_one_row_has_no_period(write: Write) -> None:
     path = write("q1,q2\n0.5,1.5\n")
-    read_again = read_map(write(map_of(read_log([path])), "lab.toml")).read
+    read_again = read_map(write(format_map(map_of(read_log([path]))), "lab.toml"))
     assert (read_again.period, read_log([path], read_again).rows) == (None, 1)
 
 
 def test_the_map_of_a_log_with_a_file_of_times_reads_both_again(write: Write) -> None:
     files = [write("q1,q2\n0.5,1\n0.4,2\n0.3,3\n", "q.csv"), write("1\n1.005\n1.01\n", "time.csv")]
     log = read_log(files)
-    again = read_log(files, read_map(write(map_of(log), "lab.toml")).read)
+    again = read_log(files, read_map(write(format_map(map_of(log)), "lab.toml")))
     assert again.t_ns.tolist() == log.t_ns.tolist() == [0, 5_000_000, 10_000_000]

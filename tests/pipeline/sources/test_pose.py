@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import rotation_angle
 from urmpipe_models.robots.catalogue import load_robot
@@ -289,12 +290,11 @@ def test_an_orientation_without_a_whole_sample_is_not_used(read: Read) -> None:
 def test_what_looks_like_a_recorded_tcp_and_is_none_is_said(read: Read, names: tuple[str, ...]) -> None:
     log = read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3\n0.1,0.2,1,2,3\n")
     assert log.tcp_position is None
-    quoted = ", ".join(f'"{name}"' for name in names)
     assert [(one.kind, str(one)) for one in log.warnings] == [
         (
             "tcp-not-read",
             f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x,"
-            f" tcp_y, tcp_z; --map FILE.toml names them: [tcp] position = [{quoted}]",
+            f" tcp_y, tcp_z; {Hint('position', [one.removesuffix(' [mm]') for one in names])} takes them",
         )
     ]
 
@@ -304,7 +304,7 @@ def test_two_recorded_tcps_are_said(read: Read) -> None:
     log = read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3,4,5,6\n0.1,0.2,1,2,3,4,5,6\n")
     assert list(map(str, log.warnings)) == [
         f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x, tcp_y,"
-        ' tcp_z; --map FILE.toml names them: [tcp] position = ["A", "B", "C"]'
+        " tcp_z; --position X,Y,Z names them"
     ]
 
 

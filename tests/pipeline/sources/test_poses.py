@@ -18,7 +18,7 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import RotationForm, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import ROW_NS, JointLog
-from urmpipe_pipeline.sources import ReadOptions, map_of, read_log, read_map
+from urmpipe_pipeline.sources import ReadOptions, format_map, map_of, read_log, read_map
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -209,8 +209,8 @@ def test_a_map_reads_poses_as_they_were_read(write: Write, tmp_path: Path) -> No
     for clock in (None, STEPS["seconds apart"][:18]):
         path, lab = write(table(random_poses(18), clock)), tmp_path / "lab.toml"
         log = read_log([path], ReadOptions(unit={"": "rad"}))
-        lab.write_text(map_of(log))
-        again = read_log([path], read_map(lab).read)
+        lab.write_text(format_map(map_of(log)))
+        again = read_log([path], read_map(lab))
         assert not again.timed
         np.testing.assert_array_equal(again.q, log.q)
 
@@ -287,8 +287,8 @@ def test_the_arms_own_tcp_comes_first_and_others_are_named_by_who_knows(read: Re
     given_by_name = read(text, load_robot("ur10"), unit="rad", measured=("A", "B", "C"))
     assert given_by_name.externally_measured and given_by_name.tcp_position is not None
     np.testing.assert_allclose(given_by_name.tcp_position, pose[:, :3])
-    lab = write(map_of(given_by_name), name="lab.toml")
-    assert read_map(lab).read.measured == ("A", "B", "C")
+    lab = write(format_map(map_of(given_by_name)), name="lab.toml")
+    assert read_map(lab).measured == ("A", "B", "C")
     with pytest.raises(OptionError) as error:
         read(text, measured=("A", "B"))
     allowed = "x, y, z, and 3, 4 or 9 of the orientation behind them, or none"

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, map_of, read_log, read_map
+from urmpipe_pipeline.sources import ReadOptions, format_map, map_of, read_log, read_map
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.smoothness import flat_ways, goes_along_rows
 
@@ -226,13 +226,13 @@ def test_a_map_keeps_the_layout(layout: str, read: Read, write: Write) -> None:
     q = motion()
     texts = {"transposed": q.T, "flat:6": q.reshape(-1, 1), "flat-by-joint:6": q.T.reshape(-1, 1), "table": q}
     log = read(written(texts[layout]), layout=layout)
-    told = read_map(write(map_of(log), "lab.toml")).read
+    told = read_map(write(format_map(map_of(log)), "lab.toml"))
     assert told.layout == layout
     np.testing.assert_array_equal(read_log([write(written(texts[layout]))], told).q, q)
 
 
 def test_a_map_of_an_ordinary_table_says_no_layout(read: Read) -> None:
-    assert "layout" not in map_of(read(written(motion())))
+    assert "layout" not in format_map(map_of(read(written(motion()))))
 
 
 smooth = st.builds(

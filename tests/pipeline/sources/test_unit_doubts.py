@@ -20,7 +20,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.repolarization.audit import is_revolute
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import ReadOptions, map_of, read_log, read_map
+from urmpipe_pipeline.sources import ReadOptions, format_map, map_of, read_log, read_map
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -350,13 +350,13 @@ def test_positions_where_no_arm_works_are_doubted(unit: str, per_m: float, read:
 )
 def test_a_map_gives_nothing_that_is_only_assumed(table: str, write: Write) -> None:
     log = read_log([write(table)])
-    written = map_of(log)
-    again = read_log([write(table)], read_map(write(written, "lab.toml")).read)
+    written = format_map(map_of(log))
+    again = read_log([write(table)], read_map(write(written, "lab.toml")))
     assert [str(one) for one in again.warnings] == [str(one) for one in log.warnings]
     assert (again.units, again.columns) == (log.units, log.columns)
     for column in log.columns:
         if column.uncertainty:
-            assert f'= "{column.unit}"  # {column.uncertainty}' in written
+            assert f'= "{column.unit}"  # assumed: {column.uncertainty}' in written
 
 
 def test_joints_turn_by_their_own_columns(write: Write) -> None:

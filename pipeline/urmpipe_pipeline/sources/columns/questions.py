@@ -21,15 +21,15 @@ MOST_ANSWERS = 9
 """Groups of columns that a question offers."""
 
 
-def take(columns: Sequence[Column], does: str = "takes these") -> Hint:
-    """Return the hint that takes columns as the joints: by number where a name has a comma, or repeats."""
+def take(columns: Sequence[Column], does: str = "takes these", *, parameter: str = "joints") -> Hint:
+    """Return the hint that takes columns as the joints, or as the position: by number if a name repeats."""
     numbers = [column.number for column in columns]
     if all(column.called == str(column.number) for column in columns) and len(columns) > 1:
         row = numbers == list(range(numbers[0], numbers[-1] + 1))
-        return Hint("joints", [f"{numbers[0]}-{numbers[-1]}"] if row else [*map(str, numbers)], does)
+        return Hint(parameter, [f"{numbers[0]}-{numbers[-1]}"] if row else [*map(str, numbers)], does)
     names = [column.called for column in columns]
     alone = all("," not in name and names.count(name) == 1 for name in names)
-    return Hint("joints", names if alone else [*map(str, numbers)], does)
+    return Hint(parameter, names if alone else [*map(str, numbers)], does)
 
 
 def by_arm(columns: Sequence[Column]) -> list[list[Column]]:

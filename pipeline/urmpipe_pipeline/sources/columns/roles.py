@@ -210,7 +210,7 @@ def about_pose(pose: Pose) -> list[Inference]:
     groups = {"TCP": ("position", pose.position), "orientation": ("orientation", pose.rotation)}
     for what, (where, group) in groups.items():
         names = tuple(column.name for column in group)
-        hints = (Hint("map", None, f"with tcp.{where} in it"),)
+        hints = (Hint("measured" if pose.measured else where),)
         if names:
             said.append(Inference(f"{whose} {what}", ", ".join(names), pose.evidence, "", names, hints))
     return said
@@ -232,9 +232,9 @@ def _path(
         same = [group for group in pose.alternatives if group[0].kind == pose.position[0].kind]
         if same:
             groups = "; ".join(map(listed, (pose.position, *same)))
-            hint = Hint("map", None, 'names them: [tcp] position = ["A", "B", "C"]')
+            hints = tuple(take(group, parameter="position") for group in (pose.position, *same))
             raise LogError(
-                Finding(f"found several positions: {groups}; allowed: one x, y, z", file, hints=(hint,))
+                Finding(f"found several positions: {groups}; allowed: one x, y, z", file, hints=hints)
             )
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
@@ -242,10 +242,7 @@ def _path(
         return _with_rest(roles, said, numeric, layouts, (), pose.alternatives)
     _refuse_thousands(layouts, file)
     if path:
-        hints = (
-            Hint("", effect="name them so in the header"),
-            Hint("map", None, 'names them: [tcp] position = ["A", "B", "C"]'),
-        )
+        hints = (Hint("", effect="name them so in the header"), Hint("position", None, "names them"))
         message = f"found no position in {listed(columns)}, allowed: x, y, z"
         raise LogError(Finding(message, file=file, hints=hints))
     need = (
@@ -343,7 +340,7 @@ def _about_passed_over(
     if passed:
         said = "; ".join(f"{_ends(other)} passed over for {_ends(group)}" for group, other in passed)
         takes = [take(other) for group, other in passed if group == roles.joints]
-        hints = takes[:1] or [Hint("map", None, "with tcp.position in it takes others")]
+        hints = takes[:1] or [Hint("position", None, "takes others")]
         yield LogWarning(PASSED_OVER, said, hints=tuple(hints))
 
 

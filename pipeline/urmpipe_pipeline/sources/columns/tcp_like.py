@@ -11,6 +11,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.families import find_families, prefer_measured
 from urmpipe_pipeline.sources.columns.pose import odd_rows
+from urmpipe_pipeline.sources.columns.questions import take
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -34,13 +35,12 @@ def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
     alike = [column for column in rest if _is_like(column)]
     if len(alike) < 2:
         return []
-    named = [column.header for column in alike] if len(alike) == 3 else ["A", "B", "C"]
-    quoted = ", ".join(f'"{name}"' for name in named)
-    table = f"[tcp] position = [{quoted}]"
     said = f"{listed(alike)} look like a recorded TCP and are not read as one"
     hints = (
         Hint("", effect="name its columns tcp_x, tcp_y, tcp_z"),
-        Hint("map", None, f"names them: {table}"),
+        take(alike, "takes them", parameter="position")
+        if len(alike) == 3
+        else Hint("position", None, "names them"),
     )
     return [LogWarning(TCP_NOT_READ, said, hints=hints)]
 

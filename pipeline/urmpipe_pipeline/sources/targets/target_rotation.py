@@ -24,7 +24,7 @@ UNIT_NORM = 1e-3
 MOST_RAD = 2 * np.pi * 1.01
 """Angles without a given unit, most of them beyond a turn in [rad], are hardly in rad."""
 
-MAP = Hint("map", None, 'names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."')
+NAMED = Hint("orientation", None, "with --position and --rotation names them")
 """The remedy where the names of columns show no orientation."""
 
 _OURS = frozenset(("rx", "ry", "rz"))
@@ -129,12 +129,12 @@ def _refuse_half(
             f"{given} given for {listed(roles.position)} and no orientation",
             "its columns beside them",
         )
-        raise LogError(Finding(file=file, parameter="rotation", found=said, allowed=allowed, hints=(MAP,)))
+        raise LogError(Finding(file=file, parameter="rotation", found=said, allowed=allowed, hints=(NAMED,)))
     half = [] if named else [column for column in unused if _is_part(column)]
     if half:
         said = f"found {listed(half)} as a part of an orientation"
         allowed = "all of rz, ry, rx or of qx, qy, qz, qw, or none"
-        raise LogError(Finding(f"{said}, allowed: {allowed}", file, hints=(MAP,)))
+        raise LogError(Finding(f"{said}, allowed: {allowed}", file, hints=(NAMED,)))
 
 
 def _is_part(column: Column) -> bool:
