@@ -143,6 +143,9 @@ def map_of(
     signs, offsets = tuple(c.sign for c in joints), tuple(c.offset for c in joints)
     values |= {"signs": signs if -1 in signs else (), "offsets": offsets if any(offsets) else ()}
     values |= {"joints": _names(log, joints), "rotation": log.rotation_form if rotation else None}
+    numbered = tuple(f"q{k}" for k in range(1, len(joints) + 1))
+    if joints and not joints[0].header and log.joints != numbered:
+        values["names"] = log.joints  # those of the robot
     place, turn, outside = _names(log, position), _names(log, rotation), log.externally_measured
     values |= {"measured": place + turn if outside else ()}
     values |= {"position": () if outside else place, "orientation": () if outside else turn}

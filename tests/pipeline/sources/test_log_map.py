@@ -219,23 +219,6 @@ def test_a_sign_turns_the_recorded_rates_too(read: Read) -> None:
     assert log.qd[:, 0].tolist() == [-1.0] * 5
 
 
-SPECIMENS = Path(__file__).parents[2] / "specimens"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [
-    "clock_iso_utc.csv", "clock_time_of_day.csv", "clock_minutes.csv", "clock_date_and_time.csv",
-    "clock_sec_nanosec.csv", "clock_ms_unsaid.csv", "matlab_timetable.csv", "coppeliasim_three_graphs.csv",
-    "ros2_echo_joint_states.csv", "kuka_fri.txt", "pandas_array_cells.csv", "numpy_savetxt_default.txt",
-])  # fmt: skip
-def test_the_map_of_any_log_reads_it_again(write: Write, name: str) -> None:
-    log = read_log([SPECIMENS / name])
-    again = read_log([SPECIMENS / name], read_map(write(format_map(map_of(log)), "lab.toml")))
-    np.testing.assert_array_equal(again.q, log.q)
-    np.testing.assert_array_equal(again.t_ns, log.t_ns)
-    assert again.joints == log.joints
-
-
 def test_the_map_of_a_log_of_one_row_has_no_period(write: Write) -> None:
     path = write("q1,q2\n0.5,1.5\n")
     read_again = read_map(write(format_map(map_of(read_log([path]))), "lab.toml"))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, ReadOptions, format_map, map_of, read_log, read_map
 
 UR = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 NO_TIME = {"period": 0.02}
@@ -295,6 +296,19 @@ def _same_tool(log: JointLog, truth: Truth) -> None:
         assert log.tcp_quat_xyzw is not None
         between = Rotation.from_quat(log.tcp_quat_xyzw).inv() * truth.rotation
         assert between.magnitude().max() <= truth.rotation_within
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", GOOD, ids=_name)
+def test_a_saved_map_reads_a_specimen_again_without_the_robot(case: Good, tmp_path: Path) -> None:
+    files, given = paths(SPECIMENS[case.name]), LogMap(**case.options)
+    log = read_log(files, given, load_robot(case.robot) if case.robot else None)
+    lab = tmp_path / "lab.toml"
+    lab.write_text(format_map(map_of(log, given)), encoding="utf-8")
+    again = read_log(files, read_map(lab))
+    assert (again.joints, again.rotation_form) == (log.joints, log.rotation_form)
+    for name in ("t_ns", "q", "qd", "tcp_position", "tcp_rotation"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(log, name))  # the same bits
 
 
 @pytest.mark.slow
