@@ -20,10 +20,11 @@ SURELY_SECONDS = 0.05
 
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
 _INSIDE = re.compile(
-    r"(?<=[\s_./])(?P<unit>rad|deg)(?P<rate>_?(?:per_)?s(?:ec)?_?(?P<power>2?))?(?=[\s_./][\w])",
+    r"(?<=[\s_./])(?P<unit>rad(?:ian)?s?|deg(?:ree)?s?|(?:m|mm|cm)(?=[\s_.]per[\s_.]s))"
+    r"(?P<rate>[\s_./]?(?:per[\s_.])?s(?:ec(?:ond)?)?[\s_.^]?(?P<power>2?))?(?=[\s_./]\w|$)",
     re.IGNORECASE,
 )
-"""A unit between other words of a name, perhaps one per second."""
+"""A unit among the words of a name, or behind them, perhaps one per second."""
 
 _CAPITAL = re.compile(r"(?<=[a-z\d])(?=[A-Z])")
 _BEGINS, _ENDS = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # of a word of letters
