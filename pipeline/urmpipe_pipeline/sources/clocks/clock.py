@@ -27,6 +27,7 @@ from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, OTHER_TIME, Chosen
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
 from urmpipe_pipeline.sources.clocks.clock_units import in_si, speed_of, unit_by_speed, unit_of
 from urmpipe_pipeline.sources.clocks.digits import all_are
+from urmpipe_pipeline.sources.clocks.halves import EPOCH
 from urmpipe_pipeline.sources.clocks.steps import steps_of
 from urmpipe_pipeline.sources.clocks.text_times import known_forms, read_cells
 from urmpipe_pipeline.sources.columns.columns import Column
@@ -248,7 +249,8 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
     for value in layout.numbers(time.index)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
-            hint = Hint("unit", {time.called: "ns"}, "applies this")
+            since_1970 = [u for u, e in EXPONENTS.items() if EPOCH[0] <= value * 10.0 ** (e - 9) <= EPOCH[1]]
+            hint = Hint("unit", {time.called: (*since_1970, "ns")[0]}, "applies this")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
                 hint = Hint("", effect="a date is read if it is written as 2021-04-11 22:27:21.5")
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
