@@ -21,7 +21,7 @@ from urmpipe_pipeline.sources.columns.pose import (
     trailing_quaternion,
     with_form,
 )
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, TIMES_OF_ANOTHER
 from urmpipe_pipeline.sources.columns.roles import (
     Roles,
     about_pose,
@@ -89,7 +89,8 @@ def without_header(
     if path:
         return _path_by_place(columns, layouts, file, options, pose)
     if not columns:
-        raise LogError(Finding("found no column beside the time, allowed: the joints", file=file))
+        message = "found no column except the time, allowed: the joints"
+        raise LogError(Finding(message, file=file, hints=(TIMES_OF_ANOTHER,)))
     behind = None if pose else _trailing_pose(columns, layouts, robot)
     pose = with_form(pose or behind or Pose(), options.rotation)
     used = (*pose.position, *pose.rotation)

@@ -12,6 +12,8 @@ RECORD = Hint("", effect="record the missing one")
 OTHER_ROBOT = Hint("robot", None, "gives another arm")
 NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
 
+TIMES_OF_ANOTHER = Hint("", effect="times of another log: read that one with --time FILE:COLUMN")
+
 _SIDES = (frozenset(("left", "l")), frozenset(("right", "r")))
 
 UNKNOWN = "columns that are known to be joints"

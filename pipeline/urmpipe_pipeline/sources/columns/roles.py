@@ -28,7 +28,14 @@ from urmpipe_pipeline.sources.columns.joint_names import (
     some_named,
 )
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, turns_as_quaternion, with_form
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_arm, take, which_joints
+from urmpipe_pipeline.sources.columns.questions import (
+    NAME_JOINTS,
+    OTHER_ROBOT,
+    TIMES_OF_ANOTHER,
+    by_arm,
+    take,
+    which_joints,
+)
 from urmpipe_pipeline.sources.columns.sides import REST
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -255,8 +262,9 @@ def _path(
         lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
         answers = () if robot else (take(found),)
         raise LogError(Finding(lacking, file=file, hints=(record, *answers, other)))
-    none = f"no joint columns in {listed(columns)}" if columns else "no column of numbers"
-    raise which_joints(file, none, _may_be(numeric, layouts, robot), need)
+    none = f"no joint columns in {listed(columns)}" if columns else "no column of numbers except times"
+    times = () if columns else (TIMES_OF_ANOTHER,)
+    raise which_joints(file, none, _may_be(numeric, layouts, robot), need, *times)
 
 
 def _may_be(

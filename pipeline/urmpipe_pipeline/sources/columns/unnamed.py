@@ -13,7 +13,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.sources.columns.blocks import SURE, proved_blocks
 from urmpipe_pipeline.sources.columns.columns import Column, listed
-from urmpipe_pipeline.sources.columns.questions import UNKNOWN, which_joints
+from urmpipe_pipeline.sources.columns.questions import TIMES_OF_ANOTHER, UNKNOWN, which_joints
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
 
@@ -49,6 +49,9 @@ def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, ro
     if whole is None or (count is not None and len(free) <= count):
         return tuple(free), (), f"no header: joints in order{', as many as the robot has' if robot else ''}"
     values = whole.values([column.index for column in free])
+    if count is None and len(free) == 1 and len(values) > FEW and (np.diff(values[:, 0]) > 0).all():
+        found = "one column, which always increases, as times do"
+        raise which_joints(layout.file, found, [free], UNKNOWN, TIMES_OF_ANOTHER)
     blocks = proved_blocks(values, count)
     if len(blocks) == 1 and (count or len(blocks[0].joints) > FEW or blocks[0].weakest >= SURE):
         joints, rates = (tuple(free[k] for k in some) for some in (blocks[0].joints, blocks[0].rates))
