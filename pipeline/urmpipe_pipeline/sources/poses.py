@@ -1,7 +1,8 @@
 """Rows that are static poses: calibration grids, random configurations, points measured one by one.
 
-No motion joins them, so a clock of theirs is a label. They are known by their steps: no joint makes them in
-the time that is assumed, and they go on in no direction. A motion is smooth, however coarse its clock.
+No motion joins them, so a clock of theirs is a label. They are known by the steps between rows that differ (a
+pose may be measured several times): no joint makes them in the time that is assumed, and they continue in no
+direction, or in straight lines with jumps from each to the next. A motion is smooth, however coarse.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Hint
 from urmpipe_models.wraps import FULL_TURN
-from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD
 from urmpipe_pipeline.sources.clocks.clock_columns import GIVEN
 from urmpipe_pipeline.sources.clocks.clock_units import in_si
@@ -23,8 +24,13 @@ from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
 from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
 
-STEP = FASTEST * PAPER_PERIOD
-"""The median step of static poses, in [rad] or [m], is larger: none is made in the period that is assumed."""
+STEP = (
+    FASTEST * PAPER_PERIOD
+)  # median step of static poses in [rad] or [m]: none is made in the assumed period
+REST = STEP / 10  # rows with smaller steps are of one pose
+REST_SHARE = (
+    0.1  # ... if these add up to less than this share of the others, which are this share of the rows
+)
 
 TURNED = 0.8
 """Static poses change their steps by this share of them at least: of a motion with n samples in its shortest
@@ -32,6 +38,10 @@ period it is 2 sin(pi / n), of random configurations 1.4 or more."""
 
 TURNING = 0.75
 """The quantile at which that is told: a grid goes straight on for some poses, a log has single spikes."""
+
+JUMPS = 0.03
+"""Share of the steps of a grid, three at least, that are twice as long as those before and after them. In a
+motion with n samples in its shortest period these add up to twice the step times cos(2 pi / n)."""
 
 APART = 2e9
 """Rows so many [ns] apart, in the median, are no samples of a motion that steps so."""
@@ -42,8 +52,11 @@ IMPOSSIBLE = 0.1
 LEAST_ROWS = 6
 """Fewer rows tell nothing."""
 
-SAMPLED = 4000
-"""Places, spread evenly over the rows, that decide."""
+BLOCKS, BLOCK = 8, 500
+"""Blocks of so many rows, spread evenly, decide."""
+
+
+LIKE_POSES = f"no clock, and half of the steps are of {STEP:g} rad (or m) and more, as between static poses"
 
 
 def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers:
@@ -55,6 +68,10 @@ def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers
         numbers: The rows of a table.
     """
     why = "given as an option" if plan.poses else _evidence(plan, columns, numbers)
+    if why == LIKE_POSES:
+        both = (Hint("poses", True, "reads them as static poses"), Hint("period", None, "confirms a motion"))
+        warning = LogWarning("like-poses", f"{why}: read as a motion", hints=both, role="time")
+        return replace(numbers, warnings=(*numbers.warnings, warning))
     if not why:
         return numbers
     clock = plan.clock.columns
@@ -65,31 +82,40 @@ def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers
 
 
 def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
-    """Return why the rows of a table are static poses; empty if they are not, or it cannot be told."""
+    """Return why the rows of a table are static poses, or may be; empty if nothing shows it."""
     if plan.poses is None and _written_untimed(plan):
         return "urmpipe wrote them without times"
     joints = [columns.index(joint) for joint in plan.roles.joints if joint in columns]
     count = len(numbers.values)
     if plan.poses is False or not joints or len(joints) < len(plan.roles.joints) or count < LEAST_ROWS:
         return ""
-    at = np.arange(0, count - 2, max(1, count // SAMPLED))
-    rows = np.stack([at, at + 1, at + 2])
-    q = numbers.values[rows[:, :, np.newaxis], joints]
-    q, turns = in_si(q, plan.roles.joints, plan.units, plan.tables.known)
-    known = np.isfinite(q).all(axis=(0, 2))
-    if np.count_nonzero(known) < LEAST_ROWS - 2:
-        return ""
-    steps = np.diff(q[:, known], axis=0)
+    rows = np.arange(count)
+    if count > BLOCKS * BLOCK:
+        rows = np.add.outer(np.linspace(0, count - BLOCK, BLOCKS).astype(np.int64), np.arange(BLOCK)).ravel()
+    q, turns = in_si(
+        numbers.values[rows[:, np.newaxis], joints], plan.roles.joints, plan.units, plan.tables.known
+    )
+    rows, q = rows[known := np.isfinite(q).all(axis=1)], q[known]
+    steps = np.diff(q, axis=0)
     steps -= np.rint(steps / FULL_TURN) * turns
-    size = np.abs(steps[0]).max(axis=1)
-    turned, usual = (np.linalg.norm(one, axis=1) for one in (steps[1] - steps[0], steps[0]))
-    if _quantile(size, 0.5) <= STEP or _quantile(turned, TURNING) < TURNED * _quantile(usual, TURNING):
+    size = np.abs(steps).max(axis=1)
+    moves = np.flatnonzero(size > REST)
+    rests = size.sum() - size[moves].sum()
+    if len(moves) < max(LEAST_ROWS - 1, REST_SHARE * len(size)) or rests > REST_SHARE * size[moves].sum():
         return ""
-    unit = "rad" if turns.any() else "m"
-    said = f"the joints step by up to {size.max():.2g} {unit} from row to row, in no direction"
-    if numbers.clock is None:
-        return f"no clock, and {said}"
-    return _label(plan, numbers.clock[rows[:2, known]], said)
+    steps, size = steps[moves], size[moves]
+    if _quantile(size, 0.5) <= STEP:
+        return ""
+    usual, turned = np.linalg.norm(steps, axis=1), np.linalg.norm(np.diff(steps, axis=0), axis=1)
+    said = f"the joints step by up to {size.max():.2g} {'rad' if turns.any() else 'm'} from row to row, in"
+    aimless = _quantile(turned, TURNING) >= TURNED * _quantile(usual, TURNING)
+    if numbers.clock is not None:
+        times = numbers.clock[np.stack([rows[moves], rows[moves + 1]])]
+        return _label(plan, times, f"{said} no direction") if aimless else ""
+    jumps = np.count_nonzero(usual[1:-1] > 2 * np.maximum(usual[:-2], usual[2:]))
+    lines = jumps >= max(3, JUMPS * len(usual))
+    why = f"no clock, and {said} {'no direction' if aimless else 'lines with jumps between them'}"
+    return why if aimless or lines else LIKE_POSES
 
 
 def _written_untimed(plan: Plan) -> bool:

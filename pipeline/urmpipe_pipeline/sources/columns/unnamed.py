@@ -49,7 +49,7 @@ def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, ro
     if whole is None or (count is not None and len(free) <= count):
         return tuple(free), (), f"no header: joints in order{', as many as the robot has' if robot else ''}"
     values = whole.values([column.index for column in free])
-    if count is None and len(free) == 1 and len(values) > FEW and (np.diff(values[:, 0]) > 0).all():
+    if count is None and len(layout.names) == 1 and len(values) > FEW and (np.diff(values[:, 0]) > 0).all():
         found = "one column, which always increases, as times do"
         raise which_joints(layout.file, found, [free], UNKNOWN, TIMES_OF_ANOTHER)
     blocks = proved_blocks(values, count)
