@@ -4,8 +4,8 @@ Libraries in C and Rust end the whole process, by SIGSEGV or SIGABRT, where they
 `except` does not catch that. A file that ended the separate process is not read in this one. A file that this
 process has written and read back, or that was read before, is read directly as long as it is not changed.
 
-The separate process runs `python -m urmpipe_pipeline.subprocess_reader READER PATH`. A reader is a module
-with a function `read_through(path)`, which reads everything in a file.
+The separate process runs `python -m urmpipe_pipeline.subprocess_reader READER PATH ARGUMENTS`. A reader is a
+module with a function `read_through(path, *arguments)`, which reads everything that is needed of a file.
 """
 
 from __future__ import annotations
@@ -52,23 +52,26 @@ def find_crash(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> str:
     return ""
 
 
-def read_in_subprocess(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> Any:
+def read_in_subprocess(
+    path: Path, reader: str, meanwhile: Sequence[str] = (), arguments: Sequence[str] = ()
+) -> Any:
     """Return the result of a reader of a file, from a separate process; from this one of a safe file.
 
     Args:
         path: The file.
         reader: Name of the module whose `read_through` reads everything in a file.
         meanwhile: Modules that are needed afterwards, imported while the other process runs.
+        arguments: Further arguments of `read_through`.
 
     Raises:
         ReaderCrashError: With how that process ended.
         OSError: If there is no such file.
     """
     if _file_state(path) in _safe:
-        return import_module(reader).read_through(str(path))
+        return import_module(reader).read_through(str(path), *arguments)
     timeout = READ_TIMEOUT + path.stat().st_size / MIN_READ_RATE
     with TemporaryFile() as output:
-        command = module_command(__name__, reader, str(path))
+        command = module_command(__name__, reader, str(path), *arguments)
         process = Popen(command, stdin=DEVNULL, stdout=output, stderr=DEVNULL, env=module_environment())
         try:
             for name in meanwhile:
@@ -97,5 +100,5 @@ def _file_state(path: Path) -> FileState:
 
 if __name__ == "__main__":
     limit_memory()
-    result = import_module(sys.argv[1]).read_through(sys.argv[2])
+    result = import_module(sys.argv[1]).read_through(*sys.argv[2:])
     pickle.dump(result, sys.stdout.buffer, protocol=pickle.HIGHEST_PROTOCOL)

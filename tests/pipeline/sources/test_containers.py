@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -81,26 +80,6 @@ def ros2_bag(path: Path) -> None:
     shutil.copy(folder / f"bag{path.suffix}", path)
 
 
-def mat_73(path: Path) -> None:
-    """Write what MATLAB's save -v7.3 writes: a header, arrays by columns, their classes as attributes."""
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, values in {"t": T[:, None], "q": Q, "n": np.array([[3.0]])}.items():
-            file.create_dataset(name, data=values.T).attrs["MATLAB_class"] = np.bytes_(b"double")
-        text = file.create_dataset("robot", data=np.array([[117], [114], [53]], dtype=np.uint16))
-        text.attrs["MATLAB_class"] = np.bytes_(b"char")
-        file.create_dataset("#refs#/a", data=np.zeros((2, 1))).attrs["MATLAB_class"] = np.bytes_(b"double")
-    with path.open("r+b") as raw:
-        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + b"\x00\x02IM")
-
-
-def hdf5(path: Path) -> None:
-    """Write a demonstration as ALOHA does."""
-    with h5py.File(path, "w") as file:
-        file["observations/qpos"], file["observations/t"] = Q, T
-        file["observations/images/top"] = np.zeros((ROWS, 4, 4, 3), dtype=np.uint8)
-        file["version"] = 1
-
-
 def ulog(path: Path) -> None:
     """Write a ULog file: header, format and messages. Source: PX4 guide, ULog file format."""
 
@@ -143,8 +122,6 @@ def old_workbook(path: Path) -> None:
 
 ARRAYS = {"t": T, "q": Q}
 WRITERS: Mapping[str, Write] = {
-    "a.v7.3.mat": mat_73,
-    "a.hdf5": hdf5,
     "my log.xlsx": lambda path: TABLE.to_excel(path, index=False),
     "a.ods": lambda path: TABLE.to_excel(path, index=False),
     "a.xls": old_workbook,
@@ -189,7 +166,7 @@ def test_the_command_for_a_format_writes_a_table_that_is_read(name: str, tmp_pat
 
 def test_every_container_has_a_command_that_runs_here() -> None:
     """But for what MATLAB or Excel alone read, and what is no log."""
-    others = ("MATLAB file", "password", "Simulink", "robot", "TOML", "picture", "PDF", "web page")
+    others = ("password", "Simulink", "robot", "TOML", "picture", "PDF", "web page")
     names = [*WRITERS, "a.mcap"]
     for one in vocabulary().containers:
         suffixed = any(name.lower().endswith(one.suffixes) for name in names) or "JSON" in one.what
@@ -213,8 +190,6 @@ def test_a_folder_that_is_a_bag(tmp_path: Path) -> None:
         ("a.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook"),
         ("a.csv", b"PK\x03\x04\x14\x00", "an Excel workbook"),
         ("a.zip", b"PK\x03\x04\x14\x00\x01\x00", "a zip archive"),
-        ("a.mat", b"MATLAB 7.3 MAT-file, Platform", "a MATLAB file of version 7.3"),
-        ("a.txt", b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
         ("A.XLSX", b"t,q1\n0,1\n", "an Excel workbook"),
         ("a.txt", b"#ROSBAG V2.0\n", "a ROS bag"),
         ("a.txt", b"\xff\xd8\xff\xe0\x00\x10JFIF", "a picture"),

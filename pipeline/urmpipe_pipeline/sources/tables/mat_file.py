@@ -1,4 +1,7 @@
-"""MAT files (version 5) of MATLAB, Octave and SciPy: vectors and matrices with a row a sample."""
+"""Variables of MATLAB, Octave and SciPy as a table: vectors, matrices and signals of Simulink.
+
+MAT files of version 5 are read here; files of version 7.3 are HDF5 (`hdf5_file`).
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,11 @@ from numpy.typing import NDArray
 
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline import mat_variables
+from urmpipe_pipeline.array_choice import Name, Question, choose_arrays
 from urmpipe_pipeline.outputs import EXPORT_HEADER
+from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import numpy_columns
+from urmpipe_pipeline.sources.tables.array_table import ArrayColumn, ask_for_arrays, make_array_table
 from urmpipe_pipeline.sources.tables.column_facts import UNIT
 from urmpipe_pipeline.sources.tables.exact_clock import decimals
 from urmpipe_pipeline.sources.tables.form import spread_names
@@ -29,44 +35,79 @@ from urmpipe_pipeline.subprocess_reader import ReaderCrashError, read_in_subproc
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Powers of ten from a unit of times to [ns]."""
 
-LONG = 3
-"""A matrix that is so many times wider than high has its samples side by side."""
+TO_CSV = {"table": "writetable(NAME", "timetable": "writetimetable(NAME"}
+SIGNALS = ("timeseries", "Simulink.")
+"""Classes of MATLAB and what to write in their place: a MAT file keeps their numbers in a form of its own."""
 
 HEADER, COMPRESSED = 128, 15
 """Bytes before the first variable of a file; the kind of a variable that is packed."""
 
-Arrays = Mapping[str, NDArray[Any]]
 
-
-def read_mat(path: Path, head: bytes) -> MemoryTable:
+def read_mat(path: Path, head: bytes, options: ReadOptions) -> MemoryTable:
     """Return the table of a MAT file of version 5.
 
-    Of variables, and of the fields of structs, those are its columns that have a value a sample: vectors, and
-    matrices with a row or a column a sample.
+    Raises:
+        LogError: If it is damaged, and as `make_variable_table`.
+    """
+    return make_variable_table(path, _loaded(path), options, exported=EXPORT_HEADER.encode() in head)
+
+
+def make_variable_table(
+    path: Path, variables: Mapping[str, Any], options: ReadOptions, *, exported: bool = False
+) -> MemoryTable:
+    """Return the table of the variables of MATLAB, Octave or SciPy.
+
+    Its columns are vectors, and matrices with a row or a column per sample, also those of structs.
+
+    Args:
+        path: The file.
+        variables: Variables by name, structs as dictionaries.
+        options: Which episode or which length is read, if there are several.
+        exported: Whether `urmpipe export` wrote the file.
 
     Raises:
-        LogError: If it is damaged, or holds no such numbers.
+        LogError: If there are no such numbers, or with the question which of them are read.
     """
-    found = _loaded(path)
-    run = found.get("run")
-    if EXPORT_HEADER.encode() in head and isinstance(run, Mapping) and "rows" in run:
+    run, simulated = (variables.get(name) if exported else None for name in ("run", "simulation"))
+    if isinstance(run, Mapping) and "rows" in run:
         return MemoryTable(path.stem, _grid(run) if run["rows"] == "grid" else _file(run), path=path)
-    simulated = found.get("simulation")
-    if EXPORT_HEADER.encode() in head and isinstance(simulated, Mapping) and "values" in simulated:
+    if isinstance(simulated, Mapping) and "values" in simulated:
         return MemoryTable(path.stem, _signals(simulated), path=path)
-    arrays = dict(_numeric(found))
-    rows = _rows(arrays)
-    columns = dict(_columns(arrays, rows))
-    if rows < 2 or not columns:
-        names = ", ".join(list(found)[:8]) or "it"
-        hint = Hint(
-            "", effect=f'in MATLAB: writetable(T, "log.csv") of a table, or save("{path.name}", "t", "q")'
-        )
-        said = (
-            f"found no numbers with one row per sample in {names}, allowed: such as t (n x 1), q (n x joints)"
-        )
-        raise LogError(Finding(said, str(path), hints=(hint,)))
-    return MemoryTable(path.stem, _table(columns), path=path)
+    arrays = dict(_iter_arrays(read_signals(variables)))
+    shapes = {name: values.shape for name, values in arrays.items()}
+    choice = choose_arrays(shapes, options.episode, options.topic, separator=".", by_rows=False)
+    if isinstance(choice, Question):
+        ask_for_arrays(path, choice)
+    columns = [
+        column
+        for name in choice.names
+        for column in _columns(name[len(choice.group) :], arrays[name], choice.rows)
+    ]
+    objects = dict(_iter_objects(variables))
+    if choice.rows < 2 or not columns:
+        raise LogError(_no_numbers(path, variables, objects))
+    scalars = {name: value for name, value in variables.items() if isinstance(value, (int, float))}
+    left_out = [
+        ".".join(name) + f" {arrays[name].shape}" for name in choice.left_out if arrays[name].size > 1
+    ]
+    left_out += [f"{name} ({kind})" for name, kind in objects.items() if _command(name, kind)]
+    return make_array_table(path, choice, columns, scalars, ".", left_out)
+
+
+def _no_numbers(path: Path, variables: Mapping[str, Any], objects: Mapping[str, str]) -> Finding:
+    """Return the finding about a file without numbers, and what to save instead of objects of a class."""
+    shown = (f"{name} ({objects[name]})" if name in objects else name for name in [*variables][:8])
+    command = next(filter(None, map(_command, objects, objects.values())), "")
+    command = command or f'writetable(T, "log.csv") of a table, or save("{path.name}", "t", "q")'
+    hint = Hint("", effect=f"in MATLAB: {command}")
+    found = f"found no numbers with one row per sample in {', '.join(shown) or 'it'}"
+    return Finding(f"{found}, allowed: such as t (n x 1), q (n x joints)", str(path), hints=(hint,))
+
+
+def _command(name: str, kind: str) -> str:
+    """Return the command of MATLAB that writes an object as CSV; an empty text of other objects."""
+    start = "writetimetable(extractTimetable(NAME)" if kind.startswith(SIGNALS) else TO_CSV.get(kind)
+    return f'{start.replace("NAME", name)}, "log.csv")' if start else ""
 
 
 def _loaded(path: Path) -> dict[str, Any]:
@@ -98,38 +139,79 @@ def _unpacked(path: Path) -> int:
     return total
 
 
-def _numeric(found: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield vectors and matrices of numbers by name, those of a struct as well."""
-    fields = [
-        (name if name not in found else f"{struct}.{name}", value)
-        for struct, inner in found.items()
-        if isinstance(inner, Mapping)
-        for name, value in inner.items()
+def _iter_arrays(value: Any, name: Name = ()) -> Iterator[tuple[Name, NDArray[Any]]]:
+    """Yield vectors and matrices of numbers by name, those of structs and of arrays of structs as well."""
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biuf" and value.ndim <= 2 and value.size > 1:
+        yield name, value
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _iter_arrays(inner, (*name, key))
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+        for k, inner in enumerate(np.ravel(value) if isinstance(value, np.ndarray) else value, start=1):
+            yield from _iter_arrays(inner, (*name[:-1], f"{name[-1]}({k})"))
+
+
+def _iter_objects(value: Any, name: Name = ()) -> Iterator[tuple[str, str]]:
+    """Yield name and class of each object of a class."""
+    if isinstance(value, tuple):
+        yield ".".join(name), value[1]
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _iter_objects(inner, (*name, key))
+
+
+def _columns(name: Name, values: NDArray[Any], rows: int) -> Iterator[ArrayColumn]:
+    """Yield a column for a vector, and NAME_1, NAME_2, ... of a matrix with this number of samples."""
+    by_row = values if len(values) == rows else values.T
+    names = spread_names([name[-1]], [by_row.shape[1] if values.ndim == 2 else 0])
+    matrix = np.ascontiguousarray(by_row.T).reshape(-1, rows)
+    yield from (((*name[:-1], own), "", column) for own, column in zip(names, matrix, strict=True))
+
+
+def read_signals(variables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return variables with the signals of Simulink as arrays by their labels.
+
+    Structures with time have `time` and `signals`, with `values` of shape (n, k) or (i, j, n), `label` and
+    `blockName`. Timeseries as structs have `Time`, `Data` and `Name`, those of a Dataset in `Values`.
+    """
+    return {name: _read_signals(name, value) for name, value in variables.items()}
+
+
+def _read_signals(name: str, value: Any) -> Any:
+    if isinstance(value, list):
+        return [_read_signals(name, one) for one in value]
+    if not isinstance(value, Mapping):
+        return value
+    name = _text(value.get("Name")) or name
+    if isinstance(value.get("Values"), Mapping):
+        return _read_signals(name, value["Values"])
+    signals = value.get("signals", ())
+    signals = signals if isinstance(signals, list) else [signals]
+    if signals and all(isinstance(one, Mapping) and "values" in one for one in signals):
+        blocks = [_text(one.get("blockName")).rpartition("/")[2] * (len(signals) > 1) for one in signals]
+        labels = [_text(one.get("label")) or block for one, block in zip(signals, blocks, strict=True)]
+        arrays = [one["values"] for one in signals]
+    elif {"Time", "Data"} <= value.keys():
+        labels, arrays = [name], [value["Data"]]
+    else:
+        return {key: _read_signals(key, inner) for key, inner in value.items()}
+    labels = [label or name for label in labels]
+    labels = [
+        label if labels.count(label) == 1 else f"{label}_{k}" for k, label in enumerate(labels, start=1)
     ]
-    for name, value in (*found.items(), *fields):
-        if isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim <= 2 and value.size > 1:
-            yield name, value
+    values = zip(labels, map(_with_rows, arrays), strict=True)
+    return {"time": value.get("time", value.get("Time")), **dict(values)}
 
 
-def _rows(arrays: Arrays) -> int:
-    """Return the number of samples: the length of the longest vector, else the rows of the highest matrix."""
-    vectors = [len(array) for array in arrays.values() if array.ndim == 1]
-    if vectors:
-        return max(vectors)
-    return max((_height(*array.shape) for array in arrays.values()), default=0)
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else ""  # an empty text is an empty array
 
 
-def _height(rows: int, columns: int) -> int:
-    return columns if columns >= LONG * rows else rows
-
-
-def _columns(arrays: Arrays, rows: int) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield a column for each vector and each column of a matrix with so many samples: NAME_1, NAME_2, ..."""
-    for name, array in arrays.items():
-        by_row = array if len(array) == rows else array.T
-        if len(by_row) == rows:
-            names = spread_names([name], [by_row.shape[1] if array.ndim == 2 else 0])
-            yield from zip(names, np.ascontiguousarray(by_row.T).reshape(-1, rows), strict=True)
+def _with_rows(values: Any) -> Any:
+    """Return the values of a signal with one row per sample; matrices are stored along the last axis."""
+    if isinstance(values, np.ndarray) and values.ndim == 3:
+        return values.reshape(-1, values.shape[2], order="F").T
+    return values
 
 
 def _grid(run: Mapping[str, Any]) -> pa.Table:

@@ -72,13 +72,14 @@ def read_numpy(path: Path) -> MemoryTable:
     in_order = in_order or len(tables) == len(wide) == 1  # joints as rows, which are asked about
     named = not in_order or bool(tables.get("", np.empty(0)).dtype.names)
     values = dict(_columns(tables))
-    times, said = _even_times(arrays, values) if named else ({}, ())
+    single = {name: float(one.item()) for name, one in arrays.items() if one is not None and _is_number(one)}
+    times, said = even_times(single, values) if named else ({}, ())
     columns = pa.table({name: column(one) for name, one in (times | values).items()})
     return MemoryTable(path.stem, columns, named=named, path=path, inferences=said)
 
 
-def _even_times(
-    arrays: Mapping[str, Array | None], columns: Mapping[str, Array]
+def even_times(
+    single: Mapping[str, float], columns: Mapping[str, Array]
 ) -> tuple[dict[str, Array], tuple[Inference, ...]]:
     """Return the times that a single number between samples gives, if no column is named like a time.
 
@@ -87,7 +88,6 @@ def _even_times(
     words = vocabulary()
     if any(pattern.search(key(split_unit(name)[0])) for name in columns for pattern in words.time):
         return {}, ()
-    single = {name: float(one.item()) for name, one in arrays.items() if one is not None and _is_number(one)}
     periods = {
         name: value
         for name, value in single.items()

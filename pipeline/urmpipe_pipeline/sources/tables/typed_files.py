@@ -36,7 +36,12 @@ def read_typed(path: Path, options: ReadOptions) -> MemoryTable | None:
     if head.startswith(b"MATLAB 5.0 MAT-file"):
         from urmpipe_pipeline.sources.tables.mat_file import read_mat
 
-        return read_mat(path, head)
+        return read_mat(path, head, options)
+    if head.startswith((b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file")):
+        import_optional("h5py", path, "an HDF5 file")
+        from urmpipe_pipeline.sources.tables.hdf5_file import read_hdf5
+
+        return read_hdf5(path, options)
     if head.startswith(b"\x93NUMPY") or (head.startswith(b"PK\x03\x04") and path.suffix.lower() == ".npz"):
         from urmpipe_pipeline.sources.tables.numpy_file import read_numpy
 
