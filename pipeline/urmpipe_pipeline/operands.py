@@ -41,6 +41,7 @@ from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import MemoryTable, ReadOptions
+from urmpipe_pipeline.sources.tables.bag_file import is_bag_folder
 from urmpipe_pipeline.sources.vocabulary import key
 
 NOT_A_RUN = (
@@ -352,12 +353,12 @@ def _is_recording(operand: Path) -> bool:
 
 
 def log_files(operand: Path) -> list[Path]:
-    """Return the files of one log: the file itself, or the CSV files of a folder by name.
+    """Return the files of one log: the file, the folder of a recording, or the CSV files of one by name.
 
     Raises:
         LogError: If a folder has no CSV file.
     """
-    if not isdir(operand):  # noqa: PTH112
+    if not isdir(operand) or is_bag_folder(operand):  # noqa: PTH112
         return [operand]
     files = sorted(path for path in operand.iterdir() if path.suffix.lower() in (".csv", ".txt"))
     if not files:

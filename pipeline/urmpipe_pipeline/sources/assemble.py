@@ -127,6 +127,7 @@ def assemble(
             *([Inference("significant digits", str(digits), coarse)] if digits else []),
         ),
         warnings=(
+            *plan.tables.warnings,
             *_not_used(plan, options, by_source=clock.by_source or measured.by_source),
             *content.warnings,
             *clock.warnings,

@@ -7,24 +7,18 @@ import os
 import pickle
 import re
 import shlex
-import shutil
 import struct
 import subprocess
 import sys
 import tarfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 import xlwt
-from rosbags.rosbag1 import Writer as Ros1Writer
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Ros2Writer
-from rosbags.typesys import Stores, get_typestore
 
 from asserting import refusal
 from urmpipe_models.errors import LogError, python_command
@@ -39,45 +33,10 @@ T = np.arange(ROWS) * 0.01
 Q = 0.5 * np.sin(2 * np.pi * 0.7 * T[:, None] + np.arange(6))  # rad, six joints that all turn back
 TABLE = pd.DataFrame({"t [s]": T, **{f"q{k + 1} [rad]": Q[:, k] for k in range(6)}})
 CSV = TABLE.to_csv(index=False).encode()
-EPOCH = 1_700_000_000
 
 
 def records() -> list[dict[str, float]]:
     return [{str(name): float(value) for name, value in row.items()} for _, row in TABLE.iterrows()]
-
-
-def joint_states(store: Any, **header: int) -> Iterator[tuple[int, Any]]:
-    """Yield the log as messages; between two of them one of a gripper, on the same topic."""
-    state, head, time = (
-        store.types[name]
-        for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
-    )
-    names, none = [f"joint_{k + 1}" for k in range(6)], np.empty(0)
-    for k in range(ROWS):
-        stamp = EPOCH * 10**9 + k * 10_000_000
-        at = head(stamp=time(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="", **header)
-        yield stamp, state(header=at, name=names, position=Q[k], velocity=none, effort=none)
-        yield stamp, state(header=at, name=["finger"], position=np.zeros(1), velocity=none, effort=none)
-
-
-def ros1_bag(path: Path) -> None:
-    kind, store = "sensor_msgs/msg/JointState", get_typestore(Stores.ROS1_NOETIC)
-    with Ros1Writer(path) as bag:
-        topic = bag.add_connection("/joint_states", kind, typestore=store)
-        for stamp, message in joint_states(store, seq=0):
-            bag.write(topic, stamp, store.serialize_ros1(message, kind))
-
-
-def ros2_bag(path: Path) -> None:
-    """Write a bag in a folder beside the file, and bring its storage to where the file shall be."""
-    kind, store = "sensor_msgs/msg/JointState", get_typestore(Stores.ROS2_HUMBLE)
-    folder = path.parent / "bag"
-    plugin = StoragePlugin.MCAP if path.suffix == ".mcap" else StoragePlugin.SQLITE3
-    with Ros2Writer(folder, version=8, storage_plugin=plugin) as bag:
-        topic = bag.add_connection("/joint_states", kind, typestore=store)
-        for stamp, message in joint_states(store):
-            bag.write(topic, stamp, store.serialize_cdr(message, kind))
-    shutil.copy(folder / f"bag{path.suffix}", path)
 
 
 def ulog(path: Path) -> None:
@@ -125,9 +84,6 @@ WRITERS: Mapping[str, Write] = {
     "my log.xlsx": lambda path: TABLE.to_excel(path, index=False),
     "a.ods": lambda path: TABLE.to_excel(path, index=False),
     "a.xls": old_workbook,
-    "a.bag": ros1_bag,
-    "a.mcap": ros2_bag,
-    "a.db3": ros2_bag,
     "a.json": lambda path: path.write_text(json.dumps(records())),
     "records.txt": lambda path: path.write_text(json.dumps(records(), indent=1)),
     "columns.json": lambda path: path.write_text(json.dumps(TABLE.to_dict("list"))),
@@ -167,19 +123,9 @@ def test_the_command_for_a_format_writes_a_table_that_is_read(name: str, tmp_pat
 def test_every_container_has_a_command_that_runs_here() -> None:
     """But for what MATLAB or Excel alone read, and what is no log."""
     others = ("password", "Simulink", "robot", "TOML", "picture", "PDF", "web page")
-    names = [*WRITERS, "a.mcap"]
     for one in vocabulary().containers:
-        suffixed = any(name.lower().endswith(one.suffixes) for name in names) or "JSON" in one.what
+        suffixed = any(name.lower().endswith(one.suffixes) for name in WRITERS) or "JSON" in one.what
         assert suffixed or any(word in one.what for word in others), one.what
-
-
-def test_a_folder_that_is_a_bag(tmp_path: Path) -> None:
-    ros2_bag(tmp_path / "a.db3")
-    said = refusal(LogError, read_log, [tmp_path / "bag"])
-    assert said.startswith(
-        f"{tmp_path}/bag: found a ROS bag, allowed: a text table; with pip install rosbags: "
-    )
-    assert f"pathlib.Path('{tmp_path}/bag')" in said
 
 
 @pytest.mark.parametrize(
@@ -191,7 +137,6 @@ def test_a_folder_that_is_a_bag(tmp_path: Path) -> None:
         ("a.csv", b"PK\x03\x04\x14\x00", "an Excel workbook"),
         ("a.zip", b"PK\x03\x04\x14\x00\x01\x00", "a zip archive"),
         ("A.XLSX", b"t,q1\n0,1\n", "an Excel workbook"),
-        ("a.txt", b"#ROSBAG V2.0\n", "a ROS bag"),
         ("a.txt", b"\xff\xd8\xff\xe0\x00\x10JFIF", "a picture"),
         ("a.pdf", b"%PDF-1.7\n", "a PDF"),
         ("a.slx", b"PK\x03\x04\x14\x00", "a Simulink model"),

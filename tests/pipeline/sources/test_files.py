@@ -42,7 +42,7 @@ def test_real_containers_are_known(tmp_path: Path) -> None:
     paths[1].write_bytes(b"%PDF-1.7\n")
     with pytest.raises(LogError) as caught:
         read_log(paths)
-    kinds = ["a ROS bag", "a PDF"]
+    kinds = ["no message (db3.csv: is a database without messages of ROS 2)", "a PDF"]
     assert [str(f).partition("found ")[2].partition(",")[0] for f in caught.value.findings] == kinds
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -39,6 +41,7 @@ from urmpipe_pipeline.sources.columns.questions import (
 from urmpipe_pipeline.sources.columns.sides import REST
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.own_tables import stated_joints
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -120,7 +123,8 @@ def assign(
         found = NamedJoints(joints, evidence, *family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
-        own = () if path else called_as_joints(numeric, robot)
+        stated = tuple(c for c in numeric if c.index in stated_joints(layouts[c.table]))
+        own = () if path else stated or called_as_joints(numeric, robot)
         pose = chosen_pose(columns, options) or find_pose(
             [c for c in numeric if c not in own],
             layouts,
@@ -135,10 +139,11 @@ def assign(
         }
         free = [column for column in numeric if column not in about_tool]
         half, placed = bool(pose.position and not pose.rotation), bool(pose.position)
-        found = NamedJoints(()) if path else find_joints(free, file, robot, half_pose=half, path=placed)
+        by_name = partial(find_joints, free, file, robot, half_pose=half, path=placed)
+        found = NamedJoints(()) if path else _stated(stated, file, robot) if stated else by_name()
         if whole and not (path or found.columns or pose.position or some_named(free, robot)[0]):
             found = proved_by_rates(numbered_alike(free), whole)
-        if len(found.columns) == 4 and turns_as_quaternion(found.columns, layouts):
+        if not stated and len(found.columns) == 4 and turns_as_quaternion(found.columns, layouts):
             unit = f"{listed(found.columns)} with length 1 in each row, as a quaternion has"
             raise which_joints(file, unit, [found.columns])
     pose = with_form(pose, options.rotation)
@@ -157,6 +162,21 @@ def assign(
     return _with_rest(
         roles, [*said, *about_pose(pose)], numeric, layouts, found.alternatives, pose.alternatives
     )
+
+
+def _stated(stated: Sequence[Column], file: str, robot: Chain | None) -> NamedJoints:
+    """Return the joints among the columns that a schema states, by their names, else all but a gripper's."""
+    first = [c for c in stated if c.kind == min(column.kind for column in stated)]
+    arm = tuple(c for c in first if not c.words & vocabulary().grippers) or tuple(first)
+    try:
+        joints = find_joints(stated, file, robot, half_pose=False, path=False)
+    except LogError:
+        if robot is not None or len(by_arm(arm)) > 1:
+            raise
+        joints = NamedJoints(())
+    names = tuple(re.split("(?:^|_)positions?_", column.key, maxsplit=1)[-1] for column in arm)
+    evidence = "the messages name them; the order is theirs"
+    return joints if joints.columns else NamedJoints(arm, evidence, names=names)
 
 
 def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:

@@ -7,6 +7,8 @@ import pyarrow as pa
 UNIT, ROLE = b"unit", b"role"
 """The keys of its unit, and of what it holds with its place among those of this role."""
 
+JOINT = b"joint"  # the role of a column that is a joint, but in no known place
+
 
 def is_number(kind: pa.DataType) -> bool:
     """Return whether a type is that of numbers."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, format_value
-from urmpipe_pipeline.joint_log import Inference, SourceFile
+from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_text, to_float, to_nanoseconds
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables import numpy_columns
@@ -60,6 +60,8 @@ class MemoryTable:
         path: The file that it was read from; None of an object in memory.
         inferences: What was found out about it.
         applied: The reading options that its file was read by, such as "episode": they are done with.
+        source: Name of the source that its schema states, which tells units.
+        warnings: Warnings about its file.
     """
 
     name: str
@@ -68,6 +70,8 @@ class MemoryTable:
     path: Path | None = None
     inferences: tuple[Inference, ...] = ()
     applied: tuple[str, ...] = ()
+    source: str = ""
+    warnings: tuple[LogWarning, ...] = ()
 
     @property
     def place(self) -> Path:

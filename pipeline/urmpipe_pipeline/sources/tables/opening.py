@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
 from urmpipe_models.files import log_stem
-from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference
+from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import is_number
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
@@ -48,6 +48,7 @@ class Tables:
         inferences: What was found out.
         foreign: Whether its source was given, and has columns or graphs of its own, which are not there.
         whole: All numbers of each table, for what the first rows do not prove.
+        warnings: Warnings about its files.
     """
 
     source: str
@@ -57,6 +58,7 @@ class Tables:
     inferences: tuple[Inference, ...]
     foreign: bool = False
     whole: tuple[Whole, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
 
     @property
     def paths(self) -> list[Path]:
@@ -106,7 +108,9 @@ def open_tables(
     layouts = _shaped(layouts, options) if sniff_plain is sniff else layouts
     titles = tuple(title for title, _ in titled)
     names = _names(layouts)
-    known, why = _known(names, options.source, titles if forced else ())
+    tables = [table for table in opened if isinstance(table, MemoryTable)]
+    stated = next((table.source for table in tables if table.source), "")
+    known, why = _known(names, options.source, titles if forced else (), stated)
     if known is None and options.source is None and all(map(in_si, layouts)):
         known, why = vocabulary().source(URMPIPE_SOURCE), "what its columns are called, and their units"
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
@@ -114,7 +118,8 @@ def open_tables(
     foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
     foreign = not graphs if options.source == COPPELIASIM else foreign
     said_of_all, whole = (*_encoding(texts[:1]), said), tuple(map(Whole, layouts))
-    return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, whole)
+    warnings = tuple(warning for table in tables for warning in table.warnings)
+    return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, whole, warnings)
 
 
 def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTable:
@@ -156,10 +161,14 @@ def _layout(one: Segment | MemoryTable, options: ReadOptions, sniff_plain: Sniff
     return found or sniff_arrays(one, *given) or with_names(sniff_plain(one, *given))
 
 
-def _known(names: Sequence[str], given: str | None, graphs: Sequence[str]) -> tuple[KnownSource | None, str]:
-    """Return the source that is given, or that graphs or the names of columns give away, and why."""
+def _known(
+    names: Sequence[str], given: str | None, graphs: Sequence[str], stated: str = ""
+) -> tuple[KnownSource | None, str]:
+    """Return the source that is given, stated by a schema, or known by graphs or columns, and why."""
     if given is not None:
         return vocabulary().source(given), "given as an option"
+    if stated:
+        return vocabulary().source(stated), "the types of the messages"
     if graphs:
         return None, f"each graph has its path and header: {', '.join(graphs)}"
     known = next((source for source in vocabulary().sources if source.wrote(names)), None)

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from urmpipe_models.math3d import COLUMN_NAMES
 from urmpipe_pipeline.joint_log import Role
-from urmpipe_pipeline.sources.tables.column_facts import ROLE, UNIT
+from urmpipe_pipeline.sources.tables.column_facts import JOINT, ROLE, UNIT
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
@@ -65,6 +65,12 @@ def roles_of(layout: Layout) -> dict[int, Role]:
         if told:
             return {index: role for _, index, role in sorted(told)}
     return grid_roles(head_of(layout)) if layout.header is not None and layout.form is None else {}
+
+
+def stated_joints(layout: Layout) -> frozenset[int]:
+    """Return the indices of the columns that a schema calls positions of joints, in no order."""
+    schema = getattr(layout.held, "schema", ())
+    return frozenset(k for k, field in enumerate(schema) if (field.metadata or {}).get(ROLE) == JOINT)
 
 
 def form_of(layout: Layout) -> str:

@@ -125,5 +125,9 @@ def _state(path: Path) -> State | None:
     except ValueError:
         raise LogError(f"found {format_value(str(path))}, allowed: the name of a file") from None
     if stat.S_ISDIR(found.st_mode):
-        return (found.st_mode,)
+        parts = (part.stat() for part in sorted(path.iterdir()))
+        return (
+            found.st_mode,
+            *(value for part in parts for value in (part.st_ino, part.st_size, part.st_mtime_ns)),
+        )
     return found.st_mode, found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns

@@ -8,6 +8,7 @@ from typing import Any
 
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.bag_file import MAGIC, is_bag_folder, is_packed
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 
 HEAD = 128
@@ -46,7 +47,16 @@ def read_typed(path: Path, options: ReadOptions) -> MemoryTable | None:
         from urmpipe_pipeline.sources.tables.numpy_file import read_numpy
 
         return read_numpy(path)
-    return None
+    is_recording = head.startswith(tuple(MAGIC)) or is_packed(path) or is_bag_folder(path)
+    return _read_messages(path, options) if is_recording else None
+
+
+def _read_messages(path: Path, options: ReadOptions) -> MemoryTable:
+    for library in ("mcap.reader", "rosbags.typesys"):
+        import_optional(library, path, "a recording of messages")
+    from urmpipe_pipeline.sources.tables.bag_table import read_bag
+
+    return read_bag(path, options)
 
 
 def import_optional(library: str, path: Path, what: str) -> Any:
