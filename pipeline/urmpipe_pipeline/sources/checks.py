@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import GAP, Inference, LogWarning, has_gap_after
@@ -16,6 +17,7 @@ from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.rounded import are_many, behind_repeated, spread_repeated
 from urmpipe_pipeline.sources.tables.numbers import NO_TIME, SHOWN_FINDINGS, UNREADABLE, Numbers
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
+from urmpipe_pipeline.sources.tables.rows import ROWS_READ
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 
@@ -37,14 +39,17 @@ SHOWN_GAPS = 10
 """Gaps that are told with their rows; the others are counted."""
 
 
-def trimmed(numbers: Numbers) -> Numbers:
-    """Return the numbers without rows at the end that hold neither a time nor a value (spreadsheets)."""
+def trimmed(numbers: Numbers) -> tuple[Numbers, tuple[Inference, ...]]:
+    """Return the numbers without rows at the end that hold neither a time nor a value, and their count."""
     if numbers.clock is None:
-        return numbers
-    end = len(numbers.clock)
+        return numbers, ()
+    end = rows = len(numbers.clock)
     while end and numbers.clock[end - 1] == NO_TIME and np.isnan(numbers.values[end - 1]).all():
         end -= 1
-    return numbers if end == len(numbers.clock) else numbers.at(slice(end))
+    if end == rows:
+        return numbers, ()
+    why = f"{format_count(rows - end, 'row')} at the end left out, without a time and a value"
+    return numbers.at(slice(end)), (Inference(ROWS_READ, f"{end} of {rows}", why),)
 
 
 def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
@@ -53,11 +58,13 @@ def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
         return numbers, []
     rows = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread))
     lasting = numbers.lasting
-    read = replace(numbers.at(rows), findings=lasting, wrong=len(lasting), rows=rows + 1)
+    read = replace(numbers.at(rows), findings=lasting, wrong=len(lasting))
     shown = sorted(numbers.unread.items())[:SHOWN_FINDINGS]
     warnings = [
         LogWarning(
-            SKIPPED, f"data row {row + 1} of the file is left out: {'; '.join(map(str, faults))}", row - k + 1
+            SKIPPED,
+            f"data row {numbers.file_row(row + 1)} of the file is left out: {'; '.join(map(str, faults))}",
+            row - k + 1,
         )
         for k, (row, faults) in enumerate(shown)
     ]
@@ -249,7 +256,7 @@ def _several_logs(starts: IntArray, numbers: Numbers, name: str) -> Finding:
     rows = [numbers.file_row(int(row) + 1) for row in starts]
     begin = ", ".join(map(str, rows[:SHOWN_GAPS])) + (", ..." if len(rows) > SHOWN_GAPS else "")
     ends = [*(row - 1 for row in rows), numbers.file_row(len(numbers.values))]
-    logs = [f"{first}:{last}" for first, last in zip([1, *rows], ends, strict=True)]
+    logs = [f"{first}:{last}" for first, last in zip([numbers.file_row(1), *rows], ends, strict=True)]
     hints = (*(Hint("rows", one, "reads one") for one in logs[:SHOWN_GAPS]), *OTHER_TIME)
     said = f"found {len(logs)} logs in one file: the clock begins again in row{'s' * (len(rows) > 1)} {begin}"
     return Finding(f"{said}, allowed: one log", row=int(starts[0]) + 1, column=name, hints=hints)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -108,8 +107,9 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
         too_many = Finding(unread, file, parameter="skip_bad", allowed=f"{MOST_SKIPPED:.0%} of them")
     elif may_skip(numbers):
         too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
-    numbers = over_midnight(trimmed(timed(layout, clock.parts, numbers)), clock)
-    numbers, padding = without_padding(numbers, lambda: plan.tables.whole[table].read.values)
+    numbers, inferences = trimmed(timed(layout, clock.parts, numbers))
+    numbers = over_midnight(numbers, clock)
+    numbers, padding = without_padding(numbers, lambda: plan.tables.whole[table].read)
     if clock.lasts:
         numbers = summed(numbers, clock.columns[0].name)
     numbers = rebuilt(as_poses(plan, columns, numbers))
@@ -119,7 +119,8 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
         raise LogError(*findings, *([too_many] if too_many else []))
-    return replace(numbers, warnings=(*warnings, *padding, *numbers.warnings))
+    warned = (*warnings, *padding, *numbers.warnings)
+    return replace(numbers, inferences=(*inferences, *numbers.inferences), warnings=warned)
 
 
 def _with_times(plan: Plan, main: Numbers, skip_bad: bool) -> Numbers:
@@ -146,20 +147,12 @@ def _joined(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tuple[In
         if any(column.table == table for column in needed) or len(set(plan.tables.paths)) > 1:
             findings.append(difference)
             continue
-        roles = _without(roles, table)
+        roles = roles.without([column for column in roles.columns if column.table == table])
     if findings:
         raise LogError(*findings)
     if roles == plan.roles:
         return roles, ()
     return roles, (Inference("other graphs", "left out", "they were sampled at other times than the joints"),)
-
-
-def _without(roles: Roles, table: int) -> Roles:
-    """Return the roles without the groups that have a column in a table: half a group has no meaning."""
-    names = ("rates", "accelerations", "position", "rotation")
-    partly = [name for name in names if any(column.table == table for column in getattr(roles, name))]
-    none: dict[str, Any] = dict.fromkeys(partly, ())
-    return replace(roles, **none)
 
 
 def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Finding | None:

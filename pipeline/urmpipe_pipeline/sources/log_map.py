@@ -21,6 +21,7 @@ from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
 from urmpipe_pipeline.sources.options import READING, Basis, Evidence, LogMap
 from urmpipe_pipeline.sources.tables.opening import TABLE
+from urmpipe_pipeline.sources.tables.rows import ROWS_READ
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import key as compared
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
@@ -65,7 +66,10 @@ CORRECTIONS = (
 )
 """What may be added to a map by hand."""
 
-NOTES = ("encoding", "header", "labels", "arrays", "program", "clock", "form of the time", "columns not used")
+NOTES = (
+    *("encoding", "header", "labels", "arrays", "program", ROWS_READ),
+    *("clock", "form of the time", "columns not used"),
+)
 """Kinds of inferences that are no entries of a map."""
 
 

@@ -21,11 +21,11 @@ from urmpipe_pipeline.sources.columns.long_form import refuse_long_form
 from urmpipe_pipeline.sources.columns.own_log import own_joints, written_roles
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
-from urmpipe_pipeline.sources.columns.sides import columns_of_side, without_other_side
+from urmpipe_pipeline.sources.columns.sides import columns_of_side, of_topic, without_other_side
 from urmpipe_pipeline.sources.columns.simulated import joints_of_blocks
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
-from urmpipe_pipeline.sources.vocabulary import Patterns, Unit
+from urmpipe_pipeline.sources.vocabulary import Patterns, Unit, vocabulary
 
 MOST_JOINTS = 500
 """Joints of a log: an arm has seven, a humanoid with its hands has sixty."""
@@ -94,7 +94,11 @@ def make_plan(
     units = given_units(columns, options)
     beside = columns_named(columns, tables.layouts, further or {})
     columns = tuple(column for column in columns if column not in beside.values())
-    own_side = without_other_side(columns, options)
+    chosen = columns
+    if options.topic is not None and not all("topic" in layout.applied for layout in tables.layouts):
+        chosen = tuple(of_topic(columns, options.topic, tables.layouts[0].file))
+    has_time = any(pattern.search(column.key) for column in chosen for pattern in vocabulary().time)
+    own_side = without_other_side(chosen if has_time else columns, options)
     apart = apart if options.time else time_file(tables, own_side)
     if apart is None:
         joints = len(robot.coordinates) if robot else None
@@ -105,7 +109,7 @@ def make_plan(
         own = [column for column in own_side if column.table == i]
         refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "selects one: give its number"))
     times = {column for clock in clocks for column in clock.columns}
-    rest = [column for column in columns if column not in times and column.table != apart]
+    rest = [column for column in chosen if column not in times and column.table != apart]
     rest = columns_of_side(rest, options, tables.layouts[0].file)
     only = None if apart is None else 1 - apart
     roles = _renamed(_roles(rest, tables, options, robot, only), options)

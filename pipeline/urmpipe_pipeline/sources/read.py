@@ -26,6 +26,7 @@ from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
 from urmpipe_pipeline.sources.tables.own_tables import roles_of
 from urmpipe_pipeline.sources.tables.reachable import unchanged
 from urmpipe_pipeline.sources.tables.text import fingerprint
+from urmpipe_pipeline.sources.topics import plan_topic
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded
 from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
 
@@ -71,7 +72,7 @@ def read_numbers(
         options = _without_foreign(tables, given)
         hashed = [beside.submit(_fingerprint, file) for file in used]
         try:
-            plan = make_plan(tables, options, robot)
+            plan = plan_topic(tables, options, robot)
         except LogError:
             if options != given:
                 make_plan(tables, given, robot)  # its error states the columns that are not there

@@ -107,6 +107,7 @@ class Vocabulary:
     time_rests: Mapping[str, re.Pattern[str]]
     durations: Patterns
     index: Patterns
+    episode: tuple[str, ...]
     joint: Mapping[str, Patterns]
     joint_words: Mapping[str, frozenset[str]]
     marks: frozenset[str]
@@ -170,6 +171,7 @@ def vocabulary() -> Vocabulary:
         time_rests={rest["unit"]: re.compile(rest["pattern"]) for rest in time["rests"]},
         durations=_compiled(time["durations"]),
         index=_compiled(data["index"]["patterns"]),
+        episode=tuple(data["episode"]["names"]),
         joint={role: _compiled(joint[role]) for role in roles},
         joint_words={role: frozenset(joint[f"{role}_words"]) for role in roles},
         marks=frozenset(joint["marks"]),

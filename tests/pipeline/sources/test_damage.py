@@ -140,6 +140,7 @@ def joined(*lines: str) -> str:
 @pytest.mark.parametrize("behind", [30, 100_000])
 def test_a_header_again_begins_a_second_log(wrong: Wrong, behind: int) -> None:
     said = "found the header again, allowed: one log per file; a second log begins here"
+    said += "; --rows 1:100 or --rows 102:-1 reads these rows"
     assert wrong(joined(*rows(100), "t,q1 [rad],q2 [rad]", *rows(behind))) == [f"log.csv:102: {said}"]
 
 
@@ -148,6 +149,7 @@ def test_another_header_begins_a_second_log_that_is_not_skipped(wrong: Wrong, he
     """Its rows may be in other units, or in another order, and go on in time."""
     text = joined(*rows(300), header, *rows(300, 3.0))
     said = f"found another header, {header!r}, allowed: one log per file; a second log begins here"
+    said += "; --rows 1:300 reads these rows"
     assert wrong(text, skip_bad=True) == wrong(text) == [f"log.csv:302: {said}"]
 
 

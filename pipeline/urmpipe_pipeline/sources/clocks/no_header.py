@@ -338,8 +338,9 @@ def _odd_row(step: int, column: Column, layout: Layout, whole: Whole, *, path: b
     found = format_value(cells[row]) if row < len(cells) else f"{values[row]:.15g}"
     what = "the time or a counter" if path else "the time, a counter or a joint"
     message = f"found {found} in a first column that otherwise increases, which may be {what}"
-    line = lines_of_rows(layout, [row + 1]).get(row + 1)
-    return LogError(Finding(message, layout.file, line, row + 1, hints=tuple(_which([column], path=path))))
+    at = layout.file_row(row + 1)
+    line = lines_of_rows(layout, [at]).get(at)
+    return LogError(Finding(message, layout.file, line, at, hints=tuple(_which([column], path=path))))
 
 
 def _is_stair(steps: FloatArray) -> bool:

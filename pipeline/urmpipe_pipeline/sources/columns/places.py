@@ -134,7 +134,8 @@ def _trailing_pose(
 
 def _refuse_odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> None:
     """Raise a `LogError` with the few rows without which columns are an orientation, if there are some."""
-    layout, odd = layouts[columns[0].table], odd_rows(columns, layouts)
+    layout = layouts[columns[0].table]
+    odd = [layout.file_row(row) for row in odd_rows(columns, layouts)]
     lines, told = lines_of_rows(layout, odd), listed(columns, most=4)
     found = f"found no orientation in columns {told}, allowed: one in every row, as in most"
     findings = [Finding(found, layout.file, lines.get(row), row, hints=(NAME_JOINTS,)) for row in odd]

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -74,6 +75,12 @@ class Roles:
     warnings: tuple[LogWarning, ...] = ()
     measured: bool = False
     further: Mapping[str, Column] = field(default_factory=dict)
+
+    def without(self, columns: Collection[Column]) -> Roles:
+        """Return the roles without the groups that have one of these columns: half a group has no meaning."""
+        groups = ("rates", "accelerations", "position", "rotation")
+        partly: dict[str, Any] = {g: () for g in groups if not set(columns).isdisjoint(getattr(self, g))}
+        return replace(self, **partly)
 
     @property
     def groups(self) -> tuple[tuple[Column, ...], ...]:

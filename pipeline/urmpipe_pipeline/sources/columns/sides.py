@@ -1,4 +1,4 @@
-"""Sides of a table, by words in the names of its columns: commanded and measured, or one of several arms."""
+"""Part of a table by names of columns: a side (commanded, measured, one of several arms) or a topic."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.errors import Finding, LogError, OptionError, format_value
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
@@ -139,3 +139,25 @@ def _no_column(columns: Sequence[Column], wanted: str, parameter: str, file: str
     return LogError(
         Finding(f"found no column {wanted} in its name, allowed: {allowed}", file, parameter=parameter)
     )
+
+
+def of_topic(columns: Sequence[Column], topic: str, file: str) -> list[Column]:
+    """Return the columns whose names begin with a topic.
+
+    Args:
+        columns: All columns of a table.
+        topic: How the names begin, with or without a slash before.
+        file: The file, for errors.
+
+    Raises:
+        OptionError: If no name does: with the first part of each name.
+    """
+    start = topic.strip("/")
+    is_whole = re.compile(rf"/?{re.escape(start)}(?!\w)")
+    chosen = [column for column in columns if is_whole.match(column.header)]
+    chosen = chosen or [column for column in columns if column.header.lstrip("/").startswith(start)]
+    if not chosen:
+        parts = (re.match(r"(/?\w+)[/.]", column.header) for column in columns)
+        known = ", ".join(dict.fromkeys(part[1] for part in parts if part)) or "the beginning of a name"
+        raise OptionError(Finding("", file, parameter="topic", found=format_value(topic), allowed=known))
+    return chosen

@@ -89,8 +89,6 @@ def layout_of(held: MemoryTable) -> Layout:
 
     table = plain_table(held.columns, str(held.place))
     _refuse_empty(held, table)
-    columns = [_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns]
-    sample = tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
     named = held.named and not only_count(table.column_names)
     names = tuple(table.column_names) if named else tuple(str(k + 1) for k in range(table.num_columns))
     units = tuple((field.metadata or {}).get(UNIT, b"").decode(errors="replace") for field in table.schema)
@@ -104,10 +102,17 @@ def layout_of(held: MemoryTable) -> Layout:
         header=1 if named else None,
         first_line=2 if named else 1,
         offset=0,
-        sample=sample,
+        sample=sampled_cells(table),
         inferences=held.inferences,
         held=table,
+        applied=held.applied,
     )
+
+
+def sampled_cells(table: pa.Table) -> tuple[tuple[str, ...], ...]:
+    """Return the cells of the first rows of a table in memory, as a CSV file has them."""
+    columns = [_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns]
+    return tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
 
 
 def _refuse_empty(held: MemoryTable, table: pa.Table) -> None:
@@ -159,11 +164,12 @@ def read_held(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColum
             said = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
             faults.setdefault(row, []).append(RowFault(said, (layout.names[column],)))
     findings = tuple(
-        Finding(fault.said, layout.file, row=row + 1, column=fault.columns[0])
+        Finding(fault.said, layout.file, row=layout.file_row(row + 1), column=fault.columns[0])
         for row in sorted(faults)[:SHOWN_FINDINGS]
         for fault in faults[row]
     )
-    found = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults)
+    rows = None if layout.rows is None else layout.rows + 1
+    found = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
     if not clock:
         return Numbers(values, None, *found)
     texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)

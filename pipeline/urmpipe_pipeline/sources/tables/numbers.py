@@ -97,10 +97,18 @@ class Numbers:
     still: bool = False
 
     def at(self, rows: IntArray | slice) -> Numbers:
-        """Return some of the rows alone; by index, shape (k,), or as a slice from the first one on."""
+        """Return some of the rows: by index, shape (k,), ascending, or as a slice from the first on."""
         clock = None if self.clock is None else self.clock[rows]
         texts = tuple(cells.at(rows) for cells in self.texts)
-        return replace(self, values=self.values[rows], clock=clock, texts=texts)
+        numbers, unread = self.rows, self.unread
+        if isinstance(rows, slice):
+            numbers = None if numbers is None else numbers[rows]
+        else:
+            numbers = rows + 1 if numbers is None else numbers[rows]
+            places = {row: k for k, row in enumerate(rows.tolist())} if unread else {}
+            unread = {places[row]: faults for row, faults in unread.items() if row in places}
+        values = self.values[rows]
+        return replace(self, values=values, clock=clock, texts=texts, rows=numbers, unread=unread)
 
     def file_row(self, row: int) -> int:
         """Return the data row of the file of a row that was read, both from 1."""

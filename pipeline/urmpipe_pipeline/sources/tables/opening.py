@@ -21,6 +21,7 @@ from urmpipe_pipeline.sources.tables.own_tables import in_si
 from urmpipe_pipeline.sources.tables.padding import without_end_rows
 from urmpipe_pipeline.sources.tables.programs.program_text import read_program
 from urmpipe_pipeline.sources.tables.ros2 import with_names
+from urmpipe_pipeline.sources.tables.rows import choose_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout, across, sniff
 from urmpipe_pipeline.sources.tables.text import Segment, open_text, refuse_long_lines
 from urmpipe_pipeline.sources.tables.turned import turned
@@ -136,11 +137,10 @@ def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTa
 
 
 def _shaped(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:
-    """Return tables with a row a sample, and none of those that end a log in what is sampled of them."""
+    """Return tables with a row a sample: the rows that are read, without end marks in what is sampled."""
     alone = len(layouts) == 1
-    return map_collecting_errors(
-        lambda one: without_end_rows(turned(one, options.layout, alone=alone)), layouts
-    )
+    shaped = map_collecting_errors(lambda one: turned(one, options.layout, alone=alone), layouts)
+    return [without_end_rows(one) for one in choose_rows(shaped, options)]
 
 
 def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:

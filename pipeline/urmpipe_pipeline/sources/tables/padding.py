@@ -42,7 +42,7 @@ START = "start-rows"
 def end_rows(values: FloatArray) -> int:
     """Return how many rows at the end hold no sample.
 
-    Columns that go on through the whole table, such as a clock or a count, are not looked at.
+    Columns that rise or fall through the whole table, such as a clock or a count, are ignored.
 
     Args:
         values: All columns of numbers in the file's own units, shape (n, columns).
@@ -51,22 +51,22 @@ def end_rows(values: FloatArray) -> int:
         return 0
     by_row = np.diff(values, axis=0)
     going_on = (by_row > 0).all(axis=0) | (by_row < 0).all(axis=0)
-    ways = [~going_on, *(values[-1] == mark for mark in MARKS)]  # a joint may go on until the mark, and to it
-    return max(_marked(values[:, own]) for own in ways if (own | going_on).all())
+    ways = [~going_on, *(values[-1] == mark for mark in MARKS)]  # a joint may rise up to the mark
+    return max(_marked(values[:, columns]) for columns in ways if (columns | going_on).all())
 
 
-def _marked(own: FloatArray) -> int:
+def _marked(values: FloatArray) -> int:
     """Return how many rows at the end are all one mark, and away from the motion, shape (n, columns)."""
-    if own.shape[1] < FEWEST_MARKS or not _alike(own[-1]):
+    if values.shape[1] < FEWEST_MARKS or not _alike(values[-1]):
         return 0
-    others = np.flatnonzero((own != own[-1]).any(axis=1))
-    if len(others) < LEAST_ROWS:
+    unmarked = np.flatnonzero((values != values[-1]).any(axis=1))
+    if len(unmarked) < LEAST_ROWS:
         return 0
-    samples = own[: others[-1] + 1]
+    samples = values[: unmarked[-1] + 1]
     largest = np.array([np.fmax.reduce(np.abs(steps(column))) for column in samples.T])
     moves = largest > 0.0 if (largest > 0.0).any() else np.ones(len(largest), dtype=bool)
-    far = np.abs(samples[-1] - own[-1]) > JUMP * largest
-    return len(own) - len(samples) if (far & moves).any() else 0
+    far = np.abs(samples[-1] - values[-1]) > JUMP * largest
+    return len(values) - len(samples) if (far & moves).any() else 0
 
 
 def start_rows(values: FloatArray) -> int:
@@ -91,33 +91,35 @@ def without_end_rows(layout: Layout) -> Layout:
     return replace(layout, sample=layout.sample[:-count]) if count else layout
 
 
-def without_padding(numbers: Numbers, whole: Callable[[], FloatArray]) -> tuple[Numbers, list[LogWarning]]:
-    """Return numbers without the rows at the end that hold no sample, and what there is to say of them.
+def without_padding(numbers: Numbers, whole: Callable[[], Numbers]) -> tuple[Numbers, list[LogWarning]]:
+    """Return numbers without the rows at the end that hold no sample, and the warnings.
 
-    Such rows at the start are said, and stay.
+    Such rows at the start are a warning, and stay.
 
     Args:
         numbers: The rows of the columns that are used.
-        whole: Gives all columns of numbers of the table, shape (n, columns); called where those that are used
-            may be padded.
+        whole: Gives all columns of numbers of the table; called where those that are used may be padded.
     """
     used = numbers.values
     if len(used) <= LEAST_ROWS or not used.shape[1] or not (_alike(used[-1]) or _alike(used[0])):
         return numbers, []
-    values, warnings = whole(), []
+    table, warnings = whole(), []
+    values = table.values
     ends = end_rows(values)
     samples = values[: len(values) - ends]
     starts = start_rows(samples)
     if ends:
-        place = f"data row {len(values)}" if ends == 1 else f"data rows {len(samples) + 1} to {len(values)}"
-        said = f"the end of the file, {place}, holds {used[-1, 0]:g} in every column"
-        said = f"{said}, and no step of the motion leads there: left out as padding or end mark"
-        warnings.append(LogWarning(END, said))
-        rows = np.arange(len(used)) if numbers.rows is None else numbers.rows[: len(used)] - 1
-        numbers = numbers.at(slice(int(np.searchsorted(rows, len(samples)))))
+        last = table.file_row(len(values))
+        place = f"data row {last}" if ends == 1 else f"data rows {table.file_row(len(samples) + 1)} to {last}"
+        message = f"the end of the file, {place}, holds {used[-1, 0]:g} in every column"
+        message += ", and no step of the motion leads there: left out as padding or end mark"
+        warnings.append(LogWarning(END, message))
+        rows = np.arange(1, len(used) + 1) if numbers.rows is None else numbers.rows
+        kept = np.searchsorted(rows, table.file_row(len(samples)), side="right")
+        numbers = numbers.at(slice(int(kept)))
     if starts > 1:
-        said = f"the first {starts} rows hold {used[0, 0]:g} in every column, and then the values jump"
-        warnings.append(LogWarning(START, f"{said}: had the controller not started?", 1))
+        message = f"the first {starts} rows hold {used[0, 0]:g} in every column, and then the values jump"
+        warnings.append(LogWarning(START, f"{message}: had the controller not started?", 1))
     return numbers, warnings
 
 

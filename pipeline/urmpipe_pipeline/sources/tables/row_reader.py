@@ -11,7 +11,7 @@ from itertools import islice
 import numpy as np
 
 from urmpipe_models.display import format_count
-from urmpipe_models.errors import Finding
+from urmpipe_models.errors import Finding, Hint
 from urmpipe_pipeline.sources.cells.cell import (
     is_missing,
     is_number,
@@ -38,6 +38,8 @@ _SHOWN_TEXT = 60
 _LAST_BYTES = 1 << 12
 _FIXED_ROWS = 100
 """So many rows tell that a column is written with the same number of decimals."""
+
+HEADER = "the header again"
 
 MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is missing"
 """What a cell of a log may hold."""
@@ -97,11 +99,12 @@ class _Fault:
     row: int
     column: str | None
     more: int = 0
+    hints: tuple[Hint, ...] = ()
 
     def finding(self, file: str) -> Finding:
         """Return it as a finding."""
         more = f" (and so {self.more} more row{'s' if self.more > 1 else ''} below it)" if self.more else ""
-        return Finding(self.message + more, file, self.line, self.row, self.column)
+        return Finding(self.message + more, file, self.line, self.row, self.column, hints=self.hints)
 
 
 class RowReader:
@@ -138,6 +141,7 @@ class RowReader:
         self._texts: list[list[str]] = []
         self.ended = False
         self._wanted = (*columns, *(part.column for part in clock))
+        self._rows_read = None if layout.rows is None else frozenset(layout.rows.tolist())
 
     def pass_over(self, rows: int, lines: int) -> None:
         """Count rows and lines that were read otherwise."""
@@ -182,10 +186,14 @@ class RowReader:
             if self.ended:
                 return
             self._line, self._row = line, self._row + 1
-            cells = self._cells(text)
+            cells = self._cells(text) if self._is_read() else None
             for texts, part in zip(self._texts, self._text_parts, strict=True):
                 texts.append("" if cells is None else cells[part.column])
             yield (REPORTED, nothing) if cells is None else (self._time(cells), self._values(cells))
+
+    def _is_read(self) -> bool:
+        """Return whether this row is among those that are read."""
+        return self._rows_read is None or self._row - 1 in self._rows_read
 
     def _values(self, cells: Sequence[str]) -> list[float]:
         wanted = [cells[j] for j in self.columns]
@@ -223,6 +231,10 @@ class RowReader:
         width = len(names)
         if again := self._header_again(text, values, names):
             self._report(f"found {again}, allowed: one log per file; a second log begins here", lasting=True)
+            if self._last and not self.allowed:  # a table of targets has no such option
+                first = 1 + min(self._rows_read or [0])
+                parts = [f"{first}:{self._row - 1}", f"{self._row + 1}:-1"][: 2 if again == HEADER else 1]
+                self._last.hints = tuple(Hint("rows", part, "reads these rows") for part in parts)
             self.ended = True
             return False
         if len(values) == width - 1 and not names[-1]:
@@ -240,7 +252,7 @@ class RowReader:
         if self.layout.header is None or not any(names):
             return None
         if tuple(values[: len(names)]) == tuple(names):
-            return "the header again"
+            return HEADER
         if any(not isinstance(value, str) or is_number(value, self.layout.decimal) for value in values):
             return None
         known = {split_unit(name)[0].lower() for name in names if name}
@@ -251,7 +263,7 @@ class RowReader:
         """Report the last row if the file ends within its last cell."""
         layout = self.layout
         cut = cut_cell(layout) if len(layout.names) - 1 in self._wanted else None
-        if cut is not None and not self.ended:
+        if cut is not None and not self.ended and self._is_read():
             self._line = lines_of_rows(layout, [self._row])[self._row]
             self._report(f"found {cut!r} where the file ends, allowed: as many decimals as in the other rows")
 

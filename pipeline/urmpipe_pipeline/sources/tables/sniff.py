@@ -11,6 +11,7 @@ from itertools import islice
 from typing import Any
 
 from urmpipe_models.display import format_count
+from urmpipe_models.elementwise import IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import (
@@ -75,6 +76,8 @@ class Layout:
         form: How its rows become rows of plain cells, if they hold arrays or labels.
         across: Whether the rows of its only column stand side by side in one line.
         held: The Arrow table that it is, where it is no text: then it has no lines.
+        rows: Data rows of the file that are read, from 0 and ascending, shape (n,); None for all of them.
+        applied: Options of reading that its format applied already, such as "topic" or "episode".
     """
 
     segment: Segment
@@ -90,6 +93,8 @@ class Layout:
     form: Form | None = None
     across: bool = False
     held: Any = None
+    rows: IntArray | None = None
+    applied: tuple[str, ...] = ()
 
     @property
     def header_line(self) -> int | None:
@@ -103,8 +108,12 @@ class Layout:
 
     def error(self, message: str, column: str | None, *hints: Hint) -> LogError:
         """Return an error about its first row, or a column there."""
-        line = self.first_line if self.held is None else None
-        return LogError(Finding(message, self.file, line, 1, column, hints=hints))
+        line = self.first_line if self.held is None and self.rows is None else None
+        return LogError(Finding(message, self.file, line, self.file_row(1), column, hints=hints))
+
+    def file_row(self, row: int) -> int:
+        """Return the data row of the file of a row that is read, both from 1."""
+        return row if self.rows is None else int(self.rows[row - 1]) + 1
 
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""

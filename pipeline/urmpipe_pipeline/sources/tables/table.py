@@ -40,13 +40,16 @@ def read_table(
     reader.refuse_cut_row()
     values = [part.values for part in parts] or [np.empty((0, len(columns)))]
     times = [_times(part) for part in parts] or [np.empty(0, dtype=np.int64)]
-    return replace(
+    numbers = replace(
         reader.verdict(),
         values=np.concatenate(values),
         clock=np.concatenate(times) if clock else None,
         texts=tuple(TextCells.joined(texts) for texts in zip(*(part.texts for part in parts), strict=True)),
         left_out=sum(part.left_out for part in parts),
     )
+    if layout.rows is None:
+        return numbers
+    return numbers.at(layout.rows[layout.rows < len(numbers.values)])  # fewer if another header ends them
 
 
 def _times(part: Numbers) -> IntArray:

@@ -25,6 +25,7 @@ class Whole:
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
+        self._last: tuple[object, Numbers] | None = None
 
     @cached_property
     def columns(self) -> tuple[int, ...]:
@@ -56,8 +57,15 @@ class Whole:
         """Return the numbers of some columns with those of the clock, as `read_table` does.
 
         They are those that were looked at already, if nothing was wrong with them: then the exact text of the
-        clock alone is read again.
+        clock alone is read again. The last answer is kept.
         """
+        arguments = tuple(columns), tuple(clock)
+        if self._last is None or self._last[0] != arguments:
+            self._last = arguments, self._table(columns, clock)
+        return self._last[1]
+
+    def _table(self, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers:
+        """Return the same, read."""
         known = self.__dict__.get("read")
         if known is None or known.findings or known.left_out or not set(columns) <= set(self.columns):
             return read_table(self.layout, columns, clock)
