@@ -28,7 +28,7 @@ from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS
 from urmpipe_pipeline.sources.clocks.clock import even_clock
 from urmpipe_pipeline.sources.clocks.clock_columns import like_a_time
 from urmpipe_pipeline.sources.clocks.clock_units import LONGEST, SHORTEST
-from urmpipe_pipeline.sources.columns.blocks import SURE, period_of, rounded_period
+from urmpipe_pipeline.sources.columns.blocks import SURE_VARIED, period_of, rounded_period
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import Content
@@ -275,11 +275,11 @@ def _by_rates(
     found = period_of(joints, rates * ratio)
     if found is None or not SHORTEST <= found[0] <= LONGEST:
         return None
-    period, correlation = rounded_period(found[0]), found[1]
+    period, varies = rounded_period(found[0]), found[1]
     t_ns, _, _ = even_clock(content.rows, period)
-    evidence = f"the joints go on so by their recorded rates: steps and rates correlate by {correlation:.3g}"
+    evidence = f"steps over recorded rates; half of the steps are within {100 * varies:.2g} % of it"
     said = Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),))
-    if correlation >= SURE:
+    if varies <= SURE_VARIED:
         return t_ns, 0, (said,), ()
     apart = f"the rows are {1e3 * period:g} ms apart"
     warning = LogWarning(

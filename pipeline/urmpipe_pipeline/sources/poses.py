@@ -19,6 +19,7 @@ from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD
 from urmpipe_pipeline.sources.clocks.clock_columns import GIVEN
 from urmpipe_pipeline.sources.clocks.clock_units import in_si
+from urmpipe_pipeline.sources.columns.blocks import period_of
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
@@ -104,7 +105,10 @@ def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
     if len(moves) < max(LEAST_ROWS - 1, REST_SHARE * len(size)) or rests > REST_SHARE * size[moves].sum():
         return ""
     steps, size = steps[moves], size[moves]
-    if _quantile(size, 0.5) <= STEP:
+    rates = [columns.index(rate) for rate in plan.roles.rates if rate in columns]
+    if _quantile(size, 0.5) <= STEP or (
+        rates and period_of(numbers.values[:, joints], numbers.values[:, rates])
+    ):
         return ""
     usual, turned = np.linalg.norm(steps, axis=1), np.linalg.norm(np.diff(steps, axis=0), axis=1)
     said = f"the joints step by up to {size.max():.2g} {'rad' if turns.any() else 'm'} from row to row, in"

@@ -46,6 +46,11 @@ MOST_ROWS = 50_000
 SURE = 0.99
 """Where steps and rates correlate so, the period that they tell is exact to a percent."""
 
+CLEAR = 0.1  # steps times rates that are larger than this share of what one in ten exceeds are clear motion
+LEAST_CLEAR = 10  # fewer clear steps of a joint show no period
+MOST_VARIED = 0.3  # periods of single steps vary by less, in the median, where rates are those of the joints
+SURE_VARIED = 0.1  # ... and where the period is exact to a percent: noise of a seventh of the rates
+
 EXACT = 0.002
 """Share of a period by which it is rounded: of a motion that is well sampled the rule misses by less."""
 
@@ -106,15 +111,34 @@ def _tile(joints: range, rates: range) -> bool:
 
 
 def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
-    """Return the time between rows that joints and their rates tell, and how well they correlate.
+    """Return the time between rows with which joints step as their rates say, and how much it varies.
 
-    It is in [s] if the joints are in [rad] or [m] and the rates in [rad/s] or [m/s], both of shape (n,
-    joints); None where nothing moves, or the two do not agree.
+    It is the sum of steps over that of mean rates, of the steps that move clearly and whose ratio is near its
+    median: in [s] if the joints are in [rad] or [m] and the rates in [rad/s] or [m/s], both of shape
+    (n, joints). It varies by the median of the relative deviations [-]. None where nothing moves, or joints
+    and rates do not agree.
     """
     joints = q.shape[1]
-    evidence = _Evidence.of(np.hstack([q, rates]))
-    block = evidence and evidence.block(range(joints), range(joints, 2 * joints))
-    return (block.period, block.correlation) if block else None
+    both, means = _steps_and_means(np.hstack([q, rates]))
+    steps, means = both[:, :joints], means[:, joints:]
+    size = np.abs(steps * means)
+    if len(steps) < LEAST_ROWS or not size.any():
+        return None
+    clear = size > CLEAR * np.sort(size, axis=None)[int(0.9 * (size.size - 1))]
+    each = [
+        steps[at, j] / means[at, j] for j, at in enumerate(clear.T) if np.count_nonzero(at) >= LEAST_CLEAR
+    ]
+    if len(each) < min(2, joints):
+        return None
+    period = float(np.median(np.concatenate(each)))
+    varies = float(np.median(np.abs(np.concatenate(each) / period - 1))) if period > 0 else np.inf
+    off = np.array([abs(np.median(one) / period - 1) * np.sqrt(len(one)) for one in each])
+    near = np.maximum(ONE_PERIOD * np.sqrt([len(one) for one in each]), 4 * varies)  # 2.2 standard errors
+    if varies >= MOST_VARIED or (off > near).any():
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        usual = clear & (np.abs(steps / means / period - 1) <= 4 * varies + 1e-9)
+    return float(np.abs(steps[usual]).sum() / np.abs(means[usual]).sum()), varies
 
 
 def rounded_period(period: float) -> float:
