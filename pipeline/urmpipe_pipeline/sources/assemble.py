@@ -196,6 +196,9 @@ def _measured(
     q = _in_si(q, units)
     lengths, why = _lengths(plan, finder, roles, robot, q, tcp)
     tcp = _in_si(tcp, lengths)
+    if len(roles.position) == 2:
+        tcp = np.column_stack((tcp, np.zeros(len(tcp))))
+        why = (*why, Inference("z of the position", "0 m", "x and y are given alone"))
     told = finder.rotations(roles.rotation, roles.forms)
     arm = (robot, q) if robot and roles.joints else None
     given = options.rotation is not None

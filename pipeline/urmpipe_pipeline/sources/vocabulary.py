@@ -116,6 +116,7 @@ class Vocabulary:
     grippers: frozenset[str]
     measured_markers: frozenset[str]
     commanded: frozenset[str]
+    goals: frozenset[str]
     arms: re.Pattern[str]
     stems: frozenset[str]
     present: re.Pattern[str]
@@ -180,6 +181,7 @@ def vocabulary() -> Vocabulary:
         grippers=frozenset(joint["grippers"]),
         measured_markers=frozenset(joint["measured"]),
         commanded=frozenset(joint["commanded"]),
+        goals=frozenset(joint["goals"]),
         arms=re.compile(joint["arms"]),
         stems=frozenset(joint["stems"]),
         present=re.compile(joint["present"]),

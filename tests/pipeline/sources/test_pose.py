@@ -214,7 +214,10 @@ def test_named_columns_of_the_pose(read: Read) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"position": ("a1", "a2")}, "position: found 2 columns, allowed: x, y, z"),
+        (
+            {"position": ("a1", "a2", "a3", "b1")},
+            "position: found 4 columns, allowed: x, y, z, or x, y of a planar arm",
+        ),
         (
             {"position": ("a1", "a2", "a3"), "orientation": ("b1",)},
             "orientation: found 1 column, allowed: 3, 4 or 9",

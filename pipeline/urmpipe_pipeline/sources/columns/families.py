@@ -39,6 +39,11 @@ class Family:
     columns: dict[int, Column] = field(default_factory=dict)
     twins: list[Column] = field(default_factory=list)
 
+    @property
+    def is_measured(self) -> bool:
+        """Whether a word for measured is in their names; that of a sensor may be of a force."""
+        return all(column.marked.measured - {"sensor"} for column in self.columns.values())
+
     def shares_name(self, other: Family) -> bool:
         """Return whether the names are the same, with or without a sign beside the number."""
         one, two = (_BESIDE.sub("#", family.name) for family in (self, other))
@@ -92,13 +97,15 @@ def _stands_for(other: Family, family: Family) -> bool:
 
 
 def drop_unknown(found: Sequence[Family], *, lone: bool) -> list[Family]:
-    """Return the families that are known, and the others that share a name with one of them.
+    """Return the families that are known or measured, and the others that share a name with one of them.
 
     Args:
         found: The families.
         lone: Whether all count if none is known.
     """
-    kept = [f for f in found if f.known or any(o is not f and o.shares_name(f) for o in found)]
+    kept = [
+        f for f in found if f.known or f.is_measured or any(o is not f and o.shares_name(f) for o in found)
+    ]
     return kept or (list(found) if lone else [])
 
 
@@ -133,7 +140,7 @@ def _number(match: re.Match[str]) -> tuple[int, int, int]:
     groups = match.groupdict()
     if "i" in groups:
         return 10 * int(groups["i"]) + int(groups["j"]), match.start("i"), match.end("j")
-    group = next(name for name in ("n", "axis", "k") if name in groups)
+    group = next(name for name in ("n", "axis", "k", "wpr") if name in groups)
     text = groups[group]
-    number = _AXES[text] if group == "axis" else int(text or 0)
+    number = _AXES[text] if group == "axis" else "wpr".index(text) if group == "wpr" else int(text or 0)
     return number, match.start(group), match.end(group)

@@ -23,6 +23,7 @@ from urmpipe_pipeline.sources.columns.pose import (
 )
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, TIMES_OF_ANOTHER
 from urmpipe_pipeline.sources.columns.roles import (
+    GIVEN,
     Roles,
     about_pose,
     check_count,
@@ -38,9 +39,6 @@ from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import split_unit
-
-GIVEN = "given as an option"
-"""The evidence for columns that the user named."""
 
 NO_HEADER = "no header tells what they are"
 

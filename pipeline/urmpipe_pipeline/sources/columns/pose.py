@@ -42,7 +42,7 @@ class Pose:
     """Columns of a recorded tool centre point.
 
     Attributes:
-        position: x, y, z, or none.
+        position: x, y, z, or x, y in the plane z = 0, or none.
         rotation: The columns of its orientation, in the order of the form, or none.
         forms: What these may be; one if it is known.
         evidence: Why.
@@ -141,8 +141,9 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
         return None
     position = tuple(find_column(columns, text, about="position") for text in options.position)
     rotation = tuple(find_column(columns, text, about="orientation") for text in options.orientation)
-    if len(position) != 3:
-        raise OptionError(f"position: found {format_count(len(position), 'column')}, allowed: x, y, z")
+    if len(position) not in (2, 3):
+        allowed = "x, y, z, or x, y of a planar arm"
+        raise OptionError(f"position: found {format_count(len(position), 'column')}, allowed: {allowed}")
     forms = _forms_of(rotation, options)
     if rotation and not forms:
         allowed = (
@@ -313,12 +314,12 @@ def _position(
 
 
 def _xyz(
-    found: Sequence[Family], file: str | None = None
+    families: Sequence[Family], file: str | None = None
 ) -> tuple[tuple[Column, ...], tuple[tuple[Column, ...], ...]]:
     """Return the columns of the only one of the surest families that is x, y, z, and those of the others."""
-    every = [family for family in found if _numbers(family) == range(3)]
-    found = [family for family in prefer_measured(found) if family in every]
-    best = [family for family in found if family.rank == found[0].rank]
+    every = [family for family in families if _numbers(family) == range(3)]
+    families = [family for family in prefer_measured(families) if family in every]
+    best = [family for family in families if family.rank == families[0].rank]
     if len(best) > 1 and file is not None:
         groups = "; ".join(listed(family.ordered()) for family in best)
         raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
@@ -346,10 +347,10 @@ def _rotation(
     for words in vocabulary().tcp_rotations:
         wanted = range(4) if words.forms[0].startswith("quat") else range(3)
         every = [f for f in find_families(rest, words.patterns, 0) if _numbers(f) == wanted]
-        found = prefer_measured(drop_unknown(every, lone=lone))
-        if len(found) != 1:
+        families = prefer_measured(drop_unknown(every, lone=lone))
+        if len(families) != 1:
             continue
-        columns = found[0].ordered()
+        columns = families[0].ordered()
         told = not _LIKE_JOINT.fullmatch(columns[0].bare) or form in words.forms
         if told or _is_unit(columns, layouts, some=some):
             return columns, words.forms

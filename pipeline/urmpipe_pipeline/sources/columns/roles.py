@@ -17,6 +17,7 @@ from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
 from urmpipe_pipeline.sources.columns.columns import Column, Kind, chosen_columns, listed
+from urmpipe_pipeline.sources.columns.coverage import coverage_warnings
 from urmpipe_pipeline.sources.columns.families import find_families
 from urmpipe_pipeline.sources.columns.joint_names import (
     NamedJoints,
@@ -46,6 +47,8 @@ from urmpipe_pipeline.sources.tables.own_tables import stated_joints
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+GIVEN = "given as an option"  # evidence of columns that the user named
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +129,7 @@ def assign(
     numeric = [column for column in columns if (path or not column.text) and not column.counts_rows]
     if options.joints or written:
         joints = written or chosen_columns(columns, options.joints, parameter="joints")
-        evidence = "urmpipe wrote them" if written else "given as an option"
+        evidence = "urmpipe wrote them" if written else GIVEN
         found = NamedJoints(joints, evidence, *family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
@@ -153,6 +156,16 @@ def assign(
         if not stated and len(found.columns) == 4 and turns_as_quaternion(found.columns, layouts):
             unit = f"{listed(found.columns)} with length 1 in each row, as a quaternion has"
             raise which_joints(file, unit, [found.columns])
+    chosen = bool(options.joints or written)
+    if not chosen and any(column.words & vocabulary().goals for column in found.columns):
+        goals = f"goals alone ({listed(found.columns)}), which are not the motion"
+        raise which_joints(file, goals, [found.columns], by_side=True)
+    if (
+        found.columns
+        and not (chosen or options.position or options.measured)
+        and _is_commanded(pose.position, found.columns)
+    ):
+        pose = Pose()  # where the tool was to be
     pose = with_form(pose, options.rotation)
     if not found.columns:
         return _path(columns, numeric, pose, layouts, robot, path=path)
@@ -167,7 +180,7 @@ def assign(
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
     return _with_rest(
-        roles, [*said, *about_pose(pose)], numeric, layouts, found.alternatives, pose.alternatives
+        roles, [*said, *about_pose(pose)], numeric, layouts, robot, found.alternatives, pose.alternatives
     )
 
 
@@ -184,6 +197,11 @@ def _stated(stated: Sequence[Column], file: str, robot: Chain | None) -> NamedJo
     names = tuple(re.split("(?:^|_)positions?_", column.key, maxsplit=1)[-1] for column in arm)
     evidence = "the messages name them; the order is theirs"
     return joints if joints.columns else NamedJoints(arm, evidence, names=names)
+
+
+def _is_commanded(position: Sequence[Column], joints: Sequence[Column]) -> bool:
+    """Return whether a position was commanded, and the joints were not."""
+    return {c.kind for c in position} == {Kind.COMMANDED} and Kind.COMMANDED not in {c.kind for c in joints}
 
 
 def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
@@ -270,10 +288,15 @@ def _path(
             raise LogError(
                 Finding(f"found several positions: {groups}; allowed: one x, y, z", file, hints=hints)
             )
+        if not path and any(column.words & vocabulary().goals for column in pose.position):
+            message = f"found goals alone ({listed(pose.position)}), allowed: the motion itself"
+            choices = {"side": min(vocabulary().goals), "source": "path"}
+            hints = tuple(Hint(option, value, "takes them") for option, value in choices.items())
+            raise LogError(Finding(message, file, hints=hints))
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
-        return _with_rest(roles, said, numeric, layouts, (), pose.alternatives)
+        return _with_rest(roles, said, numeric, layouts, robot, (), pose.alternatives)
     _refuse_thousands(layouts, file)
     if path:
         hints = (Hint("", effect="name them so in the header"), Hint("position", None, "names them"))
@@ -301,13 +324,15 @@ def _may_be(
 
     The only one that increases from row to row may be a time.
     """
-    about_else = vocabulary().other | vocabulary().outside
-    others = [column for column in numeric if not column.words & about_else]
-    steps = [np.diff(layouts[column.table].numbers(column.index)) for column in others]
-    rising = [column for column, own in zip(others, steps, strict=True) if len(own) > 1 and (own > 0).all()]
-    others = [column for column in others if len(rising) != 1 or column is not rising[0]]
+    other_words = vocabulary().other | vocabulary().outside
+    candidates = [column for column in numeric if not column.words & other_words]
+    steps = [np.diff(layouts[column.table].numbers(column.index)) for column in candidates]
+    rising = [
+        column for column, own in zip(candidates, steps, strict=True) if len(own) > 1 and (own > 0).all()
+    ]
+    candidates = [column for column in candidates if len(rising) != 1 or column is not rising[0]]
     fits = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
-    groups = sorted([*by_arm(others), *numbered_alike(others)], key=len, reverse=True)
+    groups = sorted([*by_arm(candidates), *numbered_alike(candidates)], key=len, reverse=True)
     return [group for group in groups if len(group) in fits]
 
 
@@ -330,29 +355,40 @@ def _as_written(row: Sequence[str], layout: Layout) -> Iterator[str]:
 
 def _with_rest(
     roles: Roles,
-    said: list[Inference],
+    inferences: list[Inference],
     numeric: Sequence[Column],
     layouts: Sequence[Layout],
+    robot: Chain | None,
     *alternatives: Sequence[tuple[Column, ...]],
 ) -> Roles:
-    """Return the roles with what is said of the columns that are not used.
+    """Return the roles with what is inferences of the columns that are not used.
 
     Args:
         roles: The roles.
-        said: What was found out.
+        inferences: What was found out.
         numeric: All columns of numbers.
         layouts: The tables.
+        robot: The arm, or None.
         alternatives: Groups of columns that would have been the joints, and the position, without these.
     """
     used = frozenset(roles.columns)
     rest = [column for column in numeric if column not in used]
     pairs = list(zip((roles.joints, roles.position), alternatives, strict=True))
-    pairs += [(one, same_quantities(one, rest)) for one in (roles.rates, roles.accelerations, roles.rotation)]
+    pairs += [
+        (group, same_quantities(group, rest)) for group in (roles.rates, roles.accelerations, roles.rotation)
+    ]
     passed = _passed_over(pairs, used)
     hints = _sides_of(passed[0]) if passed else ()
-    said += [replace(one, hints=hints) for one in not_used(rest, "unknown role")]
+    inferences += [replace(item, hints=hints) for item in not_used(rest, "unknown role")]
     warnings = about_odd_rows(rest, layouts) or ([] if roles.position else about_tcp(rest))
-    return replace(roles, inferences=tuple(said), warnings=(*_about_passed_over(passed, roles), *warnings))
+    stated = {column for _, group in passed for column in group}
+    unused = [column for column in rest if column not in stated]
+    if inferences[0].evidence != GIVEN:  # who names the joints knows the others
+        numbers = family_of(roles.joints)[0]
+        warnings += coverage_warnings(roles.joints, unused, numbers, robot=robot is not None)
+    return replace(
+        roles, inferences=tuple(inferences), warnings=(*_about_passed_over(passed, roles), *warnings)
+    )
 
 
 def _passed_over(
@@ -375,7 +411,8 @@ def _about_passed_over(
     if passed:
         said = "; ".join(f"{_ends(other)} passed over for {_ends(group)}" for group, other in passed)
         takes = [take(other) for group, other in passed if group == roles.joints]
-        hints = takes[:1] or [Hint("position", None, "takes others")]
+        takes += [take(other, parameter="position") for group, other in passed if group == roles.position]
+        hints = takes[:1] or [Hint("side", None, "takes others")]
         yield LogWarning(PASSED_OVER, said, hints=tuple(hints))
 
 

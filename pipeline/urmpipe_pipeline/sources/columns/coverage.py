@@ -1,0 +1,67 @@
+"""Columns of numbers that are named like columns in use, and are not used."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.sources.columns.columns import Column, Kind, listed
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, take
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+COLUMNS_NOT_READ = "columns-not-read"
+
+_DERIVATIVE = re.compile(r"d{1,2}_?[a-z]|q2d|q?dd?_")  # ddq1, d_q1, q2d_1
+_MARKERS = frozenset({"limit", "limits", "index", "min", "max"})  # of other values of a joint
+_SLIDES = re.compile(r"[dsl]_?(?P<n>\d+)")  # what a prismatic joint is called beside q1, q2
+
+
+def coverage_warnings(
+    joints: Sequence[Column], unused: Sequence[Column], numbers: Collection[int], *, robot: bool
+) -> list[LogWarning]:
+    """Return the warning that columns named like the joints are not used, or nothing.
+
+    A column is named like the joints if it has all words that they share, or "joint" as they do; if they
+    share no word, if it has their unit. "d4" is named like a joint that slides behind q3.
+
+    Args:
+        joints: The joint columns.
+        unused: The columns of numbers without a use, except those that other warnings state.
+        numbers: The numbers in the names of the joints.
+        robot: Whether an arm is given, which states how many joints there are.
+    """
+    words = vocabulary()
+    names = [_words(column) for column in joints]
+    if not joints or not all(column.header for column in joints):
+        return []
+    shared = frozenset.intersection(*map(frozenset, names))
+    longest = max(map(len, names)) + 1
+    units = {column.unit for column in joints} - {None}
+    apart = words.other | words.joint_words["rate"] | words.joint_words["acceleration"] | _MARKERS
+
+    def is_alike(column: Column) -> bool:
+        own = _words(column)
+        slides = _SLIDES.fullmatch(column.key)
+        if slides and numbers and int(slides["n"]) == max(numbers) + 1:
+            return True
+        if column.kind == Kind.COMMANDED or column.words & apart or _DERIVATIVE.match(column.bare):
+            return False
+        return bool(
+            ("joint" in shared and "joint" in own)
+            or (shared and shared <= {*own} and len(own) <= longest)
+            or (not shared and column.unit in units)
+        )
+
+    alike = [column for column in unused if not column.text and column.header and is_alike(column)]
+    if not alike:
+        return []
+    every = sorted({*joints, *alike}, key=lambda column: column.number)
+    hint = NAME_JOINTS if robot else take(every, "takes all of them")
+    message = f"{listed(alike, most=8)} named like the joints and not read"
+    return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
+
+
+def _words(column: Column) -> list[str]:
+    """Return the words of a name without its numbers: of joint2_pos joint and pos."""
+    return [word for word in re.split(r"[_\d]+", column.bare) if word]
