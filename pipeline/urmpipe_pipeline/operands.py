@@ -42,6 +42,7 @@ from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import MemoryTable, ReadOptions
 from urmpipe_pipeline.sources.tables.bag_file import is_bag_folder
+from urmpipe_pipeline.sources.tables.lerobot import is_data_set
 from urmpipe_pipeline.sources.vocabulary import key
 
 NOT_A_RUN = (
@@ -353,12 +354,12 @@ def _is_recording(operand: Path) -> bool:
 
 
 def log_files(operand: Path) -> list[Path]:
-    """Return the files of one log: the file, the folder of a recording, or the CSV files of one by name.
+    """Return the files of one log: the file, the folder of a recording or data set, or the CSV files of one.
 
     Raises:
         LogError: If a folder has no CSV file.
     """
-    if not isdir(operand) or is_bag_folder(operand):  # noqa: PTH112
+    if not isdir(operand) or is_bag_folder(operand) or is_data_set(operand):  # noqa: PTH112
         return [operand]
     files = sorted(path for path in operand.iterdir() if path.suffix.lower() in (".csv", ".txt"))
     if not files:

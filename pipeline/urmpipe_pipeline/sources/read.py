@@ -22,6 +22,7 @@ from urmpipe_pipeline.sources.log_map import shown_entries
 from urmpipe_pipeline.sources.options import READING, LogMap, ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.held import MemoryTable, fingerprint_of
+from urmpipe_pipeline.sources.tables.lerobot import episode_file, is_data_set
 from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
 from urmpipe_pipeline.sources.tables.own_tables import roles_of
 from urmpipe_pipeline.sources.tables.reachable import unchanged
@@ -64,6 +65,10 @@ def read_numbers(
 ) -> Reading:
     """Return the numbers of a log; arguments and errors are those of `read_log`."""
     options = options or ReadOptions()
+    files = [
+        episode_file(file, options.episode) if isinstance(file, Path) and is_data_set(file) else file
+        for file in files
+    ]
     named = named_file(options.time)
     used = [*files, named[0]] if named else files
     with unchanged(used), ThreadPoolExecutor(max_workers=1) as beside:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.exact_clock import exact_times
 from urmpipe_pipeline.sources.tables.frames import index_first
 from urmpipe_pipeline.sources.tables.held import MemoryTable
+from urmpipe_pipeline.sources.tables.lerobot import EPISODE, chosen_episode, with_names
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked
 from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result, told_in, with_roles
 
@@ -19,8 +23,10 @@ CLOCK = "clock [ns]"
 """The exact clock of our own files; their times in s, ms and us are doubles."""
 
 
-def read_parquet(path: Path, head: bytes) -> MemoryTable:
+def read_parquet(path: Path, head: bytes, options: ReadOptions) -> MemoryTable:
     """Return the table of a Parquet file, of which the first bytes are given.
+
+    Of a file of episodes (LeRobot), only the rows of a given episode are read, and no images.
 
     Raises:
         LogError: If it is encrypted or damaged.
@@ -30,13 +36,27 @@ def read_parquet(path: Path, head: bytes) -> MemoryTable:
     if head.startswith(b"PARE"):
         found = "found an encrypted Parquet file, allowed: one without encryption"
         raise LogError(Finding(found, str(path)))
+    applied: list[str] = []
 
     def read() -> pa.Table:
         with pq.ParquetFile(path) as file:
             refuse_unpacked(path, _unpacked(file.metadata))
-            return file.read()
+            if EPISODE not in file.schema_arrow.names:
+                return file.read()
+            columns = [field.name for field in file.schema_arrow if not _is_image(field.type)]
+            numbers = sorted(pc.unique(file.read([EPISODE]).column(EPISODE)).drop_null().to_pylist())
+        column, _, value = (options.episode or "").rpartition("=")
+        asks = options.rows is None and column in ("", EPISODE)
+        number = chosen_episode(path, numbers, value or None) if asks and numbers else None
+        applied.extend(["episode"] * (number is not None))
+        rows = None if number is None else [(EPISODE, "==", number)]
+        return with_names(pq.read_table(path, columns=columns, filters=rows, partitioning=None), path)
 
-    return _held(path, read, "Parquet")
+    return replace(_held(path, read, "Parquet"), applied=tuple(applied))
+
+
+def _is_image(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_struct(kind) and any(pa.types.is_binary(field.type) for field in kind))
 
 
 def read_feather(path: Path) -> MemoryTable:

@@ -29,7 +29,7 @@ def read_typed(path: Path, options: ReadOptions) -> MemoryTable | None:
     if head.startswith((b"PAR1", b"PARE")):
         from urmpipe_pipeline.sources.tables.parquet_file import read_parquet
 
-        return read_parquet(path, head)
+        return read_parquet(path, head, options)
     if head.startswith(b"ARROW1"):
         from urmpipe_pipeline.sources.tables.parquet_file import read_feather
 
