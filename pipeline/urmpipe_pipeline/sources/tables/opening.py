@@ -27,6 +27,7 @@ from urmpipe_pipeline.sources.tables.text import Segment, open_text, refuse_long
 from urmpipe_pipeline.sources.tables.turned import turned
 from urmpipe_pipeline.sources.tables.typed_files import read_typed
 from urmpipe_pipeline.sources.tables.whole import Whole
+from urmpipe_pipeline.sources.tables.workbook import read_workbook
 from urmpipe_pipeline.sources.vocabulary import KnownSource, vocabulary
 
 COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
@@ -88,6 +89,9 @@ def open_tables(
     is_number.cache_clear()  # cells of other logs, which may be long
     opened = map_collecting_errors(lambda one: _opened(one, options), files)
     texts = [one for one in opened if isinstance(one, Segment)]
+    if options.sheet is not None and not options.shared and not any(text.delimiter for text in texts):
+        found = format_value(options.sheet)
+        raise OptionError(Finding(parameter="sheet", found=found, allowed="with a workbook"))
     markers = map_collecting_errors(refuse_conflict, texts)
     titled = [
         (log_stem(file) if isinstance(file, Path) else file.name, one)
@@ -129,6 +133,8 @@ def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTa
         return one
     if (typed := read_typed(one, options)) is not None:
         return typed
+    if (sheet := read_workbook(one, options)) is not None:
+        return sheet
     text = open_text(one, any_suffix=options.source is not None)
     program = read_program(text, options)
     if program is None:
@@ -147,6 +153,8 @@ def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
     """Yield the encoding of a text, and how its file was read."""
     for text in texts:
         yield from text.inferences
+        if text.delimiter:
+            continue
         mark = "byte order mark" if text.start else "its bytes"
         utf_8 = (Hint("", effect="save the file as UTF-8"),)
         yield Inference("encoding", text.encoding, mark, hints=utf_8)
@@ -156,8 +164,8 @@ def _layout(one: Segment | MemoryTable, options: ReadOptions, sniff_plain: Sniff
     """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
     if isinstance(one, MemoryTable):
         return layout_of(one)
-    given = options.delimiter, options.decimal
-    found = None if options.delimiter else sniff_labels(one)
+    given = one.delimiter or options.delimiter, options.decimal
+    found = None if given[0] else sniff_labels(one)
     return found or sniff_arrays(one, *given) or with_names(sniff_plain(one, *given))
 
 

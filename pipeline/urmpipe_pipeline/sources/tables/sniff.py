@@ -193,7 +193,7 @@ def sniff(
         first_line=body[first].number,
         offset=body[first].offset,
         sample=tuple(tuple(row) for row in rows[first:]),
-        inferences=(*_style_inferences(style, delimiter, decimal, told), said),
+        inferences=(*_style_inferences(style, delimiter, decimal, told)[bool(segment.delimiter) :], said),
     )
 
 
@@ -309,10 +309,15 @@ def _numeric_columns(rows: Sequence[Row], width: int, decimal: str) -> list[int]
 
 
 def _is_data(rows: Sequence[Row], i: int, numeric: Sequence[int], decimal: str) -> bool:
-    """Return whether row i is data: at least half of it, where numbers belong, are numbers."""
+    """Return whether row i is data: at least half of it, where numbers belong, are numbers.
+
+    Of a row that is mostly empty, such as Rate,500,,,,, above a header, all must be.
+    """
     cells = [rows[i][column] for column in numeric if column < len(rows[i])]
     cells = [cell for cell in cells if not is_missing(cell)]
     numbers = [cell for cell in cells if is_number(cell, decimal)]
+    if 2 * len(cells) < len(numeric) and len(numbers) < len(cells):
+        return False
     return bool(numbers) and 2 * len(numbers) >= len(cells) and not _is_numbered_header(rows, i, numbers)
 
 

@@ -168,6 +168,20 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
     return replace(segment, head=_head(segment))
 
 
+def text_segment(path: Path, text: str, delimiter: str, inferences: tuple[Inference, ...]) -> Segment:
+    """Return the content of a file that is no text as one segment: text that its reader wrote.
+
+    Args:
+        path: The file.
+        text: Its content as lines.
+        delimiter: Sign between the cells of a line.
+        inferences: What was found out about the file.
+    """
+    data = text.encode("utf-8", "surrogatepass")
+    segment = Segment(path, "utf-8", 0, len(data), 1, "", data, delimiter, inferences)
+    return replace(segment, head=_head(segment))
+
+
 def refuse_long_lines(segment: Segment) -> None:
     """Raise a `LogError` if a line is so long that it is none of a table.
 
