@@ -90,8 +90,8 @@ def open_tables(
     opened = map_collecting_errors(lambda one: _opened(one, options), files)
     texts = [one for one in opened if isinstance(one, Segment)]
     if options.sheet is not None and not options.shared and not any(text.delimiter for text in texts):
-        found = format_value(options.sheet)
-        raise OptionError(Finding(parameter="sheet", found=found, allowed="with a workbook"))
+        sheet = format_value(options.sheet)
+        raise OptionError(Finding(parameter="sheet", found=sheet, allowed="with a workbook"))
     markers = map_collecting_errors(refuse_conflict, texts)
     titled = [
         (log_stem(file) if isinstance(file, Path) else file.name, one)
