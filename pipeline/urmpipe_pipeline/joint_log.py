@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -147,6 +147,11 @@ class LogWarning(Message):
         return ": ".join(filter(None, (self.about, row, self.column)))
 
 
+def number_rows(warnings: Iterable[LogWarning], file_row: Callable[[int], int]) -> tuple[LogWarning, ...]:
+    """Return warnings about rows of a log, from 1, with the data rows of the file."""
+    return tuple(w if w.row is None else replace(w, row=file_row(w.row)) for w in warnings)
+
+
 @dataclass(frozen=True, slots=True)
 class LogColumn:
     """A column of the file that was used.
@@ -193,7 +198,7 @@ class JointLog(Displayable):
         clock_start_ns: Clock of the file at the first row in integer [ns].
         joints: Names of the joint columns, in the order of the robot.
         q: Joint values in [rad] or [m], shape (n, joints); NaN where a sample is missing.
-        first_line: Line of row 1 in the file (row r of a plain table is line first_line + r - 1).
+        first_line: Line of data row 1 of the file (row r of a plain table is line first_line + r - 1).
         qd: Recorded joint velocities in [rad/s] or [m/s], shape (n, joints).
         qdd: Recorded joint accelerations in [rad/s2] or [m/s2], shape (n, joints).
         tcp_position: Recorded tool centre point in [m], shape (n, 3).
@@ -206,6 +211,7 @@ class JointLog(Displayable):
         timed: Whether the rows have times; else they are static poses.
         externally_measured: Whether an external device measured the tool centre point, in a frame at an
             unknown pose.
+        file_rows: Data row of the file of each row, from 1, shape (n,); None if no earlier row was left out.
     """
 
     name: str
@@ -227,6 +233,11 @@ class JointLog(Displayable):
     warnings: tuple[LogWarning, ...] = ()
     timed: bool = True
     externally_measured: bool = False
+    file_rows: IntArray | None = None
+
+    def file_row(self, row: int) -> int:
+        """Return the data row of the file of a row, both from 1."""
+        return row if self.file_rows is None else int(self.file_rows[row - 1])
 
     @property
     def t(self) -> FloatArray:

@@ -289,8 +289,10 @@ class Deviation(Displayable):
         if (
             self.run.rows is None and self.run.resampled
         ):  # of an old recording, judged on the grid: the nearest
-            return int(np.argmin(np.abs(self.run.log.t_ns - self.t_ns[self.peak(statistics)]))) + 1
-        return statistics.sample_max + 1
+            row = int(np.argmin(np.abs(self.run.log.t_ns - self.t_ns[self.peak(statistics)]))) + 1
+        else:
+            row = statistics.sample_max + 1
+        return self.run.log.file_row(row)
 
     @property
     def worst_statistics(self) -> Statistics:

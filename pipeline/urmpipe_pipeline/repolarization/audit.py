@@ -351,7 +351,8 @@ def _unexplained_warning(log: JointLog, steps: _Steps, periods: FloatArray) -> I
     worst = steps.largest
     message = f"{len(steps.rows)} steps of {names} by more than {quarter} are not wraps and are kept"
     message += f"; the largest, of {log.joints[steps.joints[worst]]} by"
-    message += f" {np.degrees(abs(steps.sizes[worst])):.4g} deg, is to row {steps.rows[worst] + 1}"
+    to_row = log.file_row(int(steps.rows[worst]) + 1)
+    message += f" {np.degrees(abs(steps.sizes[worst])):.4g} deg, is to row {to_row}"
     yield LogWarning("large-step", message, row + 1, hints=_LIST_ALL)
 
 
@@ -367,7 +368,7 @@ def _in_between_warning(log: JointLog, steps: _Steps) -> Iterator[LogWarning]:
         return
     message = f"{len(steps.rows)} samples of {names} lie inside wraps, as after linear resampling: up to"
     message += f" {distance} off the line between their neighbours"
-    message += f" ({log.joints[steps.joints[worst]]} in row {steps.rows[worst] + 1})"
+    message += f" ({log.joints[steps.joints[worst]]} in row {log.file_row(int(steps.rows[worst]) + 1)})"
     hints = (Hint("repair", True, "moves them onto this line"), *_LIST_ALL)
     yield LogWarning("in-between", message, row, hints=hints)
 
@@ -386,5 +387,5 @@ def _ambiguous_warning(log: JointLog, steps: _Steps, speeds: FloatArray) -> Iter
         yield LogWarning("ambiguous-turn", message, row)
         return
     message = f"in {len(gaps)} gaps without values {turned}; the longest gap, {durations[longest]:.6g} s,"
-    message += f" ends at row {gaps[longest, 0] + 1}; the nearest turns are assumed"
+    message += f" ends at row {log.file_row(int(gaps[longest, 0]) + 1)}; the nearest turns are assumed"
     yield LogWarning("ambiguous-turn", message, row, hints=_LIST_ALL)

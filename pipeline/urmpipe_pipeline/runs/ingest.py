@@ -20,7 +20,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, LogError, OptionError, check_choice
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.joint_log import JointLog, LogWarning, number_rows
 from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING, mesh_warnings
 from urmpipe_pipeline.provenance import Provenance, build_provenance
 from urmpipe_pipeline.repolarization.audit import AuditResult, audit_log, is_revolute
@@ -148,7 +148,6 @@ def log_to_run(
     tcp, robot_warnings = tcp_motion(robot, q, qd, qdd)
     has_clock = any(column.role == "time" for column in log.columns)
     warnings = [
-        *log.warnings,
         *recorded_tcp_warnings(robot, log),
         *audit.warnings,
         *_plausibility_warnings(log, robot, audit, grid.tsp),
@@ -161,11 +160,12 @@ def log_to_run(
     run = Run(
         name=name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd, tcp=tcp,
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
-        audit=audit.entries, warnings=tuple(warnings), provenance=provenance,
+        audit=audit.entries, warnings=(*log.warnings, *number_rows(warnings, log.file_row)),
+        provenance=provenance,
         rows=None if grid.is_rows else RowJoints(grid.source_ns, audit.q),
         tau=compute_torques(robot, q, qd, qdd), derivative=source,
     )  # fmt: skip
-    return replace(run, warnings=(*run.warnings, *torque_warnings(run)))
+    return replace(run, warnings=(*run.warnings, *number_rows(torque_warnings(run), log.file_row)))
 
 
 def _poses_to_run(
@@ -175,7 +175,8 @@ def _poses_to_run(
     missing = np.full_like(log.q, np.nan)
     tcp, robot_warnings = tcp_motion(robot, log.q, missing, missing)
     limits = [] if robot is None or not log.joints else limit_warnings(log, log.q, robot)
-    warnings = (*log.warnings, *warnings, *recorded_tcp_warnings(robot, log), *limits, *robot_warnings)
+    warnings = (*warnings, *recorded_tcp_warnings(robot, log), *limits, *robot_warnings)
+    warnings = (*log.warnings, *number_rows(warnings, log.file_row))
     return Run(
         name=log.name, log=log, robot=robot, tsp=0.0, t_ns=log.t_ns, q=log.q, qd=missing, qdd=missing,
         tcp=tcp, tcp_recorded=log.tcp_position, audit=(), provenance=provenance, warnings=warnings,
@@ -232,11 +233,12 @@ def with_robot(run: Run, robot: Chain | None) -> Run:
     tcp, robot_warnings = tcp_motion(robot, run.q, run.qd, run.qdd)
     _check_joint_kinds(run, robot)
     warnings = [warning for warning in run.warnings if warning.kind not in ROBOT_WARNINGS]
-    warnings += [*recorded_tcp_warnings(robot, run.log), *_limit_warnings(run, robot), *robot_warnings]
+    own_warnings = (*recorded_tcp_warnings(robot, run.log), *_limit_warnings(run, robot), *robot_warnings)
+    warnings += number_rows(own_warnings, run.log.file_row)
     provenance = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
     tau = compute_torques(robot, run.q, run.qd, run.qdd) if run.timed else None
     run = replace(run, robot=robot, tcp=tcp, tau=tau, warnings=tuple(warnings), provenance=provenance)
-    return replace(run, warnings=(*run.warnings, *torque_warnings(run)))
+    return replace(run, warnings=(*run.warnings, *number_rows(torque_warnings(run), run.log.file_row)))
 
 
 def _check_joint_kinds(run: Run, robot: Chain) -> None:

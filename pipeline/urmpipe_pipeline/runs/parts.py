@@ -145,7 +145,10 @@ def log_events(run: Run) -> Iterator[Event]:
         level: Level = "info" if entry.kind in ("wrap", "repaired") else "warning"
         yield Event(round(entry.t * 1e9), f"{entry.joint} {_format_entry(entry)}", level)
     for warning in run.warnings:
-        row = int(np.clip((warning.row or 1) - 1, 0, run.log.rows - 1))
+        row = (warning.row or 1) - 1
+        if run.log.file_rows is not None:
+            row = int(np.searchsorted(run.log.file_rows, row + 1))
+        row = int(np.clip(row, 0, run.log.rows - 1))
         yield Event(int(run.log.t_ns[row]) if run.timed else None, warning, "warning")
 
 

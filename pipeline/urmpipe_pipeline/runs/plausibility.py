@@ -11,6 +11,7 @@ the file or an uneven clock explains the values.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,7 @@ class JointMotion(NamedTuple):
         inner_max_step: Largest step of each joint between rows other than the first and the last, in [rad] or
             [m], shape (joints,); NaN if a value is missing.
         resolution: Resolution of the number format of each joint in [rad] or [m], shape (joints,).
+        file_row: Data row of the file of a row, both from 1.
     """
 
     names: tuple[str, ...]
@@ -61,6 +63,7 @@ class JointMotion(NamedTuple):
     period: float
     inner_max_step: FloatArray
     resolution: FloatArray
+    file_row: Callable[[int], int]
 
     @classmethod
     def of(cls, log: JointLog, q: FloatArray, revolute: BoolArray) -> JointMotion:
@@ -73,7 +76,7 @@ class JointMotion(NamedTuple):
         """
         inner = largest_steps(q[1:-1]) if len(q) > 3 else np.zeros(q.shape[1])
         units = tuple("rad" if turns else "m" for turns in revolute)
-        return cls(log.joints, units, q, log.t_ns, log.period, inner, format_resolution(log))
+        return cls(log.joints, units, q, log.t_ns, log.period, inner, format_resolution(log), log.file_row)
 
     @property
     def ends(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -265,7 +268,7 @@ def _limit_warnings(motion: JointMotion, robot: Chain) -> list[LogWarning]:
             worst = int(rows[np.argmax(beyond[rows])])
             limits = f"its limits of {lower[j]:.6g} to {upper[j]:.6g} {motion.units[j]}"
             message = f"{motion.names[j]} is beyond {limits} in {len(rows)} of {len(q)} rows"
-            message += f", at worst {q[worst, j]:.6g} in row {worst + 1}"
+            message += f", at worst {q[worst, j]:.6g} in row {motion.file_row(worst + 1)}"
             excesses.append(_Excess(motion.names[j], rows, float(beyond[worst]), message))
     return (
         [LogWarning(JOINT_LIMIT, *_join_excesses(excesses, "row", "check robot, unit, sign and zero"))]
@@ -316,7 +319,8 @@ def speed_warning(
             unit = f"{motion.units[j]}/s"
             message = f"{motion.names[j]} moves faster than {limits[j]:.4g} {unit}"
             message += f" in {len(rows)} of {len(steps)} steps"
-            message += f", at worst at {speeds.max():.4g} {unit} to row {rows[np.argmax(speeds)] + 2}"
+            worst = motion.file_row(int(rows[np.argmax(speeds)]) + 2)
+            message += f", at worst at {speeds.max():.4g} {unit} to row {worst}"
             excesses.append(_Excess(motion.names[j], rows + 1, float(speeds.max() / limits[j]), message))
     return (
         [LogWarning(SPEED_LIMIT, *_join_excesses(excesses, "step", "check robot, unit and clock"))]

@@ -372,7 +372,7 @@ def _slice_log(log: JointLog, rows: slice, name: str) -> JointLog:
     start_ns = int(log.t_ns[rows.start])
     arrays: dict[str, Any] = {
         key: None if (values := getattr(log, key)) is None else values[rows]
-        for key in ("q", "qd", "qdd", "tcp_position", "tcp_rotation")
+        for key in ("q", "qd", "qdd", "tcp_position", "tcp_rotation", "file_rows")
     }
     return replace(
         log, name=name, t_ns=log.t_ns[rows] - start_ns, clock_start_ns=log.clock_start_ns + start_ns,

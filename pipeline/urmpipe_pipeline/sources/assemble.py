@@ -21,6 +21,7 @@ from urmpipe_pipeline.joint_log import (
     LogColumn,
     LogWarning,
     SourceFile,
+    number_rows,
 )
 from urmpipe_pipeline.sources.cells.cell import significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
@@ -93,7 +94,7 @@ def assemble(
         OptionError: If an option does not fit the log.
     """
     roles, layout = content.roles, plan.tables.layouts[plan.main]
-    clock = plan.clock.as_label if content.still else plan.clock
+    numbers, clock = content.numbers[plan.main], plan.clock.as_label if content.still else plan.clock
     t_ns, start, timed, noticed = _times(content, plan, options)
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, options)
@@ -132,13 +133,14 @@ def assemble(
             *content.warnings,
             *clock.warnings,
             *noticed,
-            *roles.warnings,
-            *measured.warnings,
-            *missing_samples(measured.named),
-            *gaps(t_ns),
+            *number_rows(
+                (*roles.warnings, *measured.warnings, *missing_samples(measured.named)), numbers.file_row
+            ),
+            *gaps(t_ns, numbers.file_row),
         ),
         timed=not content.still,
         externally_measured=roles.measured,
+        file_rows=None if len(t_ns) == numbers.file_row(len(t_ns)) else numbers.rows,
     )
 
 

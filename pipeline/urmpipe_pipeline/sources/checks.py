@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +25,7 @@ FAR_BACK = 10.0
 """Median periods: a clock that falls back by more, to about its first time, begins again."""
 
 SKIPPED = "skipped-row"
-"""The kind of the warnings about rows that were left out; their row is the one read in their place."""
+"""The kind of the warnings about rows that were left out."""
 
 MOST_SKIPPED = 0.01
 """Share of the rows that may be left out because they cannot be read."""
@@ -61,12 +61,8 @@ def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
     read = replace(numbers.at(rows), findings=lasting, wrong=len(lasting))
     shown = sorted(numbers.unread.items())[:SHOWN_FINDINGS]
     warnings = [
-        LogWarning(
-            SKIPPED,
-            f"data row {numbers.file_row(row + 1)} of the file is left out: {'; '.join(map(str, faults))}",
-            row - k + 1,
-        )
-        for k, (row, faults) in enumerate(shown)
+        LogWarning(SKIPPED, f"data row {row} of the file is left out: {'; '.join(map(str, faults))}", row)
+        for row, faults in ((numbers.file_row(row + 1), faults) for row, faults in shown)
     ]
     if len(numbers.unread) > len(shown):
         more = len(numbers.unread) - len(shown)
@@ -288,8 +284,13 @@ def _unusual(values: FloatArray) -> list[int]:
         return np.flatnonzero(~np.isfinite(values.sum(axis=0))).tolist()
 
 
-def gaps(t_ns: IntArray) -> list[LogWarning]:
-    """Return a warning with each gap between two rows at times in [ns], shape (n,)."""
+def gaps(t_ns: IntArray, file_row: Callable[[int], int]) -> list[LogWarning]:
+    """Return a warning with each gap between two rows at times in [ns], shape (n,).
+
+    Args:
+        t_ns: The times.
+        file_row: The data row of the file of a row, both from 1.
+    """
     places = np.flatnonzero(has_gap_after(t_ns)).tolist()
     if not places:
         return []
@@ -298,11 +299,12 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
     def passed(k: int) -> str:
         return f"{steps[k] / 1e9:.6g} s"
 
-    found = [f"{passed(k)} before row {k + 2}" for k in places[1:SHOWN_GAPS]]
+    found = [f"{passed(k)} before row {file_row(k + 2)}" for k in places[1:SHOWN_GAPS]]
     if len(places) > SHOWN_GAPS:
         longest = max(places, key=lambda k: steps[k])
         more = f"{len(places) - SHOWN_GAPS} more"
-        found.append(f"{more}, the longest of all of {passed(longest)} before row {longest + 2}")
+        found.append(f"{more}, the longest of all of {passed(longest)} before row {file_row(longest + 2)}")
     said = ", ".join([f"{passed(places[0])} pass before this row", *found])
     counted, period = f"{len(places)} gaps: " if found else "", float(np.median(steps))
-    return [LogWarning("gap", f"{counted}{said}; the median period is {period / 1e9:.6g} s", places[0] + 2)]
+    message = f"{counted}{said}; the median period is {period / 1e9:.6g} s"
+    return [LogWarning("gap", message, file_row(places[0] + 2))]

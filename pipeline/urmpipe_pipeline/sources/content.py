@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, map_collecting_errors
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import Inference, LogWarning, number_rows
 from urmpipe_pipeline.sources.checks import (
     MOST_SKIPPED,
     find_errors,
@@ -119,7 +119,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
         raise LogError(*findings, *([too_many] if too_many else []))
-    warned = (*warnings, *padding, *numbers.warnings)
+    warned = (*warnings, *padding, *number_rows(numbers.warnings, numbers.file_row))
     return replace(numbers, inferences=(*inferences, *numbers.inferences), warnings=warned)
 
 

@@ -21,7 +21,7 @@ from urmpipe_pipeline.sources.columns.long_form import refuse_long_form
 from urmpipe_pipeline.sources.columns.own_log import own_joints, written_roles
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
-from urmpipe_pipeline.sources.columns.sides import columns_of_side, of_topic, without_other_side
+from urmpipe_pipeline.sources.columns.sides import columns_of_side, columns_of_topic, without_other_side
 from urmpipe_pipeline.sources.columns.simulated import joints_of_blocks
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
@@ -94,9 +94,10 @@ def make_plan(
     units = given_units(columns, options)
     beside = columns_named(columns, tables.layouts, further or {})
     columns = tuple(column for column in columns if column not in beside.values())
-    chosen = columns
-    if options.topic is not None and not all("topic" in layout.applied for layout in tables.layouts):
-        chosen = tuple(of_topic(columns, options.topic, tables.layouts[0].file))
+    chosen, applied = columns, {name for layout in tables.layouts for name in layout.applied}
+    if options.topic is not None and "topic" not in applied:
+        topic = tuple(columns_of_topic(columns, options, tables.layouts[0].file))
+        chosen, applied = topic or columns, applied | ({"topic"} if topic else set())
     has_time = any(pattern.search(column.key) for column in chosen for pattern in vocabulary().time)
     own_side = without_other_side(chosen if has_time else columns, options)
     apart = apart if options.time else time_file(tables, own_side)
@@ -120,8 +121,13 @@ def make_plan(
     for table in {column.table for column in roles.joints}:
         own = [column for column in rest if column.table == table]
         refuse_long_form(roles.joints, own, clocks[table].columns, tables.layouts[table])
+    unused = [name for name in ("topic", "episode") if getattr(options, name) and name not in applied]
+    warnings = [
+        LogWarning(f"{name}-not-used", "no effect: not in this log", parameter=name) for name in unused
+    ]
     if apart is None:
-        roles = replace(roles, warnings=(*roles.warnings, *_unused_files(tables, roles)))
+        warnings += _unused_files(tables, roles)
+    roles = replace(roles, warnings=(*roles.warnings, *warnings))
     if options.poses:
         return Plan(tables, clocks, roles, units, poses=True)
     told = options.period is not None or options.time not in (None, "none") or apart is not None

@@ -238,8 +238,8 @@ def test_rows_that_cannot_be_read_are_left_out_if_asked_for(read: Read, wrong: W
     skipped = [(w.row, w.message) for w in log.warnings if w.kind == "skipped-row"]
     assert skipped == [
         (101, "data row 101 of the file is left out: found 2 cells, allowed: 3"),
-        (500, f"data row 501 of the file is left out: {said[1].partition(', ')[2]}"),
-        (500, "data row 502 of the file is left out: found 1 cell ('(paused)'), allowed: 3"),
+        (501, f"data row 501 of the file is left out: {said[1].partition(', ')[2]}"),
+        (502, "data row 502 of the file is left out: found 1 cell ('(paused)'), allowed: 3"),
     ]
 
 

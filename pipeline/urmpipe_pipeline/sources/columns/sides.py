@@ -141,22 +141,23 @@ def _no_column(columns: Sequence[Column], wanted: str, parameter: str, file: str
     )
 
 
-def of_topic(columns: Sequence[Column], topic: str, file: str) -> list[Column]:
-    """Return the columns whose names begin with a topic.
+def columns_of_topic(columns: Sequence[Column], options: ReadOptions, file: str) -> list[Column]:
+    """Return the columns whose names begin with the topic that the user chose.
 
     Args:
         columns: All columns of a table.
-        topic: How the names begin, with or without a slash before.
+        options: `topic`, with or without a slash before, and whether it may be that of another log.
         file: The file, for errors.
 
     Raises:
         OptionError: If no name does: with the first part of each name.
     """
+    topic = options.topic or ""
     start = topic.strip("/")
     is_whole = re.compile(rf"/?{re.escape(start)}(?!\w)")
     chosen = [column for column in columns if is_whole.match(column.header)]
     chosen = chosen or [column for column in columns if column.header.lstrip("/").startswith(start)]
-    if not chosen:
+    if not chosen and not options.shared:
         parts = (re.match(r"(/?\w+)[/.]", column.header) for column in columns)
         known = ", ".join(dict.fromkeys(part[1] for part in parts if part)) or "the beginning of a name"
         raise OptionError(Finding("", file, parameter="topic", found=format_value(topic), allowed=known))

@@ -119,7 +119,7 @@ def without_padding(numbers: Numbers, whole: Callable[[], Numbers]) -> tuple[Num
         numbers = numbers.at(slice(int(kept)))
     if starts > 1:
         message = f"the first {starts} rows hold {used[0, 0]:g} in every column, and then the values jump"
-        warnings.append(LogWarning(START, f"{message}: had the controller not started?", 1))
+        warnings.append(LogWarning(START, f"{message}: had the controller not started?", numbers.file_row(1)))
     return numbers, warnings
 
 

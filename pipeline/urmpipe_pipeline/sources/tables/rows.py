@@ -49,7 +49,7 @@ def choose_rows(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]
             _ask_episode(layout)
         return list(layouts)
     chosen = [_choose_episode(layout, options.episode) for layout in layouts]
-    if all(layout is None for layout in chosen):
+    if all(layout is None for layout in chosen) and not options.shared:
         allowed = f"a column {', '.join(vocabulary().episode)}, or COLUMN=VALUE"
         raise _unknown_episode(layouts[0], options.episode, allowed)
     return [episode or layout for episode, layout in zip(chosen, layouts, strict=True)]
@@ -155,6 +155,7 @@ def _choose_episode(layout: Layout, episode: str) -> Layout | None:
         episodes = _find_episodes(layout, column)
         if (rows := episodes.get(_plain(episode))) is not None:
             why = f"{layout.names[column]} is {episode}, given as an option: the other rows left out"
+            layout = replace(layout, applied=(*layout.applied, "episode"))
             return with_rows(layout, rows, _rows_read(len(rows), sum(map(len, episodes.values())), why))
     if columns:
         raise _unknown_episode(
