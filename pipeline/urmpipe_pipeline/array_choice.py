@@ -14,7 +14,7 @@ quickly.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 Name = tuple[str, ...]
@@ -70,11 +70,14 @@ def choose_arrays(
     group: Name = ()
     applied: tuple[str, ...] = ()
     if groups:
-        by_number = {_number(name): name for name in groups}
-        chosen = episode if episode in groups else by_number.get(episode or "")
+        chosen = pick_episode(groups, episode)
         chosen = next(iter(groups)) if episode is None and len(groups) == 1 else chosen
         if chosen is None:
-            arrays = {name: length_of(shapes, inside, by_rows) for name, inside in groups.items()}
+            inside: dict[Name, dict[Name, tuple[int, ...]]] = {name: {} for name in groups.values()}
+            depth = len(next(iter(inside)))
+            for name, shape in shapes.items():
+                inside.get(name[:depth], {})[name] = shape
+            arrays = {name: length_of(inside[path], path, by_rows) for name, path in groups.items()}
             rows_of = ((name, max(lengths.values(), default=0)) for name, lengths in arrays.items())
             return Question("episode", episode, tuple((name, f"its {rows} rows") for name, rows in rows_of))
         group, applied = groups[chosen], ("episode",) if episode else ()
@@ -114,6 +117,12 @@ def find_episodes(shapes: Shapes) -> dict[str, Name]:
                 name: (*outer, name) for name in sorted(members, key=lambda name: (int(_number(name)), name))
             }
     return {}
+
+
+def pick_episode(names: Iterable[str], episode: str | None) -> str | None:
+    """Return the name of an episode that is given by its name or number; None if there is no such episode."""
+    by_number = {_number(name): name for name in names}
+    return episode if episode in by_number.values() else by_number.get(episode or "")
 
 
 def _number(name: str) -> str:

@@ -16,11 +16,20 @@ from typing import Any, NamedTuple, TypeAlias
 import h5py
 import numpy as np
 
-from urmpipe_pipeline.array_choice import OPAQUE, Choice, Name, Question, choose_arrays
+from urmpipe_pipeline.array_choice import (
+    OPAQUE,
+    Choice,
+    Name,
+    Question,
+    choose_arrays,
+    find_episodes,
+    pick_episode,
+)
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 
 MAX_ENTRIES = 500  # columns of a dataset of a log; packed images have more
+SHOWN = 9  # episodes of which a question states the rows
 DEEPEST = 16  # structs in structs
 
 
@@ -165,10 +174,18 @@ _MATLAB: dict[str, Callable[[Any, int], Any]] = {
 
 def _read_datasets(file: Any, most: int, episode: str | None, topic: str | None) -> Contents:
     """Return the columns of datasets: those of one table."""
-    datasets = {name: item for name, item in _walk(file) if isinstance(item, h5py.Dataset)}
-    datasets = {n: item for n, item in datasets.items() if not (_describes(item) or _repeats(n, datasets))}
+    paths = _leaves(file)
+    unopened = _other_episodes(paths, episode)
+    opened = {name: file["/".join(name)] for name in paths if name not in unopened}
+    frames = {name[:-1]: _is_frame(item.parent) for name, item in opened.items()}
+    datasets = {
+        name: item
+        for name, item in opened.items()
+        if isinstance(item, h5py.Dataset)
+        and not (_repeats(name, opened) or _describes(item, frame=frames[name[:-1]]))
+    }
     columns = {name: item for name, item in datasets.items() if _is_column(item)}
-    shapes = {name: item.shape for name, item in columns.items()}
+    shapes = {name: item.shape for name, item in columns.items()} | dict.fromkeys(unopened, (0,))
     choice = choose_arrays(shapes, episode, topic, separator="/", by_rows=True)
     group, rows, names = choice[:3] if isinstance(choice, Choice) else ((), 1, ())
     used = [name for name in names if columns[name].size <= MAX_ENTRIES * rows]
@@ -196,9 +213,32 @@ def _is_column(dataset: Any) -> bool:
     return dataset.dtype.kind in "biuf" and (axes == 1 or (axes == 2 and _is_narrow(dataset)))
 
 
-def _describes(dataset: Any) -> bool:
+def _leaves(file: Any) -> list[Name]:
+    """Return the paths that contain no others, of datasets or empty groups; links are not followed."""
+    paths: list[str] = []
+    file.visit(paths.append)
+    names = [tuple(path.split("/")) for path in paths]
+    groups = {name[:-1] for name in names}
+    return [name for name in names if name not in groups]
+
+
+def _other_episodes(names: list[Name], episode: str | None) -> set[Name]:
+    """Return the paths that need not be opened: of episodes that are not read, nor shown in the question."""
+    groups = find_episodes(dict.fromkeys(names, (0,)))
+    wanted = pick_episode(groups, episode)
+    needed = [wanted] if wanted else list(groups)[:SHOWN]
+    left_out = {groups[name] for name in groups if name not in needed}
+    depth = len(next(iter(left_out), ()))
+    return {name for name in names if left_out and name[:depth] in left_out}
+
+
+def _is_frame(group: Any) -> bool:
+    return bool(group.attrs.get("pandas_type") == b"frame")
+
+
+def _describes(dataset: Any, *, frame: bool) -> bool:
     """Return whether a dataset of pandas or PyTables is no column: names of columns, a count, an index."""
-    if dataset.parent.attrs.get("pandas_type") != b"frame":
+    if not frame:
         return "/_i_" in dataset.name
     counts = dataset.attrs.get("kind") == b"integer" and dataset.attrs.get("name") == b"N."
     return not _own(dataset).endswith("_values") and (_own(dataset) != "axis1" or counts)
@@ -241,7 +281,7 @@ def _iter_columns(name: Name, dataset: Any, rows: int) -> Iterator[tuple[Name, s
         return
     values = values.reshape(rows, -1) if values.shape[0] in (1, rows) else values.T
     units = next((texts for key in ("unit", "units") if (texts := _texts_of(attributes.get(key)))), [])
-    if dataset.parent.attrs.get("pandas_type") == b"frame":
+    if _is_frame(dataset.parent):
         kind = bytes(attributes.get("kind", b"")).decode()
         if kind:  # the index
             label = bytes(attributes["name"]).decode().replace("N.", "time")
