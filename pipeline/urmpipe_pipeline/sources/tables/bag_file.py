@@ -352,7 +352,7 @@ def _query(file: Path, query: str) -> Iterator[tuple[Any, ...]]:
     try:
         with closing(sqlite3.connect(f"file:{quote(str(file))}?mode=ro&immutable=1", uri=True)) as database:
             yield from database.execute(query)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise _DamageError(f"cannot be read ({_reason(error)})") from error
 
 
@@ -383,6 +383,8 @@ def _sqlite_messages(file: Path) -> Iterator[Message]:
         "SELECT name, timestamp, data FROM messages JOIN topics ON topics.id = topic_id ORDER BY messages.id"
     )
     for name, when, data in _query(file, query):
+        if not (isinstance(when, int) and isinstance(data, bytes)):
+            raise _DamageError("holds a damaged row")
         yield Message(topics[name], when, data)
 
 

@@ -11,8 +11,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import pyarrow as pa
 
@@ -54,6 +55,9 @@ _NO_VALUES = frozenset(("header", "stamp", "timestamp", "layout", "time_from_sta
 _POSITION = re.compile(r"(.*?\.)?positions?\.(?P<name>.*)")  # of a joint, in any message
 _STAMPS = ("time_from_start", "stamp", "timestamp")
 _FRACTIONS = ("nanosec", "nsec", "nsecs")
+
+
+_Values: TypeAlias = tuple[Sequence[str], Sequence[Any]]  # names of numbers, and the numbers
 
 
 class _Row(NamedTuple):
@@ -222,16 +226,19 @@ def _nanoseconds(value: Any) -> int | None:
 def _stamp(fields: Mapping[str, Any]) -> int | None:
     """Return the time that a message states in [ns]; None without one."""
     header = fields.get("header")
-    inner = {} if header is None or isinstance(header, str) else _fields(header)
-    times = (_nanoseconds(place.get(name)) for place in (inner, fields) for name in _STAMPS)
-    return next((time for time in times if time is not None), None)
+    stamp = getattr(header, "stamp", None)
+    if stamp is None:
+        inner = header if isinstance(header, Mapping) else {}
+        places = (place[name] for place in (inner, fields) for name in _STAMPS if name in place)
+        stamp = next(places, None)
+    return _nanoseconds(stamp)
 
 
 def _names_in(fields: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names that a message gives the values of its arrays."""
     for field in _NAMES:
         names = fields.get(field)
-        if isinstance(names, list) and names and all(isinstance(name, str) for name in names):
+        if isinstance(names, list) and names and isinstance(names[0], str):
             return tuple(names)
     joints = fields.get("joints")
     if isinstance(joints, list) and joints and not isinstance(joints[0], (str, int, float)):
@@ -323,44 +330,47 @@ def _is_among(joint: str, names: Collection[str]) -> bool:
 # Columns
 
 
-def _values(
-    message: Any, names: Sequence[str], large: set[str], before: str = ""
-) -> Iterator[tuple[str, Any]]:
-    """Yield the numbers of a message, called by their path."""
+def _values(message: Any, names: tuple[str, ...], large: set[str], before: str = "") -> Iterator[_Values]:
+    """Yield the numbers of a message with their names, which are paths."""
     for name, value in _fields(message).items():
         if name not in _NO_VALUES:
             yield from _value(before + name, value, names, large)
 
 
-def _value(path: str, value: Any, names: Sequence[str], large: set[str]) -> Iterator[tuple[str, Any]]:
+def _value(path: str, value: Any, names: tuple[str, ...], large: set[str]) -> Iterator[_Values]:
     if isinstance(value, (int, float)):
-        yield path, int(value) if isinstance(value, bool) else value
-    elif value is None or isinstance(value, (str, bytes)) or _nanoseconds(value) is not None:
-        return
+        yield (path,), (int(value) if isinstance(value, bool) else value,)
     elif isinstance(value, list) or hasattr(value, "tolist"):
         values: Any = value if isinstance(value, list) else value.tolist()
         if not isinstance(values, list):
-            yield path, values
+            yield (path,), (values,)
         elif len(values) > MAX_VALUES:
             large.add(f"{path} ({len(values)} values)")
-        elif not values or not isinstance(values[0], (int, float)):
+        elif values and isinstance(values[0], (int, float)):
+            yield _labels(path, names, len(values)), values
+        elif values and not isinstance(values[0], str):
             for k, item in enumerate(values):
                 yield from _item(path, k, item, names, large)
-        elif len(values) == len(names):
-            yield from ((f"{path}.{name}", number) for name, number in zip(names, values, strict=True))
-        else:
-            yield from ((f"{path}[{k}]", number) for k, number in enumerate(values))
-    else:
+    elif value is not None and not isinstance(value, (str, bytes)) and _nanoseconds(value) is None:
         yield from _values(value, names, large, f"{path}.")
 
 
-def _item(path: str, k: int, item: Any, names: Sequence[str], large: set[str]) -> Iterator[tuple[str, Any]]:
+@lru_cache
+def _labels(path: str, names: tuple[str, ...], count: int) -> tuple[str, ...]:
+    """Return the names of the numbers of an array: position.NAME for one name each, else data[0]."""
+    if count == len(names):
+        return tuple(f"{path}.{name}" for name in names)
+    return tuple(f"{path}[{k}]" for k in range(count))
+
+
+def _item(path: str, k: int, item: Any, names: tuple[str, ...], large: set[str]) -> Iterator[_Values]:
     """Yield the numbers of an element of a list: by its name if it has one, position.NAME, else by number."""
     if item is None or isinstance(item, (str, bytes)):
         return
     fields = {} if isinstance(item, (int, float, list)) or hasattr(item, "tolist") else _fields(item)
     if isinstance(fields.get("name"), str):
-        yield from ((f"{field}.{fields['name']}", number) for field, number in _values(item, names, large))
+        for labels, values in _values(item, names, large):
+            yield tuple(f"{label}.{fields['name']}" for label in labels), values
     else:
         yield from _value(f"{path}[{k}]", item, names, large)
 
@@ -369,34 +379,37 @@ def _build_table(
     rows: Sequence[_Row], topic: str, file: str, clock: str
 ) -> tuple[pa.Table, list[Inference], list[LogWarning]]:
     """Return rows as a table, with inferences and warnings about its clock and its columns."""
-    large, columns = set[str](), dict[str, list[Any]]()
+    large = set[str]()
+    blocks = dict[tuple[str, ...], tuple[list[int], list[list[Any]]]]()  # rows with the same numbers
     for place, row in enumerate(rows):
-        count = 0
-        for name, value in _values(row.message, row.names, large):
-            column = columns.get(name)
-            if column is None:
-                refuse_wide(len(columns) + 1, file)
-                column = columns[name] = [None] * place
-            if len(column) > place:
-                message = f"message {place + 1} of {topic} has {name} twice, allowed: each name once"
-                raise LogError(Finding(message, file))
-            column.append(value)
-            count += 1
-        if count < len(columns):
-            for values in columns.values():
-                values.extend([None] * (place + 1 - len(values)))
+        labels, numbers = list[str](), list[Any]()
+        for more, values in _values(row.message, row.names, large):
+            labels += more
+            numbers += values
+        places, block = blocks.setdefault(tuple(labels), ([], []))
+        places.append(place)
+        block.append(numbers)
+    columns = dict[str, list[Any]]()
+    for names, (places, block) in blocks.items():
+        if twice := [name for name, count in Counter(names).items() if count > 1]:
+            message = f"message {places[0] + 1} of {topic} has {twice[0]} twice, allowed: each name once"
+            raise LogError(Finding(message, file))
+        refuse_wide(len({*columns, *names}), file)
+        for name, values in zip(names, zip(*block, strict=True), strict=True):
+            column = columns.setdefault(name, [None] * len(rows))
+            for place, value in zip(places, values, strict=True):
+                column[place] = value
     times, called, inferences, warnings = _clock(rows, topic, clock)
-    arrays = [pa.array(times, pa.int64()), *map(_array, columns.values())]
-    fields = [pa.field(called, pa.int64(), metadata={UNIT: b"ns"})]
-    joints = frozenset(name for row in rows for name in row.names)
+    arrays = [*map(_array, (times, *columns.values()))]
+    fields = [pa.field(called, arrays[0].type, metadata={UNIT: b"ns"})]
+    joints = {name for names in {row.names for row in rows} for name in names}
     for name, array in zip(columns, arrays[1:], strict=True):
         match = _POSITION.fullmatch(name)
         is_joint = match is not None and match["name"] in joints and "error" not in name.split(".")
         fields.append(pa.field(name, array.type, metadata={ROLE: JOINT} if is_joint else None))
     if large:
-        inferences.append(
-            Inference("values not read", ", ".join(sorted(large)), "arrays longer than a log is wide")
-        )
+        why = f"arrays of more than {MAX_VALUES} values"
+        inferences.append(Inference("values not read", ", ".join(sorted(large)), why))
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields)), inferences, warnings
 
 

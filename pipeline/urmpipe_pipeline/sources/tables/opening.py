@@ -121,6 +121,7 @@ def open_tables(
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
     said = Inference("source", name, why, hints=(Hint("source"),))
     foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
+    foreign = foreign and options.source != stated
     foreign = not graphs if options.source == COPPELIASIM else foreign
     said_of_all, whole = (*_encoding(texts[:1]), said), tuple(map(Whole, layouts))
     warnings = tuple(warning for table in tables for warning in table.warnings)
