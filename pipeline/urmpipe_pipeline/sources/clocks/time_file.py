@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.clocks.steps import runs_evenly
 from urmpipe_pipeline.sources.columns.columns import Column, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
+from urmpipe_pipeline.sources.tables.rows import count_rows, with_rows
 from urmpipe_pipeline.sources.tables.sniff import across
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import Unit, key, vocabulary
@@ -60,7 +61,9 @@ def with_time_file(tables: Tables, options: ReadOptions) -> tuple[Tables, int | 
         apart = open_tables([named[0]], plain)
     except LogError:
         apart = open_tables([named[0]], ReadOptions())  # it may be written in another way than the log
-    layout = across(apart.layouts[0])
+    layout, rows = across(apart.layouts[0]), tables.layouts[0].rows
+    if rows is not None and rows[-1] < count_rows(layout):
+        layout = with_rows(layout, rows)
     layouts, titles = (*tables.layouts, layout), (*tables.titles, apart.titles[0])
     return replace(tables, layouts=layouts, titles=titles, whole=(*tables.whole, Whole(layout))), 1
 

@@ -55,10 +55,10 @@ def choose_rows(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]
     return [episode or layout for episode, layout in zip(chosen, layouts, strict=True)]
 
 
-def with_rows(layout: Layout, rows: IntArray, inference: Inference) -> Layout:
+def with_rows(layout: Layout, rows: IntArray, *inferences: Inference) -> Layout:
     """Return a table of some of its rows, by index from 0, ascending, shape (k,)."""
     in_file = rows if layout.rows is None else layout.rows[rows]
-    layout = replace(layout, rows=in_file, inferences=(*layout.inferences, inference))
+    layout = replace(layout, rows=in_file, inferences=(*layout.inferences, *inferences))
     if layout.held is None:
         return replace(layout, sample=_sample(layout, in_file[:SAMPLED_LINES]))
     table = layout.held.take(numpy_columns.column(rows))
@@ -84,7 +84,8 @@ def _sample(layout: Layout, rows: IntArray) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(split_line(text, layout.delimiter)) for text in texts)
 
 
-def _count_rows(layout: Layout) -> int:
+def count_rows(layout: Layout) -> int:
+    """Return the number of data rows of a table."""
     if layout.held is not None:
         return int(layout.held.num_rows)
     return sum(1 for _ in data_lines(layout, layout.segment.lines()))
@@ -92,7 +93,7 @@ def _count_rows(layout: Layout) -> int:
 
 def _choose_ranges(layout: Layout, ranges: str) -> Layout:
     """Return a table of the rows of ranges such as "2:-1", from 1; -1 is the last."""
-    count = _count_rows(layout)
+    count = count_rows(layout)
     is_read = np.zeros(count, dtype=np.bool_)
     for text in ranges.split(","):
         ends = zip(text.split(":"), (1, -1), strict=True)
