@@ -81,7 +81,6 @@ class Container:
     what: str
     suffixes: tuple[str, ...]
     magic: tuple[bytes, ...]
-    lone: tuple[bytes, ...]
     advice: str
     parameters: Mapping[str, str] = field(default_factory=dict)
 
@@ -213,7 +212,6 @@ def vocabulary() -> Vocabulary:
                 one["what"],
                 tuple(one["suffixes"]),
                 tuple(magic.encode("latin-1") for magic in one["magic"]),
-                tuple(magic.encode("latin-1") for magic in one.get("lone", ())),
                 one["advice"],
                 one.get("parameters", {}),
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -228,15 +227,6 @@ def test_decimal_commas_behind_labels(read: Read) -> None:
     log = read("Zeit: 0,1 A1: 1,5 A2: -2\nZeit: 0,2 A1: 1,25 A2: -3,5\n")
     assert log.q.tolist() == [[1.5, -2], [1.25, -3.5]]
     assert log.t_ns.tolist() == [0, 100_000_000]
-
-
-def test_json_lines(tmp_path: Path) -> None:
-    path = tmp_path / "log.jsonl"
-    rows = [{"t": t, "mode": "run", "q": q} for t, q in zip(T, Q.tolist(), strict=True)]
-    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    log = read_log([path])
-    assert log.joints == tuple(f"q_{k + 1}" for k in range(7))
-    np.testing.assert_array_equal(log.q, Q)
 
 
 def test_words_before_numbers_are_no_labels(read: Read) -> None:

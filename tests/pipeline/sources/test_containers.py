@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import pickle
 import re
@@ -32,10 +31,6 @@ T = np.arange(ROWS) * 0.01
 Q = 0.5 * np.sin(2 * np.pi * 0.7 * T[:, None] + np.arange(6))  # rad, six joints that all turn back
 TABLE = pd.DataFrame({"t [s]": T, **{f"q{k + 1} [rad]": Q[:, k] for k in range(6)}})
 CSV = TABLE.to_csv(index=False).encode()
-
-
-def records() -> list[dict[str, float]]:
-    return [{str(name): float(value) for name, value in row.items()} for _, row in TABLE.iterrows()]
 
 
 def ulog(path: Path) -> None:
@@ -70,10 +65,6 @@ def objects(path: Path) -> None:
 
 ARRAYS = {"t": T, "q": Q}
 WRITERS: Mapping[str, Write] = {
-    "a.json": lambda path: path.write_text(json.dumps(records())),
-    "records.txt": lambda path: path.write_text(json.dumps(records(), indent=1)),
-    "columns.json": lambda path: path.write_text(json.dumps(TABLE.to_dict("list"))),
-    "log.csv": lambda path: path.write_text(json.dumps(records())),
     "a.pkl": lambda path: path.write_bytes(pickle.dumps(ARRAYS)),
     "frame.pkl": TABLE.to_pickle,
     "objects.npy": objects,
@@ -107,7 +98,7 @@ def test_every_container_has_a_command_that_runs_here() -> None:
     """But for what is no log."""
     others = ("Simulink", "robot", "TOML", "picture", "PDF", "web page")
     for one in vocabulary().containers:
-        suffixed = any(name.lower().endswith(one.suffixes) for name in WRITERS) or "JSON" in one.what
+        suffixed = any(name.lower().endswith(one.suffixes) for name in WRITERS)
         assert suffixed or any(word in one.what for word in others), one.what
 
 
@@ -125,7 +116,7 @@ def test_known_by_suffix_and_first_bytes(wrong: Wrong, name: str, head: bytes, w
     assert said.startswith(f"{name}: found {what}, allowed: a text table; ")
 
 
-@pytest.mark.parametrize("name", ["a.xlsx", "a.bag", "a.npz", "a.mat", "a.json", "a.csv"])
+@pytest.mark.parametrize("name", ["a.xlsx", "a.bag", "a.npz", "a.mat", "a.csv"])
 def test_an_empty_file_is_empty_whatever_it_is_called(wrong: Wrong, name: str) -> None:
     assert wrong(b"", name=name) == [f"{name}: found an empty file, allowed: a table with one row per sample"]
 

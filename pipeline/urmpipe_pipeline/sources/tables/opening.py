@@ -16,6 +16,7 @@ from urmpipe_pipeline.sources.tables import coppeliasim
 from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
 from urmpipe_pipeline.sources.tables.conflict import refuse_among_rows, refuse_conflict
 from urmpipe_pipeline.sources.tables.held import MemoryTable, layout_of
+from urmpipe_pipeline.sources.tables.json_text import read_json, sniff_json_lines
 from urmpipe_pipeline.sources.tables.labels import sniff_labels
 from urmpipe_pipeline.sources.tables.own_tables import in_si
 from urmpipe_pipeline.sources.tables.padding import without_end_rows
@@ -137,10 +138,10 @@ def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTa
     if (sheet := read_workbook(one, options)) is not None:
         return sheet
     text = open_text(one, any_suffix=options.source is not None)
-    program = read_program(text, options)
-    if program is None:
+    table = read_program(text, options) or read_json(text)
+    if table is None:
         refuse_long_lines(text)
-    return program or text
+    return table or text
 
 
 def _shaped(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:
@@ -166,7 +167,8 @@ def _layout(one: Segment | MemoryTable, options: ReadOptions, sniff_plain: Sniff
     if isinstance(one, MemoryTable):
         return layout_of(one)
     given = one.delimiter or options.delimiter, options.decimal
-    found = None if given[0] else sniff_labels(one)
+    found = None if one.delimiter else sniff_json_lines(one)
+    found = found or (None if given[0] else sniff_labels(one))
     return found or sniff_arrays(one, *given) or with_names(sniff_plain(one, *given))
 
 

@@ -236,8 +236,7 @@ def _container(path: Path, raw: bytes, any_suffix: bool) -> Container | None:
     ends = [max((len(end) for end in one.suffixes if name.endswith(end)), default=0) for one in known]
     longest = 0 if any_suffix else max(ends)
     suffixed = [one for one, end in zip(known, ends, strict=True) if end == longest > 0]
-    lone = b"\n" not in raw.strip()
-    begun = [one for one in known if raw.startswith(one.magic + (one.lone if lone else ()))]
+    begun = [one for one in known if raw.startswith(one.magic)]
     both = [one for one in suffixed if one in begun]
     return next(iter((*both, *suffixed, *begun)), None)
 
