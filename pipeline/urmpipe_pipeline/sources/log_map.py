@@ -19,6 +19,7 @@ from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, re
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
+from urmpipe_pipeline.sources.columns.places import ASSUMED_JOINTS
 from urmpipe_pipeline.sources.options import READING, Basis, Evidence, LogMap
 from urmpipe_pipeline.sources.tables.opening import TABLE
 from urmpipe_pipeline.sources.tables.rows import ROWS_READ
@@ -222,10 +223,11 @@ def _evidence(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> I
     named |= {"rotation"} if "form" in found and found["form"].evidence == THEIR_NAMES else set()
     robot = found["robot"].value if "robot" in found else ""
     named |= {"robot"} if all(robot in column.header for column in _columns(log, "joint")) else set()
+    assumed_joints = any(one.kind == ASSUMED_JOINTS for one in log.warnings)
     for field, kind in kinds.items():
         if kind in found:
             basis: Basis = "given" if getattr(given, field) else "named" if field in named else "proved"
-            if (field == "period" and log.period_assumed) or (field, basis) == ("joints", "proved"):
+            if (field == "period" and log.period_assumed) or (field == "joints" and assumed_joints):
                 basis = "assumed"
             yield field, Evidence(basis, found[kind].evidence)
     source = vocabulary().source(log.source)
@@ -288,6 +290,6 @@ def _lines(key: str, value: Any, evidence: Evidence | None) -> Iterator[str]:
     if evidence is None:
         yield text
         return
-    open_entry = evidence.basis == "assumed" and (key == "period" or key.startswith('"'))
+    open_entry = evidence.basis == "assumed" and (key in ("period", "joints") or key.startswith('"'))
     why = evidence.basis if evidence.basis == "given" else f"{evidence.basis}: {evidence.why}"
     yield f"{'# ' if open_entry else ''}{text}  # {escape_line(why)}"

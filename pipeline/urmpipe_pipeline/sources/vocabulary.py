@@ -21,7 +21,7 @@ SURELY_SECONDS = 0.05
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
 _INSIDE = re.compile(
     r"(?<=[\s_./])(?P<unit>rad(?:ian)?s?|deg(?:ree)?s?|(?:m|mm|cm)(?=[\s_.]per[\s_.]s))"
-    r"(?P<rate>[\s_./]?(?:per[\s_.])?s(?:ec(?:ond)?)?[\s_.^]?(?P<power>2?))?(?=[\s_./]\w|$)",
+    r"(?P<rate>[\s_./]?(?:per[\s_.])?s(?:ec(?:ond)?)?(?P<power>\^?2|_2(?=[\s_./]\w))?)?(?=[\s_./]\w|$)",
     re.IGNORECASE,
 )
 """A unit among the words of a name, or behind them, perhaps one per second."""
@@ -231,9 +231,9 @@ def split_unit(name: str) -> tuple[str, str | None]:
         return match["label"].strip(), match["inside"].strip()
     inside = _INSIDE.search(name.strip())
     if inside:
-        return name.strip(), f"{inside['unit'].lower()}/s{inside['power']}" if inside["rate"] else inside[
-            "unit"
-        ]
+        return name.strip(), f"{inside['unit'].lower()}/s{'2' * bool(inside['power'])}" if inside[
+            "rate"
+        ] else inside["unit"]
     word = re.split(r"[\s_./]+", name.strip())[-1]
     known = word.lower() in vocabulary().units and word != name.strip()
     return name.strip(), word if known else None

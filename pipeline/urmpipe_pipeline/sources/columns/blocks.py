@@ -73,6 +73,12 @@ class Block:
     correlation: float
     weakest: float
 
+    def fills(self, columns: int) -> bool:
+        """Return whether all columns of a table belong to blocks of its size: none is left over."""
+        if self.joints.step > 1:
+            return len(self.joints) * self.joints.step == columns
+        return columns % len(self.joints) == 0 and _tile(self.joints, self.rates)
+
 
 def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
     """Return the blocks of joints whose rates stand beside them, by their numbers; the largest.
@@ -219,7 +225,7 @@ class _Evidence:
         """
         joints, rates, columns = block.joints, block.rates, len(self.size)
         if joints.step > 1:
-            return len(joints) * joints.step == columns
+            return block.fills(columns)
         if not _tile(joints, rates):
             return False
         shift = rates.start - joints.start

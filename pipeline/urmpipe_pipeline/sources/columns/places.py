@@ -21,7 +21,7 @@ from urmpipe_pipeline.sources.columns.pose import (
     trailing_quaternion,
     with_form,
 )
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, TIMES_OF_ANOTHER
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, TIMES_OF_ANOTHER, take
 from urmpipe_pipeline.sources.columns.roles import (
     GIVEN,
     Roles,
@@ -41,6 +41,7 @@ from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
 NO_HEADER = "no header tells what they are"
+ASSUMED_JOINTS = "assumed-joints"  # warning: all columns of a table without names are the joints
 
 
 def without_header(
@@ -96,7 +97,17 @@ def without_header(
     free = [column for column in columns[:start] if column not in used]
     joints, rates, evidence = joints_among(free, layout, whole[free[0].table] if free else None, robot)
     check_count(joints, file, robot)
-    return _by_place(joints, columns, robot, evidence, pose, rates)
+    roles = _by_place(joints, columns, robot, evidence, pose, rates)
+    return roles if robot or rates else replace(roles, warnings=(*roles.warnings, _assumed_joints(joints)))
+
+
+def _assumed_joints(joints: Sequence[Column]) -> LogWarning:
+    """Return the warning that columns without names are taken as the joints, as nothing shows it."""
+    ends = f"column {joints[0].number}" if len(joints) == 1 else f"{joints[0].number} to {joints[-1].number}"
+    taken = f"{ends} is the joint" if len(joints) == 1 else f"columns {ends} are the joints"
+    hints = (take(joints, "confirms it"), Hint("joints", None, "names others"))
+    said = f"no header names the columns: {taken}, in order"
+    return LogWarning(ASSUMED_JOINTS, said, hints=hints, assumption=taken, role="joint")
 
 
 def _path_by_place(

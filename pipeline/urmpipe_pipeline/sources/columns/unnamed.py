@@ -53,7 +53,11 @@ def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, ro
         found = "one column, which always increases, as times do"
         raise which_joints(layout.file, found, [free], UNKNOWN, TIMES_OF_ANOTHER)
     blocks = proved_blocks(values, count)
-    if len(blocks) == 1 and (count or len(blocks[0].joints) > FEW or blocks[0].weakest >= SURE):
+    if (
+        len(blocks) == 1
+        and blocks[0].fills(len(free))
+        and (count or len(blocks[0].joints) > FEW or blocks[0].weakest >= SURE)
+    ):
         joints, rates = (tuple(free[k] for k in some) for some in (blocks[0].joints, blocks[0].rates))
         alike = f"steps and rates correlate by {blocks[0].correlation:.3g}"
         return joints, rates, f"columns {listed(rates)} are their rates: {alike}"
