@@ -314,21 +314,26 @@ def _path(
         raise LogError(Finding(lacking, file=file, hints=(record, *answers, other)))
     none = f"no joint columns in {listed(columns)}" if columns else "no column of numbers except times"
     times = () if columns else (TIMES_OF_ANOTHER,)
-    raise which_joints(file, none, _may_be(numeric, layouts, robot), need, *times)
+    raise which_joints(file, none, _may_be(numeric, columns, layouts, robot), need, *times)
 
 
 def _may_be(
-    numeric: Sequence[Column], layouts: Sequence[Layout], robot: Chain | None
+    numeric: Sequence[Column], columns: Sequence[Column], layouts: Sequence[Layout], robot: Chain | None
 ) -> list[Sequence[Column]]:
     """Return the columns that may be joints whatever their names, if they are as many as an arm has.
 
-    The only one that increases from row to row may be a time.
+    The only one that increases from row to row may be a time, in a table without a clock.
     """
     other_words = vocabulary().other | vocabulary().outside
     candidates = [column for column in numeric if not column.words & other_words]
     steps = [np.diff(layouts[column.table].numbers(column.index)) for column in candidates]
+    clocked = {
+        t for t, layout in enumerate(layouts) if len(layout.names) > sum(c.table == t for c in columns)
+    }
     rising = [
-        column for column, own in zip(candidates, steps, strict=True) if len(own) > 1 and (own > 0).all()
+        column
+        for column, step in zip(candidates, steps, strict=True)
+        if column.table not in clocked and len(step) > 1 and (step > 0).all()
     ]
     candidates = [column for column in candidates if len(rising) != 1 or column is not rising[0]]
     fits = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
