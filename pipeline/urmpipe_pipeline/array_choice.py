@@ -50,7 +50,7 @@ class Question(NamedTuple):
     """What the user chooses: an option, what it was, and its values with the rows that each reads."""
 
     option: str
-    given: str | None
+    requested: str | None
     choices: tuple[tuple[str, str], ...]
 
 

@@ -225,8 +225,8 @@ def _leaves(file: Any) -> list[Name]:
 def _other_episodes(names: list[Name], episode: str | None) -> set[Name]:
     """Return the paths that need not be opened: of episodes that are not read, nor shown in the question."""
     groups = find_episodes(dict.fromkeys(names, (0,)))
-    wanted = pick_episode(groups, episode)
-    needed = [wanted] if wanted else list(groups)[:SHOWN]
+    chosen = pick_episode(groups, episode)
+    needed = [chosen] if chosen else list(groups)[:SHOWN]
     left_out = {groups[name] for name in groups if name not in needed}
     depth = len(next(iter(left_out), ()))
     return {name for name in names if left_out and name[:depth] in left_out}

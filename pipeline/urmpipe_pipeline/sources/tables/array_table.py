@@ -96,7 +96,7 @@ def ask_for_arrays(path: Path, question: Question) -> NoReturn:
     values = [value for value, _ in question.choices]
     shown = ", ".join(values[:SHOWN]) + ", ..." * (len(values) > SHOWN)
     parts = f"{len(values)} episodes" if question.option == "episode" else f"arrays of {len(values)} lengths"
-    if question.given is not None:
-        parts = f"no {question.option} {question.given} among {parts}"
+    if question.requested is not None:
+        parts = f"no {question.option} {question.requested} among {parts}"
     hints = (Hint(question.option, value, f"reads {rows}") for value, rows in question.choices[:SHOWN])
     raise LogError(Finding(file=str(path), found=f"{parts}: {shown}", allowed="one", hints=tuple(hints)))

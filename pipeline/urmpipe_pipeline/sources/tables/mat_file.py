@@ -37,7 +37,7 @@ EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 
 TO_CSV = {"table": "writetable(NAME", "timetable": "writetimetable(NAME"}
 SIGNALS = ("timeseries", "Simulink.")
-"""Classes of MATLAB and what to write in their place: a MAT file keeps their numbers in a form of its own."""
+"""Classes of MATLAB and what to write in their place: a MAT file stores their numbers in another form."""
 
 HEADER, COMPRESSED = 128, 15
 """Bytes before the first variable of a file; the kind of a variable that is packed."""
@@ -100,8 +100,8 @@ def _no_numbers(path: Path, variables: Mapping[str, Any], objects: Mapping[str, 
     command = next(filter(None, map(_command, objects, objects.values())), "")
     command = command or f'writetable(T, "log.csv") of a table, or save("{path.name}", "t", "q")'
     hint = Hint("", effect=f"in MATLAB: {command}")
-    found = f"found no numbers with one row per sample in {', '.join(shown) or 'it'}"
-    return Finding(f"{found}, allowed: such as t (n x 1), q (n x joints)", str(path), hints=(hint,))
+    fault = f"found no numbers with one row per sample in {', '.join(shown) or 'it'}"
+    return Finding(f"{fault}, allowed: such as t (n x 1), q (n x joints)", str(path), hints=(hint,))
 
 
 def _command(name: str, kind: str) -> str:
@@ -114,13 +114,13 @@ def _loaded(path: Path) -> dict[str, Any]:
     """Return the variables of a file, structs as dictionaries: damaged bytes can end SciPy's process."""
     refuse_unpacked(path, _unpacked(path))
     try:
-        found, reason = read_in_subprocess(path, mat_variables.__name__)
+        variables, reason = read_in_subprocess(path, mat_variables.__name__)
     except ReaderCrashError as error:
-        found, reason = {}, str(error)
+        variables, reason = {}, str(error)
     if reason:
-        found_out = f"found a MAT file that cannot be read ({reason}), allowed: a whole one"
-        raise LogError(Finding(found_out, str(path)))
-    return {name: value for name, value in found.items() if not name.startswith("__")}
+        fault = f"found a MAT file that cannot be read ({reason}), allowed: a whole one"
+        raise LogError(Finding(fault, str(path)))
+    return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 
 def _unpacked(path: Path) -> int:
@@ -165,7 +165,7 @@ def _columns(name: Name, values: NDArray[Any], rows: int) -> Iterator[ArrayColum
     by_row = values if len(values) == rows else values.T
     names = spread_names([name[-1]], [by_row.shape[1] if values.ndim == 2 else 0])
     matrix = np.ascontiguousarray(by_row.T).reshape(-1, rows)
-    yield from (((*name[:-1], own), "", column) for own, column in zip(names, matrix, strict=True))
+    yield from (((*name[:-1], label), "", column) for label, column in zip(names, matrix, strict=True))
 
 
 def read_signals(variables: Mapping[str, Any]) -> dict[str, Any]:
@@ -179,7 +179,7 @@ def read_signals(variables: Mapping[str, Any]) -> dict[str, Any]:
 
 def _read_signals(name: str, value: Any) -> Any:
     if isinstance(value, list):
-        return [_read_signals(name, one) for one in value]
+        return [_read_signals(name, item) for item in value]
     if not isinstance(value, Mapping):
         return value
     name = _text(value.get("Name")) or name
@@ -187,10 +187,10 @@ def _read_signals(name: str, value: Any) -> Any:
         return _read_signals(name, value["Values"])
     signals = value.get("signals", ())
     signals = signals if isinstance(signals, list) else [signals]
-    if signals and all(isinstance(one, Mapping) and "values" in one for one in signals):
-        blocks = [_text(one.get("blockName")).rpartition("/")[2] * (len(signals) > 1) for one in signals]
-        labels = [_text(one.get("label")) or block for one, block in zip(signals, blocks, strict=True)]
-        arrays = [one["values"] for one in signals]
+    if signals and all(isinstance(item, Mapping) and "values" in item for item in signals):
+        blocks = [_text(item.get("blockName")).rpartition("/")[2] * (len(signals) > 1) for item in signals]
+        labels = [_text(item.get("label")) or block for item, block in zip(signals, blocks, strict=True)]
+        arrays = [item["values"] for item in signals]
     elif {"Time", "Data"} <= value.keys():
         labels, arrays = [name], [value["Data"]]
     else:
@@ -244,9 +244,9 @@ def _file(run: Mapping[str, Any]) -> pa.Table:
         unit = units[0] if len(units) == 1 else "ns"
         times: Any = decimals(clock, EXPONENTS[unit]) if unit in EXPONENTS else clock.astype("datetime64[ns]")
         columns.append((names[0] if len(names) == 1 else "t", unit, times))
-    own, told = _list(run["names"]), _list(run["units"])
-    values = np.asarray(run["values"], dtype=np.float64).reshape(-1, len(own))
-    columns += [(name, unit, values[:, k]) for k, (name, unit) in enumerate(zip(own, told, strict=True))]
+    labels, units = _list(run["names"]), _list(run["units"])
+    values = np.asarray(run["values"], dtype=np.float64).reshape(-1, len(labels))
+    columns += [(name, unit, values[:, k]) for k, (name, unit) in enumerate(zip(labels, units, strict=True))]
     arrays = [_column(array) for _, _, array in columns]
     fields = [
         pa.field(name, array.type, metadata={UNIT: unit.encode()})
