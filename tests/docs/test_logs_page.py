@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fnmatch import fnmatch
 from importlib import import_module
 from pathlib import Path
@@ -65,16 +65,18 @@ def kinds(path: Path) -> Iterator[str]:
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "LogWarning":
             named = [keyword.value for keyword in node.keywords if keyword.arg == "kind"]
             for kind in (*node.args[:1], *named):
-                yield from texts(constants.get(kind.id, kind) if isinstance(kind, ast.Name) else kind)
+                yield from texts(kind, constants)
 
 
-def texts(kind: ast.expr) -> Iterator[str]:
+def texts(kind: ast.expr, constants: Mapping[str, ast.expr]) -> Iterator[str]:
     """Yield the texts that an expression may be."""
     match kind:
         case ast.Constant(value=str(text)):
             yield text
         case ast.IfExp(body=body, orelse=orelse):
-            yield from (*texts(body), *texts(orelse))
+            yield from (*texts(body, constants), *texts(orelse, constants))
+        case ast.Name(id=name) if name in constants:
+            yield from texts(constants[name], {})
         case ast.JoinedStr(values=parts):
             yield "".join(str(part.value) if isinstance(part, ast.Constant) else "*" for part in parts)
         case _:

@@ -30,7 +30,9 @@ SKIPPED = "skipped-row"
 MOST_SKIPPED = 0.01
 """Share of the rows that may be left out because they cannot be read."""
 
-REBUILT, SPREAD, REPEATED = "clock-rebuilt", "clock-spread", "repeated-time"
+REBUILT = "clock-rebuilt"
+SPREAD = "clock-spread"
+REPEATED = "repeated-time"
 """The kinds of the warnings about times that several rows share: all of a coarse clock, many, single ones."""
 
 INCREASING = "times that increase from row to row"
