@@ -137,9 +137,11 @@ def test_alphabetical_joint_states_of_a_known_arm_are_put_in_order(read: Read, a
     assert log.q[0].tolist() == [3.0, 2.0, 1.0, 4.0, 5.0, 6.0]
 
 
-def test_as_many_columns_as_joints(read: Read, arm: Arm) -> None:
-    log = read(table(["t", "boom", "stick"]), arm(2))
-    assert log.joints == ("boom", "stick")
+def test_as_many_columns_as_joints_are_no_proof(read: Read, wrong: Wrong, arm: Arm) -> None:
+    text = table(["t", "boom", "stick"])
+    (asked,) = wrong(text, arm(2))
+    assert "--joints boom,stick takes these" in asked
+    assert read(text, arm(2), joints=("boom", "stick")).joints == ("boom", "stick")
 
 
 def test_joints_as_the_user_says(read: Read, wrong: Wrong) -> None:

@@ -162,9 +162,6 @@ def _without_number(free: Sequence[Column], file: str, count: int | None, *, hal
         return NamedJoints(
             sized, "their units; the order is the file's", alternatives=same_quantities(sized, every)
         )
-    if count is not None and len(still) == count:
-        evidence = f"the only {count} columns left; the order is the file's"
-        return NamedJoints(tuple(still), evidence, alternatives=same_quantities(still, every))
     return NamedJoints(())
 
 

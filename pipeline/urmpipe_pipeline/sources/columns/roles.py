@@ -109,9 +109,9 @@ def assign(
     """Return the roles of the columns of a table with a header.
 
     The joints are, in this order: the columns that the user names; those named like the robot's
-    joints; those with a word for a joint and its number; those with a unit of angle; as many
-    columns as the robot has joints, if no more are left; those of a family whose rates are another
-    family, by their numbers. Without any, x, y, z make a path.
+    joints; those with a word for a joint and its number; those with a unit of angle; those of a
+    family whose rates are another family, by their numbers. Without any, x, y, z make a path. Columns
+    are not the joints because no others are left: these are asked about.
 
     Args:
         columns: The columns, without the clock.

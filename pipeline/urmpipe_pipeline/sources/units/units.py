@@ -280,9 +280,26 @@ class UnitFinder:
             self._assume(some, metre, "prismatic joints", unit_hints(some, OTHER_UNIT["m"]))
         if turns:
             turning = values if len(turns) == len(columns) else values[:, turns]
+            if robot is None and not any(known):
+                self._check_prismatic(columns, turning)
             unit = self._angle([columns[j] for j in turns], turning, t_ns, Bounds.of(robot, turns), known)
             known = [unit if j in turns else other for j, other in enumerate(known)]
         return [unit or metre for unit in known]
+
+    def _check_prismatic(self, columns: Sequence[Column], values: FloatArray) -> None:
+        """Raise the question whether the only column with values beyond those in rad is a length."""
+        sizes = [peak(column) for column in values.T]
+        large = [k for k, size in enumerate(sizes) if size > MOST_TURNS * math.tau]
+        if len(large) != 1 or any(size > math.tau for k, size in enumerate(sizes) if k != large[0]):
+            return
+        column = columns[large[0]]
+        if len(columns) < 3 or radians_proof(values) or degrees_proof(values):
+            return
+        message = f"found values up to {sizes[large[0]]:.6g} in {column.name} alone and no unit"
+        choices = ({"": "rad", column.called: "mm"}, {"": "deg"}, {"": "rad"})
+        hints = tuple(Hint("unit", choice, "specifies it") for choice in choices)
+        allowed = "the unit of a joint that slides, or one unit for all"
+        raise LogError(Finding(f"{message}, allowed: {allowed}", self.tellers.file, hints=hints))
 
     def _angle(
         self,
