@@ -25,7 +25,7 @@ from urmpipe_pipeline.sources.columns.sides import columns_of_side, columns_of_t
 from urmpipe_pipeline.sources.columns.simulated import joints_of_blocks
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
-from urmpipe_pipeline.sources.vocabulary import Patterns, Unit, vocabulary
+from urmpipe_pipeline.sources.vocabulary import Patterns, Unit
 
 MOST_JOINTS = 500
 """Joints of a log: an arm has seven, a humanoid with its hands has sixty."""
@@ -98,7 +98,7 @@ def make_plan(
     if options.topic is not None and "topic" not in applied:
         topic = tuple(columns_of_topic(columns, options, tables.layouts[0].file))
         chosen, applied = topic or columns, applied | ({"topic"} if topic else set())
-    has_time = any(pattern.search(column.key) for column in chosen for pattern in vocabulary().time)
+    has_time = any(column.is_time for column in chosen)
     own_side = without_other_side(chosen if has_time else columns, options)
     apart = apart if options.time else time_file(tables, own_side)
     if apart is None:

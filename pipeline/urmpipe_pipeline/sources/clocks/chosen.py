@@ -30,6 +30,7 @@ class Chosen(NamedTuple):
         rest: Of whole seconds and what goes on from them: the power of ten from the latter to [ns].
         forms: The form of each column where they are dates and times of day in digits alone.
         lasts: Whether each row has a duration, and the times are their sum.
+        passed_over: Times of the side that is not read.
     """
 
     columns: tuple[Column, ...]
@@ -37,3 +38,4 @@ class Chosen(NamedTuple):
     rest: int | None = None
     forms: tuple[Form, ...] = ()
     lasts: bool = False
+    passed_over: tuple[Column, ...] = ()

@@ -12,7 +12,7 @@ import numpy as np
 from urmpipe_models.elementwise import IntArray
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value
 from urmpipe_models.wraps import FULL_TURN
-from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, Inference, LogWarning
+from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.cells.text_clock import (
@@ -125,7 +125,13 @@ def find_clocks(
     for table, layout in enumerate(tables.layouts):
         own = [column for column in columns if column.table == table]
         chosen = time_columns(own, layout, options, joints, tables.whole[table])
-        clocks.append(clock_of(chosen, layout, tables.known, units, label=options.poses))
+        clock = clock_of(chosen, layout, tables.known, units, label=options.poses)
+        if chosen.passed_over:
+            names = ", ".join(column.name for column in chosen.passed_over)
+            hints = tuple(Hint("time", column.called, "takes it") for column in chosen.passed_over)
+            passed = f"{names} passed over for {chosen.columns[0].name}"
+            clock = replace(clock, warnings=(*clock.warnings, LogWarning(PASSED_OVER, passed, hints=hints)))
+        clocks.append(clock)
     return tuple(clocks)
 
 
@@ -206,7 +212,8 @@ def by_joints(clock: Clock, tables: Tables, joints: Sequence[Column], units: Map
         return speed_of(steps, times[1:] if clock.lasts else np.diff(times))
 
     unit = unit_by_speed(time, layout, speed, lasts=clock.lasts)
-    return clock if unit is None else _with_unit(clock, *unit)
+    others = tuple(warning for warning in clock.warnings if warning.kind == PASSED_OVER)
+    return clock if unit is None else _with_unit(clock, unit[0], unit[1], (*others, *unit[2]))
 
 
 def _forms_of_numbers(

@@ -13,7 +13,7 @@ from urmpipe_pipeline.sources.clocks.halves import halves_beside, named_halves
 from urmpipe_pipeline.sources.clocks.no_header import without_header
 from urmpipe_pipeline.sources.clocks.steps import increases
 from urmpipe_pipeline.sources.clocks.text_times import known_forms
-from urmpipe_pipeline.sources.columns.columns import Column, find_column
+from urmpipe_pipeline.sources.columns.columns import Column, Kind, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
@@ -77,12 +77,18 @@ def _by_name(columns: Sequence[Column], layout: Layout, whole: Whole) -> Chosen 
     """Return a column of numbers that is named like a time, or whole seconds and what goes on from them."""
     halves = list(named_halves(columns, layout, whole))
     numeric = [column for column in columns if not column.text]
-    named = (c for pattern in vocabulary().time for c in numeric if pattern.search(c.key))
-    found = next(named, None)
-    if found is None:
+    named = ([c for c in numeric if pattern.search(c.key)] for pattern in vocabulary().time)
+    sides = ([c for c in numeric if c.kind != Kind.PLAIN and p.search(c.bare)] for p in vocabulary().time)
+    times = next((columns for columns in (*named, *sides) if columns), None)
+    if times is None:
         return halves[0] if halves else None
-    both = next((pair for pair in halves if found in pair.columns), None)
-    return both or halves_beside(found, numeric, layout, whole) or Chosen((found,), "its name")
+    joints = vocabulary().joint["position"]
+    kinds = [c.kind for c in numeric if c not in times and any(p.search(c.bare) for p in joints)]
+    side = min(kinds, default=Kind.MEASURED)
+    time = min(times, key=lambda c: (c.kind != side, c.kind != Kind.PLAIN))
+    both = next((pair for pair in halves if time in pair.columns), None)
+    both = both or halves_beside(time, numeric, layout, whole) or Chosen((time,), "its name")
+    return both._replace(passed_over=tuple(c for c in times if c.kind != time.kind and c not in both.columns))
 
 
 def _day_beside_time(columns: Sequence[Column], layout: Layout) -> Chosen | None:

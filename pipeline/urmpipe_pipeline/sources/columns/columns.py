@@ -83,6 +83,12 @@ class Column:
         return any(pattern.search(self.key) for pattern in vocabulary().index)
 
     @property
+    def is_time(self) -> bool:
+        """Whether it is called like a time, also one of a side: time_cmd."""
+        names = (self.key,) if self.kind == Kind.PLAIN else (self.key, self.bare)
+        return any(pattern.search(name) for pattern in vocabulary().time for name in names)
+
+    @property
     def marked(self) -> MarkedName:
         """Its key, and what it says of its values: measured or commanded."""
         label = self.name if key(self.name) == self.key else split_unit(self.header)[0]

@@ -57,8 +57,7 @@ def without_other_side(columns: Sequence[Column], options: ReadOptions) -> tuple
         for column in columns
         if column.number in own and (other == {REST} or not other <= column.words)
     )
-    times = vocabulary().time
-    return kept if any(p.search(column.key) for p in times for column in kept) else tuple(columns)
+    return kept if any(column.is_time for column in kept) else tuple(columns)
 
 
 def select_side(columns: Sequence[Column], side: str) -> list[Column]:
