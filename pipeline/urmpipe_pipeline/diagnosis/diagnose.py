@@ -66,7 +66,7 @@ from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.reading_errors import Edits
 from urmpipe_pipeline.runs.recorded_tcp import RecordedPoses, distances_from_recorded
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources.units.evidence import CLEARLY
+from urmpipe_pipeline.sources.units.proofs import MARGIN
 from urmpipe_pipeline.trajectories import Matched, Side
 
 FLOOR = 0.01  # fraction of the tolerance below which nothing is named
@@ -416,17 +416,17 @@ def _find_origin(
     tcps = [_own_tcp(side, tolerance) for side in sides]
     size = _shown_size(diagnosis)
     distances = [_record_distance(matched, side.run, is_log=side is log) for side in sides]
-    left = float(np.hypot(diagnosis.unexplained.rms, size / CLEARLY))
+    left = float(np.hypot(diagnosis.unexplained.rms, size / MARGIN))
 
     def agrees(k: int) -> bool:
         tcp = tcps[k]
-        return tcp is not None and tcp.agrees and CLEARLY * tcp.rms <= size
+        return tcp is not None and tcp.agrees and MARGIN * tcp.rms <= size
 
     def has_causes(k: int) -> bool:
         tcp, follows = tcps[k], distances[k] <= left
-        if tcp is not None and CLEARLY * tcp.rms > size and follows:
+        if tcp is not None and MARGIN * tcp.rms > size and follows:
             return True
-        consistent = tcp is not None and CLEARLY * tcp.rms_with_tool <= size
+        consistent = tcp is not None and MARGIN * tcp.rms_with_tool <= size
         return reference.by_joints and log.by_joints and agrees(1 - k) and not consistent
 
     origin = [side.run.name for k, side in enumerate(sides) if size and has_causes(k)]

@@ -22,9 +22,12 @@ from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
 from urmpipe_models.math3d import (
     Transform,
+    conjugate,
     fit_rotation,
     from_offset,
     matrix_to_rpy,
+    quaternion_product,
+    rotation_angle,
     to_matrices,
     to_quaternions,
 )
@@ -33,20 +36,17 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, JointLog, LogWarning
 from urmpipe_pipeline.runs.reading_errors import Edit, robot_edits, sign_edits, swap_edits
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources.units.evidence import (
-    CLEARLY,
-    CLOSE_WITH_TOOL,
+from urmpipe_pipeline.sources.units.proofs import (
+    MARGIN,
     SAMPLES,
     Fit,
-    extent,
+    Recorded,
+    find_best_fit,
+    fit_readings,
     has_both,
     mean_turn,
-    single_out,
     spread,
-    tool_fit,
-    turned_apart,
 )
-from urmpipe_pipeline.sources.units.kinematic_units import Recorded, fits
 from urmpipe_pipeline.sources.vocabulary import key, split_unit
 
 RECORDED_START = "recorded-tcp-start"
@@ -58,16 +58,70 @@ MIN_REPORTED_ANGLE = 1e-3  # rad, the same: it moves a point at a tool's length 
 MAX_CALIBRATION_DISTANCE = 0.03  # m rms; no calibration and no rounding explains more
 MAX_CALIBRATION_ANGLE = np.radians(2.0)  # rad; a larger one is the rotation of a tool
 MAX_UNEXPLAINED = 1.0 / 25.0  # share of a motion; a wrong arm and some tool leave a fifth by chance
+MAX_TOOL_DISTANCE = 0.006  # m rms, from which points disagree with any tool: three numbers explain much
+MIN_EXTENT = 0.02  # m rms of the recorded points; a smaller motion determines no tool
+MIN_TOOL_ROWS = 5  # of a fit of three numbers
 MIN_ROWS = 10  # of a log whose rows have a usual tool
 
 _SET_FRAME = (Hint("tool", None, "sets it"), Hint("base", None, "sets it"))
+
+
+class ToolFit(NamedTuple):
+    """Distance of the kinematics from recorded points.
+
+    Attributes:
+        distance: Root mean square distance in [m], the tool as the robot has it.
+        with_tool: The same with the tool offset that fits best; inf where the points do not determine it.
+        tool: That offset in the frame of the tip in [m].
+    """
+
+    distance: float
+    with_tool: float
+    tool: tuple[float, float, float]
+
+
+def extent(points: FloatArray) -> float:
+    """Return the root mean square distance of points, shape (n, 3) in any unit, from their mean."""
+    return _rms(points - points.mean(axis=0))
+
+
+def _rms(vectors: FloatArray) -> float:
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+
+
+def fit_tool(position: FloatArray, rotation: FloatArray, recorded: FloatArray) -> ToolFit:
+    """Return how near poses come to recorded points, p_recorded = p + R d, and the tool offset d.
+
+    Args:
+        position: Computed positions in [m], shape (n, 3).
+        rotation: Computed orientations [-], shape (n, 3, 3).
+        recorded: Recorded positions in [m], shape (n, 3).
+    """
+    residual = recorded - position
+    distance = _rms(residual)
+    if len(recorded) < MIN_TOOL_ROWS or extent(recorded) < MIN_EXTENT:
+        return ToolFit(distance, np.inf, (0.0, 0.0, 0.0))
+    tool = np.einsum("nji,nj->ni", rotation, residual).mean(axis=0)  # least squares: R^T R = I
+    return ToolFit(distance, _rms(residual - rotation @ tool), _to_vector(tool))
+
+
+def _turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> float:
+    """Return the rms angle between orientations in [rad], with a tool after its constant turn that fits best.
+
+    Computed and recorded orientations are unit quaternions x, y, z, w [-], shape (n, 4).
+    """
+    if not tool:
+        return float(np.sqrt(np.mean(rotation_angle(computed, recorded) ** 2)))
+    relative = quaternion_product(conjugate(computed), recorded)
+    mean = np.broadcast_to(mean_turn(computed, recorded), relative.shape)
+    return float(np.sqrt(np.mean(rotation_angle(mean, relative) ** 2)))
 
 
 def count_initial_outliers(robot: Chain | None, log: JointLog) -> tuple[int, float]:
     """Return the number of first rows with another tool than the others, and its distance from it in [m].
 
     The recorded point is compared in the frame of the tip, where a tool does not move: in the outliers it is
-    `CLEARLY` times farther from the usual place than in any later row, and farther than a calibration
+    `MARGIN` times farther from the usual place than in any later row, and farther than a calibration
     explains. The distance is the median over these rows; inf for points 0, 0, 0, which are no poses except
     in a plan.
     """
@@ -96,12 +150,12 @@ def _count_other_tool(robot: Chain, log: JointLog, start: int) -> tuple[int, flo
     distance = np.linalg.norm(offset - usual, axis=1)
     least = np.minimum.accumulate(distance)[:-1]
     most = np.maximum.accumulate(distance[::-1])[::-1][1:]
-    splits = np.flatnonzero(least > np.maximum(CLEARLY * most, CLOSE_WITH_TOOL))
+    splits = np.flatnonzero(least > np.maximum(MARGIN * most, MAX_TOOL_DISTANCE))
     if not len(splits):
         return 0, 0.0
     last = int(splits[-1])
     between = np.arange(looked_at[last], looked_at[last + 1])
-    is_outlier = np.linalg.norm(_tip_offsets(robot, log, between) - usual, axis=1) > CLEARLY * most[last]
+    is_outlier = np.linalg.norm(_tip_offsets(robot, log, between) - usual, axis=1) > MARGIN * most[last]
     return int(between[is_outlier][-1]) + 1 - start, float(np.median(distance[: last + 1]))
 
 
@@ -139,10 +193,10 @@ class PoseDifference(NamedTuple):
 
     def is_clearly_smaller(self, other: PoseDifference) -> bool:
         """Return whether distance or angle is clearly smaller, and neither is clearly larger."""
-        is_nearer = CLEARLY * self.distance <= other.distance and other.distance > MIN_REPORTED_DISTANCE
-        is_turned_less = CLEARLY * self.angle <= other.angle and other.angle > MIN_REPORTED_ANGLE
-        is_not_farther = self.distance <= CLEARLY * max(other.distance, MIN_REPORTED_DISTANCE)
-        is_not_turned_more = self.angle <= CLEARLY * max(other.angle, MIN_REPORTED_ANGLE)
+        is_nearer = MARGIN * self.distance <= other.distance and other.distance > MIN_REPORTED_DISTANCE
+        is_turned_less = MARGIN * self.angle <= other.angle and other.angle > MIN_REPORTED_ANGLE
+        is_not_farther = self.distance <= MARGIN * max(other.distance, MIN_REPORTED_DISTANCE)
+        is_not_turned_more = self.angle <= MARGIN * max(other.angle, MIN_REPORTED_ANGLE)
         return (is_nearer and is_not_turned_more) or (is_turned_less and is_not_farther)
 
     @property
@@ -192,7 +246,7 @@ class RecordedPoses(NamedTuple):
         has_rotation = quat is not None and np.isfinite(quat).all(axis=1).any()
         return cls(q[known], position[known], quat if has_rotation else None)
 
-    def fit(self, robot: Chain, q: FloatArray | None = None) -> Fit:
+    def fit(self, robot: Chain, q: FloatArray | None = None) -> ToolFit:
         """Return the distance of an arm from the points.
 
         Args:
@@ -201,12 +255,12 @@ class RecordedPoses(NamedTuple):
         """
         return self.fit_each(robot, [self.q if q is None else q])[0]
 
-    def fit_each(self, robot: Chain, joint_values: Sequence[FloatArray]) -> list[Fit]:
+    def fit_each(self, robot: Chain, joint_values: Sequence[FloatArray]) -> list[ToolFit]:
         """Return the distances of several joint values in [rad] or [m], shape (n, joints) each."""
         position, rotation = poses_over_log(robot, np.concatenate(joint_values))
         count = len(joint_values)
         parts = zip(np.split(position, count), np.split(rotation, count), strict=True)
-        return [tool_fit(*part, self.position) for part in parts]
+        return [fit_tool(*part, self.position) for part in parts]
 
     def difference(self, robot: Chain, q: FloatArray | None = None, *, any_tool: bool) -> PoseDifference:
         """Return the distance of an arm from the poses.
@@ -221,7 +275,7 @@ class RecordedPoses(NamedTuple):
         distance = _fit_distance(fit) if any_tool else fit.distance
         angle = 0.0
         if self.quat is not None:
-            angle = turned_apart(*self._orientations(robot, self.q if q is None else q), tool=any_tool)
+            angle = _turned_apart(*self._orientations(robot, self.q if q is None else q), tool=any_tool)
         return PoseDifference(distance, angle)
 
     def tool_rotation(self, robot: Chain) -> tuple[float, float, float]:
@@ -246,12 +300,17 @@ class RecordedPoses(NamedTuple):
         return to_quaternions(rotation.reshape(-1, 9), "matrix"), self.quat[known]
 
 
+def _to_vector(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
 def _to_rows(matrix: FloatArray) -> tuple[Vector, Vector, Vector]:
     x, y, z = (tuple(row) for row in matrix.tolist())
     return x, y, z
 
 
-def _fit_distance(fit: Fit) -> float:
+def _fit_distance(fit: ToolFit) -> float:
     """Return the distance in [m] with the tool that fits best, or without one that is not determined."""
     return fit.with_tool if np.isfinite(fit.with_tool) else fit.distance
 
@@ -306,7 +365,7 @@ def recorded_tcp_warnings(robot: Chain | None, log: JointLog) -> list[LogWarning
     difference, fit = poses.difference(robot, any_tool=True), poses.fit(robot)
     nearer = _find_clearly_nearer(robot, log, poses, difference)
     turned = difference.angle > MIN_REPORTED_ANGLE and any(
-        CLEARLY * other.difference.angle <= difference.angle for other in nearer
+        MARGIN * other.difference.angle <= difference.angle for other in nearer
     )
     message = _format_distance(robot, poses.difference(robot, any_tool=False), turned=turned)
     has_tool = np.isfinite(fit.with_tool)
@@ -359,7 +418,7 @@ def _frame_hints(
     bare = replace(robot, tool=Transform())
     tool = _round_frame((*poses.fit(bare).tool, *poses.tool_rotation(bare)))
     without_tool, with_tool = (poses.difference(bare, any_tool=fitted).angle for fitted in (False, True))
-    if without_tool <= CLEARLY * with_tool:
+    if without_tool <= MARGIN * with_tool:
         tool = tool[:3]  # its rotation is not more than the residual of a calibration
     base = poses.base(robot)
     for name, frame, arm in (
@@ -368,7 +427,7 @@ def _frame_hints(
     ):
         rest = poses.difference(arm, any_tool=False)
         is_better = _compared(rest, turned=turned).is_clearly_smaller(difference)
-        if is_better and rest.distance <= CLOSE_WITH_TOOL:
+        if is_better and rest.distance <= MAX_TOOL_DISTANCE:
             does = f"brings them within {rest.format(turned=turned or (len(frame) > 3 and name == 'tool'))}"
             yield Hint(name, frame, does, robot=_catalogue_name(robot, name))
 
@@ -381,7 +440,7 @@ def _still_tool_hints(robot: Chain, poses: RecordedPoses) -> Iterator[Hint]:
     turned = poses.difference(bare, any_tool=False).angle > MAX_CALIBRATION_ANGLE
     tool = _round_frame((*shift.tolist(), *(poses.tool_rotation(bare) if turned else ())))
     rest = poses.difference(replace(robot, tool=from_offset(tool)), any_tool=False)
-    if rest.distance <= CLOSE_WITH_TOOL:
+    if rest.distance <= MAX_TOOL_DISTANCE:
         does = f"brings them within {rest.format(turned=turned)} here"
         yield Hint("tool", tool, does, robot=_catalogue_name(robot, "tool"))
 
@@ -417,7 +476,7 @@ def _find_clearly_nearer(
     if not difference.is_reported:
         return []
     has_motion = np.isfinite(poses.fit(robot).with_tool)
-    max_distance = MAX_UNEXPLAINED * extent(poses.position) if has_motion else CLOSE_WITH_TOOL
+    max_distance = MAX_UNEXPLAINED * extent(poses.position) if has_motion else MAX_TOOL_DISTANCE
     arms = [_with_error(error, robot, log, poses) for (error,) in robot_edits(robot)]
     if has_motion and difference.distance > MAX_CALIBRATION_DISTANCE:  # a base explains less by chance
         base = poses.base(robot)
@@ -491,39 +550,41 @@ def infer_robot(recorded: Recorded) -> tuple[Chain, Inference] | None:
 
 
 def _infer_by_kinematics(recorded: Recorded, robots: Sequence[Chain]) -> tuple[Chain, Inference] | None:
-    judged = [robot for robot in robots if recorded.judges(robot)]
     by_reading = {
         (robot.name, reading): fit
-        for robot in judged
-        for reading, fit in fits(robot, recorded, recorded.usual).items()
+        for robot in robots
+        if recorded.judges(robot)
+        for reading, fit in fit_readings(robot, recorded, recorded.usual, max_freedom=1).items()
     }
-    stated = {(robot.name, reading) for robot in judged for reading in recorded.told}
-    best = single_out(by_reading, stated) if by_reading else None
+    stated = {key for key in by_reading if key[1] in recorded.stated}
+    best = (
+        find_best_fit(by_reading, stated, max_freedom=1) if by_reading else None
+    )  # a base explains the wrong robot
     if best is None:
         return None
-    (name, reading), needs_tool = best
-    nearest = {
-        robot.name: min(
-            (by_reading[robot.name, usual] for usual in recorded.usual),
-            key=lambda fit: fit.of(tool=needs_tool),
-        )
-        for robot in judged
-    }
+    (name, reading), freedom = best
+    points = recorded.rows[1] * [unit.factor for unit in reading[1]]
+    if freedom and extent(points) < MIN_EXTENT:
+        return None
+    nearest: dict[str, Fit] = {}
+    for (robot_name, _), fit in by_reading.items():
+        if robot_name not in nearest or fit.shares[freedom] < nearest[robot_name].shares[freedom]:
+            nearest[robot_name] = fit
     nearest[name] = by_reading[name, reading]
-    inference = _robot_inference(name, nearest, needs_tool)
+    inference = _robot_inference(name, nearest, freedom)
     return next(robot for robot in robots if robot.name == name), inference
 
 
-def _robot_inference(name: str, nearest: Mapping[str, Fit], needs_tool: bool) -> Inference:
+def _robot_inference(name: str, nearest: Mapping[str, Fit], freedom: int) -> Inference:
     """Return the inference of a robot, with its distance and that of the next one."""
-    distances = {robot: fit.of(tool=needs_tool) for robot, fit in nearest.items()}
-    evidence = f"its kinematics come within {distances.pop(name) * 1e3:.2f} mm (rms) of the recorded TCP"
+    distances = {robot: f"{fit.distances[freedom] * 1e3:.2f} mm" for robot, fit in nearest.items()}
+    evidence = f"its kinematics come within {distances.pop(name)} (median) of the recorded TCP"
     hints = [Hint("robot")]
-    if needs_tool:
+    if freedom:
         x, y, z = tool = [round(value, 4) + 0.0 for value in nearest[name].tool]  # + 0.0: no -0.0
         evidence += f" with the tool {x:.4f},{y:.4f},{z:.4f}, which is not applied"
         hints.append(Hint("tool", tool, "applies it", robot=name))
     if distances:
-        second = min(distances, key=distances.__getitem__)
-        evidence += f", those of {second} within {distances[second] * 1e3:.2f} mm"
+        second = min(distances, key=lambda robot: float(nearest[robot].shares[freedom]))
+        evidence += f", those of {second} within {distances[second]}"
     return Inference("robot", name, evidence, hints=tuple(hints))

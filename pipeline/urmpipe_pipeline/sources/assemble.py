@@ -31,18 +31,14 @@ from urmpipe_pipeline.sources.clocks.clock_columns import like_a_time
 from urmpipe_pipeline.sources.clocks.clock_units import LONGEST, SHORTEST
 from urmpipe_pipeline.sources.columns.blocks import SURE_VARIED, period_of, rounded_period
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of
-from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
 from urmpipe_pipeline.sources.units.interpolated import without_contradicted, without_interpolated
-from urmpipe_pipeline.sources.units.kinematic_units import Recorded, by_kinematics
-from urmpipe_pipeline.sources.units.measured import length_by_spread
+from urmpipe_pipeline.sources.units.proofs import Recorded, prove_by_kinematics
 from urmpipe_pipeline.sources.units.rotation import settle_rotation
-from urmpipe_pipeline.sources.units.told import Tellers
-from urmpipe_pipeline.sources.units.unit_hints import unit_inference
-from urmpipe_pipeline.sources.units.units import UnitFinder, told_joints, told_lengths
+from urmpipe_pipeline.sources.units.units import UnitFinder, UnitSources
 from urmpipe_pipeline.sources.vocabulary import Unit
 
 
@@ -155,24 +151,23 @@ def _not_used(plan: Plan, options: ReadOptions, *, by_source: bool) -> Iterator[
 
 
 def recorded(plan: Plan, content: Content, options: ReadOptions, robot: Chain | None = None) -> Recorded:
-    """Return joints and recorded positions before their units are known, with what is told of these.
+    """Return joints and recorded positions before their units are known, with their stated units.
 
     Raises:
-        LogError: If a unit that is told is not known, or does not fit.
+        LogError: If a stated unit is not known, or does not fit.
         OptionError: If an option does not fit the log.
     """
-    roles, tellers = content.roles, _tellers(plan, options)
+    roles, sources = content.roles, _unit_sources(plan, options)
     q = _corrected(content.values(roles.joints), *_corrections(options, len(roles.joints)))
-    position = () if roles.measured else roles.position  # from outside, it says nothing in the base's frame
-    told = (told_joints(tellers, roles.joints, robot), told_lengths(tellers, position))
-    joints, lengths = (tuple(one.unit if one else None for one in group) for group in told)
+    stated = (sources.of_joints(roles.joints, robot), sources.of_lengths(roles.position))
+    joints, lengths = (tuple(item.unit if item else None for item in group) for group in stated)
     names = tuple(column.name for column in roles.joints)
-    return Recorded(names, q, content.values(position), joints, lengths)
+    return Recorded(names, q, content.values(roles.position), joints, lengths)
 
 
-def _tellers(plan: Plan, options: ReadOptions) -> Tellers:
+def _unit_sources(plan: Plan, options: ReadOptions) -> UnitSources:
     file, given = plan.tables.layouts[plan.main].file, options.source is not None
-    return Tellers(plan.units, plan.tables.known, file, given)
+    return UnitSources(plan.units, plan.tables.known, file, given)
 
 
 def _measured(
@@ -183,32 +178,32 @@ def _measured(
     options: ReadOptions,
 ) -> _Measured:
     """Return what was recorded in SI: the units of the joints first, since others rest on them."""
-    roles, tellers = content.roles, _tellers(plan, options)
+    roles, sources = content.roles, _unit_sources(plan, options)
     signs, _ = _corrections(options, len(roles.joints))
     q, qd, qdd, tcp, rotation = (content.values(group) for group in roles.groups)
-    refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], tellers.file)
+    refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], sources.file)
     raw = recorded(plan, content, options, robot)
     q, qd, qdd = raw.q, _corrected(qd, signs), _corrected(qdd, signs)
-    finder = UnitFinder(tellers, by_kinematics(robot, raw))
+    finder = UnitFinder(sources, prove_by_kinematics(robot, raw))
     clock = None if content.clock is None or content.still else t_ns
     judged = np.sort(q, axis=0) if content.still else q  # in no order, poses have no wraps
     units = finder.joints(roles.joints, judged, clock, robot) if roles.joints else []
     rates = finder.derivatives(roles.rates, units, 1)
     seconds = finder.derivatives(roles.accelerations, units, 2)
     q = _in_si(q, units)
-    lengths, why = _lengths(plan, finder, roles, robot, q, tcp)
+    lengths = finder.positions(roles.position, tcp, arm=bool(roles.joints)) if roles.position else []
     tcp = _in_si(tcp, lengths)
-    if len(roles.position) == 2:
+    planar = len(roles.position) == 2
+    if planar:
         tcp = np.column_stack((tcp, np.zeros(len(tcp))))
-        why = (*why, Inference("z of the position", "0 m", "x and y are given alone"))
-    told = finder.rotations(roles.rotation, roles.forms)
+    stated = finder.rotations(roles.rotation, roles.forms)
     arm = (robot, q) if robot and roles.joints else None
     given = options.rotation is not None
-    measured = tcp if roles.measured else None
+    base = finder.kinematic.base if finder.kinematic else None
     rotation, between = without_interpolated(rotation, [column.name for column in roles.rotation])
-    turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm, given=given, measured=measured)
+    turned = settle_rotation(roles.rotation, roles.forms, rotation, stated, arm, base, form_given=given)
     if turned.form:
-        finder.tell_reach(roles.rotation, told, turned.units, "rotation", "the orientation is")
+        finder.warn_not_reached(roles.rotation, stated, turned.units, "rotation", "the orientation is")
     turning = [roles.rotation[k] for k in turned.order]
     rotation, contradicted = without_contradicted(
         _in_si(rotation[:, turned.order], turned.units),
@@ -226,23 +221,15 @@ def _measured(
             _Group(turning, rotation, turned.units),
         ),
         form=turned.form,
-        inferences=(*finder.inferences, *why, *turned.inferences),
+        inferences=(
+            *finder.inferences,
+            *([Inference("z of the position", "0 m", "x and y are given alone")] if planar else []),
+            *turned.inferences,
+        ),
         warnings=(*finder.warnings, *between, *turned.warnings, *contradicted),
         doubts=doubts,
         by_source=finder.by_source,
     )
-
-
-def _lengths(
-    plan: Plan, finder: UnitFinder, roles: Roles, robot: Chain | None, q: FloatArray, position: FloatArray
-) -> tuple[Sequence[Unit], Sequence[Inference]]:
-    """Return the units of x, y, z; of measured ones that tell none by how far the joints move them."""
-    told = any(column.number in plan.units or column.unit_text for column in roles.position)
-    if roles.measured and robot and roles.joints and not told:
-        found = length_by_spread(robot, q, position)
-        if found is not None:
-            return [found[0]] * 3, [unit_inference(roles.position, found[0].name, found[1], every=False)]
-    return (finder.positions(roles.position, position) if roles.position else []), ()
 
 
 def _times(

@@ -15,11 +15,11 @@ from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.rounded import are_many, behind_repeated, spread_repeated
+from urmpipe_pipeline.sources.columns.questions import unit_hints
 from urmpipe_pipeline.sources.tables.numbers import NO_TIME, SHOWN_FINDINGS, UNREADABLE, Numbers
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.rows import ROWS_READ
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 
 FAR_BACK = 10.0
 """Median periods: a clock that falls back by more, to about its first time, begins again."""

@@ -23,7 +23,8 @@ from urmpipe_pipeline.sources.columns.blocks import period_of
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
-from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
+
+FASTEST = 20.0  # [rad/s] or [m/s], which no joint of an arm exceeds from pose to pose
 
 STEP = (
     FASTEST * PAPER_PERIOD

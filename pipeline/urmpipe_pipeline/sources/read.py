@@ -28,7 +28,7 @@ from urmpipe_pipeline.sources.tables.own_tables import roles_of
 from urmpipe_pipeline.sources.tables.reachable import unchanged
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.topics import plan_topic
-from urmpipe_pipeline.sources.units.kinematic_units import Recorded
+from urmpipe_pipeline.sources.units.proofs import Recorded
 from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
 
 

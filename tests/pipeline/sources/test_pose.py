@@ -15,9 +15,9 @@ from urmpipe_models.math3d import rotation_angle
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.units.evidence import SAMPLES
+from urmpipe_pipeline.sources.units.proofs import SAMPLES
 from urmpipe_pipeline.sources.units.rotation import settle_rotation
-from urmpipe_pipeline.sources.units.told import Told
+from urmpipe_pipeline.sources.units.units import StatedUnit
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 Read = Callable[..., JointLog]
@@ -117,7 +117,7 @@ def test_rows_spread_over_a_long_log_tell_the_unit_of_its_orientation() -> None:
     turned[1::2] = 0.0
     columns = [Column(k + 1, 0, k, name, name, name, None, text=False) for k, name in enumerate("abc")]
     rad = vocabulary().units["rad"]
-    told = (Told(rad, "name", "its name"),) * 3
+    told = (StatedUnit(rad, "name", "its name"),) * 3
     settled = settle_rotation(columns, ("vector",), turned, told, (UR5E, Q[rows]))
     assert [unit.name for unit in settled.units] == ["deg"] * 3
 

@@ -17,9 +17,9 @@ from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.halves import EPOCH
 from urmpipe_pipeline.sources.clocks.steps import steps_of
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.columns.questions import unit_hints
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.units.unit_evidence import peak
-from urmpipe_pipeline.sources.units.unit_hints import unit_hints
+from urmpipe_pipeline.sources.units.proofs import peak
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
 
 SHORTEST, LONGEST = 0.0005, 1.0

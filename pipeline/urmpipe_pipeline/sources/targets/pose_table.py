@@ -15,6 +15,7 @@ from urmpipe_models.math3d import FORMS, RotationForm, column_count
 from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed
+from urmpipe_pipeline.sources.columns.questions import unit_inference
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.numbers import RowFault
@@ -24,9 +25,7 @@ from urmpipe_pipeline.sources.targets.row_faults import ExtraColumn, Rows, read_
 from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
 from urmpipe_pipeline.sources.targets.target_rotation import rotation_units, target_form, target_rotations
 from urmpipe_pipeline.sources.units.rotation import form_inference
-from urmpipe_pipeline.sources.units.told import Tellers
-from urmpipe_pipeline.sources.units.unit_hints import unit_inference
-from urmpipe_pipeline.sources.units.units import LONGEST_REACH, UnitFinder
+from urmpipe_pipeline.sources.units.units import MAX_REACH, UnitFinder, UnitSources
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 
@@ -139,7 +138,7 @@ def _poses(
     plan: Plan, rows: Rows, form: RotationForm | None, further: Mapping[str, ExtraColumn]
 ) -> PoseTable:
     """Return the rows in SI, the pose of a row with a fault as NaN, and what was found out about units."""
-    finder = UnitFinder(Tellers(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
+    finder = UnitFinder(UnitSources(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
     columns = plan.roles.rotation
     placed, turned, others = np.split(rows.values.copy(), [3, 3 + len(columns)], axis=1)
     for part in (placed, turned):
@@ -187,7 +186,7 @@ def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[l
     source = plan.tables.known.units if plan.tables.known else {}
     told = "length" in source or any(one.unit or one.number in plan.units for one in columns)
     nearest = np.abs(_finite(values)).max(axis=1).min(initial=np.inf)
-    if told or not LONGEST_REACH < nearest < np.inf:
+    if told or not MAX_REACH < nearest < np.inf:
         return units, []
     said = f"no unit is given for {listed(columns)}: they are taken as m, though every row is beyond any arm"
     hints = (Hint("unit", {"": "mm"}, "overrides this"),)
@@ -205,7 +204,7 @@ def _further(
     found, said = {}, []
     for (name, column), cells in zip(plan.roles.further.items(), values.T, strict=True):
         factor = 1.0
-        if further[name].length and finder.tellers.of(column, ("length",)):
+        if further[name].length and finder.sources.find(column, ("length",)):
             factor = finder.positions([column], np.zeros((1, 1)))[0].factor
         elif further[name].length:
             factor = lengths[0].factor

@@ -12,10 +12,10 @@ from urmpipe_models.math3d import RotationForm, is_angular, to_matrices, to_quat
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.pose import ORTHOGONAL
+from urmpipe_pipeline.sources.columns.questions import unit_hints
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.tables.numbers import RowFault
 from urmpipe_pipeline.sources.units.rotation import PURE
-from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 UNIT_NORM = 1e-3

@@ -29,8 +29,7 @@ from urmpipe_models.math3d import (
 )
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.units.evidence import mean_turn, spread
-from urmpipe_pipeline.sources.units.unit_evidence import ONE_TURN, peak
+from urmpipe_pipeline.sources.units.proofs import ONE_TURN, mean_turn, peak, spread
 
 MOST_BETWEEN = 8
 """Rows between two samples: a log of 125 Hz resampled to 1 kHz has 7 or 8."""

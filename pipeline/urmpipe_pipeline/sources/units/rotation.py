@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,25 +12,30 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Hint
-from urmpipe_models.hand_eye import rotation_residual, solve_hand_eye
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import FORMS, RotationForm, column_count, is_angular, to_matrices, to_quaternions
+from urmpipe_models.math3d import FORMS, RotationForm, column_count, is_angular, to_quaternions
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.units.evidence import spread, turned_apart
-from urmpipe_pipeline.sources.units.told import Told
-from urmpipe_pipeline.sources.units.unit_evidence import ONE_TURN, TWO_TURNS, peak, usual_peak, wraps
-from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints, which_unit
+from urmpipe_pipeline.sources.columns.questions import OTHER_UNIT, unit_hints
+from urmpipe_pipeline.sources.units.proofs import (
+    MARGIN,
+    ONE_TURN,
+    TWO_TURNS,
+    count_wraps,
+    peak,
+    rotation_distances,
+    spread,
+    usual_peak,
+)
+from urmpipe_pipeline.sources.units.units import GIVEN, StatedUnit, doubt_warning
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 PURE = Unit("1", "ratio", 1.0)
 """The unit of quaternions and of matrices."""
 
 CLOSE = 0.03
-"""Orientations agree with the kinematics within this angle in [rad] (1.7 deg) ..."""
-
-CLEARLY = 5.0
-"""... and so many times better than in any other form."""
+"""Median angle in [rad] (1.7 deg) within which orientations agree with the kinematics, `MARGIN` times better
+than in any other form."""
 
 UNIT_LENGTH = 0.02
 """The length of a quaternion may differ from 1 by this: they are printed with two digits or more."""
@@ -73,11 +78,12 @@ class Settled:
     """What a recorded orientation is.
 
     Attributes:
-        form: Its form; None if it cannot be told, and then it is not used.
+        form: Its form; None if nothing shows it, and then it is not used.
         units: The unit of each column.
         order: The places of the columns in the order of the form.
-        inferences: What was found out.
-        warnings: What a person should know.
+        inferences: Form and unit with their evidence.
+        warnings: What is assumed or contradicted.
+        doubt: Why its unit is only assumed; empty where it is given or proved.
     """
 
     form: RotationForm | None = None
@@ -85,61 +91,56 @@ class Settled:
     order: tuple[int, ...] = ()
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
-
-    @property
-    def doubt(self) -> str:
-        """Why its unit is only assumed; empty where it is given or proved."""
-        return next((one.message for one in self.warnings if one.assumption), "")
+    doubt: str = ""
 
 
 def settle_rotation(
     columns: Sequence[Column],
     forms: Sequence[RotationForm],
     values: FloatArray,
-    told: Sequence[Told | None],
+    stated: Sequence[StatedUnit | None],
     arm: tuple[Chain, FloatArray] | None,
+    base: FloatArray | None = None,
     *,
-    given: bool = False,
-    measured: FloatArray | None = None,
+    form_given: bool = False,
 ) -> Settled:
     """Return form and units of the columns of a recorded orientation.
 
-    Where the arm's kinematics agree in another form or unit than those that are told, they decide, unless the
-    user gave them. Without, a unit is held against wraps and size of the values.
+    Where the arm's kinematics agree in another form or unit than those that are stated, they decide, unless
+    the user gave them. Without, a unit is compared with wraps and size of the values.
 
     Args:
         columns: The columns.
-        forms: The forms that their names allow.
+        forms: The forms that their names allow, or the one that the user gave.
         values: Their values in the file's own units, shape (n, columns).
-        told: The unit that is told of each column, if one is.
+        stated: The stated unit of each column, if there is one.
         arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
-        given: Whether the user told the form.
-        measured: Where the tool was measured from outside in [m], shape (n, 3): the orientations stand in a
-            frame of their own as well.
+        base: Rotation from the recorded frame to the robot's [-], shape (3, 3); None for the same frame.
+        form_given: Whether the user gave the form.
     """
     if not columns or np.isnan(values).any(axis=1).all():
         return Settled()
     names = ", ".join(column.name for column in columns)
     sound = [form for form in forms if _is_sound(values, form)]
     if not sound:
-        return Settled(warnings=(_about_lengths(names, np.linalg.norm(values, axis=1)),))
-    choices = [Choice(form, units) for form in sound for units in _possible_units(form, told)]
-    fixed = any(one and one.by == "column" for one in told)
+        return Settled(warnings=(_length_warning(names, np.linalg.norm(values, axis=1)),))
+    choices = [Choice(form, units) for form in sound for units in _possible_units(form, stated)]
     if arm is not None:
-        forms = [one for one in FORMS if column_count(one) == len(columns) and _is_sound(values, one)]
-        others = _others(choices, sound if given else forms, units=not fixed, order=not given)
-        found = _by_kinematics(list(dict.fromkeys((*choices, *others))), choices, values, arm, measured)
+        others = _others(choices, [form for form in FORMS if column_count(form) == len(columns)])
+        every = [c for c in dict.fromkeys((*choices, *others)) if _is_sound(values, c.form)]
+        found = _by_kinematics(every, choices, values, arm, base)
         if found is not None and found.proved:
-            return _settled_by_kinematics(columns, choices, found)
+            given = any(item and item.is_given for item in stated)
+            return _settled_by_kinematics(columns, choices, found, unit_given=given, form_given=form_given)
         choices = [found.choice] if found else choices
-    if len({one.form for one in choices}) > 1:
-        said = f"{names} may be of several forms: the recorded orientation is not used"
+    if len({choice.form for choice in choices}) > 1:
+        message = f"{names} may be of several forms: the recorded orientation is not used"
         hints = tuple(Hint("rotation", form, "specifies it") for form in sound)
-        return Settled(warnings=(LogWarning("orientation", said, hints=hints),))
+        return Settled(warnings=(LogWarning("orientation", message, hints=hints),))
+    by = [item for item in stated if item and item.by != "urmpipe"]
     if len(choices) > 1:
         return _without_unit(columns, choices, values)
-    teller = next((one for one in told if one and not fixed), None)
-    return _with_unit(columns, choices[0], values, teller)
+    return _with_unit(columns, choices[0], values, by)
 
 
 def form_inference(names: Sequence[str], form: RotationForm, unit: Unit, evidence: str) -> Inference:
@@ -156,7 +157,7 @@ def _is_sound(values: FloatArray, form: RotationForm) -> bool:
     return bool(np.nanmax(np.abs(length - 1.0)) <= UNIT_LENGTH)
 
 
-def _about_lengths(names: str, length: FloatArray) -> LogWarning:
+def _length_warning(names: str, length: FloatArray) -> LogWarning:
     """Return what is said of quaternions that are none, by their lengths; with the first row if few are."""
     off = np.abs(length - 1.0) > UNIT_LENGTH
     count, row = int(np.count_nonzero(off)), int(np.argmax(off))
@@ -167,78 +168,87 @@ def _about_lengths(names: str, length: FloatArray) -> LogWarning:
     return LogWarning("orientation", said, row + 1 if few else None)
 
 
-def _possible_units(form: RotationForm, told: Sequence[Told | None]) -> list[tuple[Unit, ...]]:
-    """Return the units that the columns may have: told, or rad or deg."""
+def _possible_units(form: RotationForm, stated: Sequence[StatedUnit | None]) -> list[tuple[Unit, ...]]:
+    """Return the units that the columns may have: stated, or rad or deg."""
     if not is_angular(form):
-        return [(PURE,) * len(told)]
-    known = [one.unit for one in told if one is not None]
+        return [(PURE,) * len(stated)]
+    known = [item.unit for item in stated if item is not None]
     if known:
-        return [tuple(one.unit if one else known[0] for one in told)]
-    return [(vocabulary().units[name],) * len(told) for name in ("rad", "deg")]
+        return [tuple(item.unit if item else known[0] for item in stated)]
+    return [(vocabulary().units[name],) * len(stated) for name in ("rad", "deg")]
 
 
-def _others(
-    choices: Sequence[Choice], forms: Sequence[RotationForm], *, units: bool, order: bool
-) -> Iterator[Choice]:
+def _others(choices: Sequence[Choice], forms: Sequence[RotationForm]) -> Iterator[Choice]:
     """Yield what the columns may be against their names: other forms, units and orders of a matrix."""
-    told = choices[0].units
     for form in forms:
-        if not is_angular(form):
-            yield Choice(form, (PURE,) * len(told))
-            if form == "matrix" and order:
-                yield Choice(form, (PURE,) * len(told), by_columns=True)
-            continue
-        yield Choice(form, told)
-        if units:
-            yield from (Choice(form, (vocabulary().units[name],) * len(told)) for name in ("rad", "deg"))
+        if is_angular(form):
+            yield Choice(form, choices[0].units)
+            yield from (
+                Choice(form, units) for units in _possible_units(form, [None] * len(choices[0].units))
+            )
+        else:
+            yield Choice(form, (PURE,) * len(choices[0].units))
+            if form == "matrix":
+                yield Choice(form, (PURE,) * len(choices[0].units), by_columns=True)
 
 
-def _settled(columns: Sequence[Column], choice: Choice, evidence: str, *warnings: LogWarning) -> Settled:
-    said = form_inference([column.name for column in columns], choice.form, choice.units[0], evidence)
-    return Settled(choice.form, choice.units, choice.order, (said,), warnings)
+def _settled(
+    columns: Sequence[Column], choice: Choice, evidence: str, *warnings: LogWarning, given: bool = False
+) -> Settled:
+    inference = form_inference([column.name for column in columns], choice.form, choice.units[0], evidence)
+    doubt = next((warning.message for warning in warnings if warning.assumption and not given), "")
+    return Settled(choice.form, choice.units, choice.order, (inference,), warnings, doubt)
 
 
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """The choice with which the kinematics agree, by how much, and whether they do in no other unit."""
+class _Found(NamedTuple):
+    """The choice with which the kinematics agree, the nearest stated choice, and the evidence."""
 
     choice: Choice
+    stated: Choice
     evidence: str
     proved: bool
 
 
-def _settled_by_kinematics(columns: Sequence[Column], told: Sequence[Choice], found: _Found) -> Settled:
-    """Return what the kinematics single out, with a warning if it is none of what is told."""
-    best, first = found.choice, told[0]
-    hints: tuple[Hint, ...]
-    if best in told:
+def _settled_by_kinematics(
+    columns: Sequence[Column], stated: Sequence[Choice], found: _Found, *, unit_given: bool, form_given: bool
+) -> Settled:
+    """Return what the kinematics prove, or what the user gave, with a warning if they differ."""
+    best, first = found.choice, found.stated
+    if best in stated:
         return _settled(columns, best, found.evidence)
+    is_same_form = any((choice.form, choice.by_columns) == (best.form, best.by_columns) for choice in stated)
     if best.by_columns:
-        was, now, hints = (
-            "matrix by rows",
-            "matrix by columns",
-            (Hint("rotation", "matrix", "reads it by rows"),),
-        )
-    elif any(one.form == best.form for one in told):
+        was, now = "matrix by rows", "matrix by columns"
+    elif is_same_form:
         was, now = first.units[0].name, best.units[0].name
-        hints = unit_hints(columns, was)
     else:
-        was, now, hints = str(first), str(best), (Hint("rotation", first.form, "overrides this"),)
+        was, now = str(first), str(best)
     names = ", ".join(column.name for column in columns)
-    said = f"{names}: {was} contradicts the kinematics: taken as {now}: {found.evidence}"
-    return _settled(columns, best, found.evidence, LogWarning("unit-contradiction", said, hints=hints))
+    message = f"{names}: {was} contradicts the kinematics: taken as"
+    if unit_given if is_same_form else form_given:
+        message = f"{message} {was}, though as {now} it would fit: {found.evidence}"
+        hints = unit_hints(columns, now) if is_same_form else (Hint("rotation", best.form, "overrides this"),)
+        taken = f"the orientation is {'in ' if is_same_form else ''}{was}"
+        warning = LogWarning("unit-contradiction", message, hints=hints, assumption=taken, role="rotation")
+        return _settled(columns, first, GIVEN, warning, given=True)
+    hints = unit_hints(columns, was) if is_same_form else (Hint("rotation", first.form, "overrides this"),)
+    if best.by_columns:
+        hints = (Hint("rotation", "matrix", "reads it by rows"),)
+    warning = LogWarning("unit-contradiction", f"{message} {now}: {found.evidence}", hints=hints)
+    return _settled(columns, best, found.evidence, warning)
 
 
 def _by_kinematics(
     every: Sequence[Choice],
-    told: Sequence[Choice],
+    stated: Sequence[Choice],
     values: FloatArray,
     arm: tuple[Chain, FloatArray],
-    measured: FloatArray | None,
+    base: FloatArray | None,
 ) -> _Found | None:
     """Return the choice with which the kinematics agree; None if none stands out.
 
-    Of several that cannot be told apart it is the only one that is told.
+    As they are, else with a turned tool, else with a turned base as well. Of several that agree it is the
+    only stated one.
     """
     robot, q = arm
     rows = spread(len(q))
@@ -246,39 +256,25 @@ def _by_kinematics(
     known = np.isfinite(q).all(axis=1) & np.isfinite((values**2).sum(axis=1))  # huge ones have no direction
     if not known.any() or len(every) < 2:
         return None
-    position, rotation = poses_over_log(robot, q[known])
-    recorded = [one.quaternions(values[known]) for one in every]
-    for apart in _apart(position, rotation, None if measured is None else measured[rows][known]):
-        distances = np.array([apart(one) for one in recorded])
+    rotation = poses_over_log(robot, q[known])[1]
+    rotation = rotation if base is None else base.T @ rotation
+    computed = to_quaternions(rotation.reshape(-1, 9), "matrix")
+    each = [rotation_distances(computed, choice.quaternions(values[known])) for choice in every]
+    for distances in np.array(each).T:
         best = distances.min()
-        worse = (distances >= CLEARLY * best) & (distances >= best + CLOSE)
-        rivals = [one for one, excluded in zip(every, worse, strict=True) if not excluded]
-        chosen = [one for one in rivals if one in told] or rivals
+        worse = (distances >= MARGIN * best) & (distances >= best + CLOSE)
+        rivals = [choice for choice, excluded in zip(every, worse, strict=True) if not excluded]
+        chosen = [choice for choice in rivals if choice in stated] or rivals
         if best <= CLOSE and worse.any() and len(chosen) == 1:
             own = every.index(chosen[0])
-            beaten = range(len(told)) if chosen[0] not in told else np.flatnonzero(worse).tolist()
-            second = min(beaten, key=distances.__getitem__)  # every choice begins with what is told
-            said = f"with it the arm's orientation agrees within {np.degrees(distances[own]):.2f} deg"
-            said += f", as {every[second]} within {np.degrees(distances[second]):.2f} deg"
-            return _Found(chosen[0], said, all(one.units == chosen[0].units for one in rivals))
+            beaten = range(len(stated)) if chosen[0] not in stated else np.flatnonzero(worse).tolist()
+            second = min(beaten, key=distances.__getitem__)  # every choice begins with the stated ones
+            evidence = f"with it the arm's orientation agrees within {np.degrees(distances[own]):.2f} deg"
+            evidence += f", as {every[second]} within {np.degrees(distances[second]):.2f} deg"
+            nearest = every[min(range(len(stated)), key=distances.__getitem__)]
+            proved = all(choice.units == chosen[0].units for choice in rivals)
+            return _Found(chosen[0], nearest, evidence, proved)
     return None
-
-
-def _apart(
-    position: FloatArray, rotation: FloatArray, measured: FloatArray | None
-) -> Iterator[Callable[[FloatArray], float]]:
-    """Yield what tells how far orientations stay from those of the kinematics in [rad], the strictest first.
-
-    In the frame of the base as they are, then with a tool that is turned; of those that were measured from
-    outside, at positions in [m], shape (n, 3), with the frames of base and tool that fit best.
-    """
-    if measured is None:
-        computed = to_quaternions(rotation.reshape(-1, 9), "matrix")
-        yield partial(turned_apart, computed, tool=False)
-        yield partial(turned_apart, computed, tool=True)
-    elif np.isfinite(measured).all(axis=1).any():
-        base = solve_hand_eye(position, rotation, measured).base_rotation
-        yield lambda recorded: rotation_residual(rotation, to_matrices(recorded), base)
 
 
 def _without_unit(columns: Sequence[Column], choices: Sequence[Choice], values: FloatArray) -> Settled:
@@ -299,28 +295,27 @@ def _without_unit(columns: Sequence[Column], choices: Sequence[Choice], values: 
     return _settled(columns, choice, "their names", warning)
 
 
-def _with_unit(columns: Sequence[Column], choice: Choice, values: FloatArray, told: Told | None) -> Settled:
-    """Return columns in the unit that is told, doubted where wraps or size of angles speak against it.
+def _with_unit(
+    columns: Sequence[Column], choice: Choice, values: FloatArray, by: Sequence[StatedUnit]
+) -> Settled:
+    """Return columns in their stated unit, doubted where wraps or size of angles contradict it.
 
-    No verdict rests on one that they exclude. Values are in the file's own units, shape (n, columns).
+    No verdict rests on one that they exclude, unless the user gave it. Values are in the file's own units,
+    shape (n, columns).
     """
-    if told is None:
-        return _settled(columns, choice, "their names")
     unit, size = choice.units[0].name, usual_peak(values)
     wrapped, why = _unit_by_wraps(values, choice.form) or ("", "")
-    large = size > ONE_TURN
-    if wrapped == unit or (not wrapped and large == (unit == "deg")) or not peak(values) > 0:
+    is_large = size > ONE_TURN
+    is_likely = wrapped == unit if wrapped else is_large == (unit == "deg")
+    is_likely |= not wrapped and any(item.is_confirmed for item in by)
+    if not by or is_likely or not peak(values) > 0:
         return _settled(columns, choice, "their names")
     if not wrapped:
-        likely = "are more than a turn as rad" if large else "may be rad as well"
-        why = f"values of {size:.6g} {likely}"
-    names = ", ".join(column.name for column in columns)
-    said, taken = f"{names}: {unit} ({told.evidence}) is doubted: {why}", f"the orientation is in {unit}"
-    asks, hints = bool(wrapped) or size > TWO_TURNS, which_unit(columns, unit, every=False)
-    warning = LogWarning(
-        "doubted-unit", said, hints=hints, assumption=taken, role="rotation", blocks_verdict=asks
-    )
-    return _settled(columns, choice, "their names", warning)
+        why = f"values of {size:.6g} {'are more than a turn as rad' if is_large else 'may be rad as well'}"
+    warning = doubt_warning(columns, by, unit, why, "the orientation is", "rotation")
+    given = by[0].is_given
+    warning = replace(warning, blocks_verdict=not given and (bool(wrapped) or size > TWO_TURNS))
+    return _settled(columns, choice, "their names", warning, given=given)
 
 
 def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | None:
@@ -330,7 +325,7 @@ def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | 
         lengths = np.linalg.norm(np.diff(known, axis=0), axis=1)
         known = np.concatenate(([0.0], np.cumsum(lengths)))[:, np.newaxis]
     likely, turn = ("deg", "360") if peak(values) > ONE_TURN else ("rad", "6.28")
-    count = int(wraps(known, likely).sum())
+    count = int(count_wraps(known, likely).sum())
     return (
         (likely, f"{format_count(count, 'step')} of about {turn} from one row to the next") if count else None
     )
