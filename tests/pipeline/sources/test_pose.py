@@ -107,7 +107,7 @@ def test_the_kinematics_tell_of_a_rotation_vector_in_another_unit_than_its_names
     )
     assert warning.message.endswith(" deg")
     given = read(table, UR5E, unit={"rotvec_x": "rad"})
-    assert given.units["rotvec_z"] == "rad"
+    assert (given.units["rotvec_z"], given.warnings[0].assumption) == ("rad", "the orientation is in rad")
 
 
 def test_rows_spread_over_a_long_log_tell_the_unit_of_its_orientation() -> None:

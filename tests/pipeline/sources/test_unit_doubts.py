@@ -122,21 +122,13 @@ def test_small_poses_in_degrees_are_no_wraps_of_radians(read: Read) -> None:
     assert assumed(log) == [("the joints are in deg", "joint", False)]
 
 
-def test_limits_confirm_what_the_header_says(read: Read, arm: Arm) -> None:
-    limited = arm(6)
-    limited = replace(limited, joints=tuple(replace(j, lower=-2.0, upper=2.0) for j in limited.joints))
-    for unit, values in (("deg", Q * 4), ("rad", Q * 0.8)):
-        names = [f"phi{k} [{unit}]" for k in range(1, 7)]
-        assert not read(csv(names, values), limited).warnings
-
-
 UNLABELLED: Mapping[str, tuple[FloatArray, FloatArray, str]] = {
     "spikes of 360 in rad": (np.where(np.arange(ROWS)[:, None] % 50 == 20, 360.4, Q[:, :1]), T, "asked"),
     "a value of 360 held": (np.where(np.abs(np.arange(ROWS)[:, None] - 50) < 5, 360.7, Q[:, :1]), T, "asked"),
     "a clock that hurries": (
         5 * T[:, None],
         np.repeat(T[::4], 4) + np.tile(np.arange(4) * 1e-5, ROWS // 4),
-        "rad",
+        "asked",
     ),
     "a clock in another unit": (5 * T[:, None], T / 1e3 * 5, "deg"),
     "a slide in mm": (np.column_stack((Q[:, :2], 300 + 200 * np.sin(T))), T, "asked"),
@@ -146,7 +138,7 @@ UNLABELLED: Mapping[str, tuple[FloatArray, FloatArray, str]] = {
 
 
 @pytest.mark.parametrize("case", UNLABELLED)
-def test_without_a_unit_nothing_but_wraps_and_limits_is_a_proof(case: str, read: Read, wrong: Wrong) -> None:
+def test_without_a_unit_nothing_but_wraps_is_a_proof(case: str, read: Read, wrong: Wrong) -> None:
     values, t, taken = UNLABELLED[case]
     table = csv(joints(count=values.shape[1]), values, t=t)
     if taken == "asked":
@@ -163,9 +155,9 @@ def test_wraps_prove_radians_without_a_unit(read: Read) -> None:
     assert not log.warnings
 
 
-def test_a_spike_beyond_the_limits_of_the_robot_is_no_proof(read: Read, wrong: Wrong) -> None:
+def test_one_bad_row_decides_on_no_unit(read: Read) -> None:
     spiky = np.where(np.arange(ROWS)[:, None] == 77, 100.0, Q)
-    assert " and no unit, allowed: rad or deg" in wrong(csv(joints(), spiky), UR5E)[0]
+    assert assumed(read(csv(joints(), spiky), UR5E)) == [("the joints are in rad", "joint", False)]
     assert not read(csv(joints(" [rad]"), spiky), UR5E).warnings
 
 
@@ -184,7 +176,7 @@ def test_the_kinematics_name_the_one_joint_that_lies(read: Read) -> None:
     np.testing.assert_allclose(log.q, Q, atol=PRINTED)
     (warning,) = log.warnings
     assert warning.message.startswith(
-        "q3: rad (its name) contradicts the kinematics: taken as deg: with it the arm"
+        "q3: rad (its name) contradicts the kinematics: taken as deg: with it the kinematics follow"
     )
     assert warning.hints[0].value == {"q3": "rad"}
 
@@ -374,3 +366,62 @@ def test_the_same_unit_for_every_angle_confirms_the_names(read: Read) -> None:
     assert not read(csv(joints(" [deg]"), Q), unit={"": "deg"}).warnings
     with pytest.raises(LogError, match="found q1, q2, q3, q4, q5, q6 in deg by name or source"):
         read(csv(joints(" [deg]"), WRAPPED), unit={"": "rad"})
+
+
+@pytest.mark.parametrize("by_column", [False, True])
+@pytest.mark.parametrize(
+    ("unit", "values", "why"),
+    [
+        ("deg", Q, "values of no more than 2.39999 may be rad as well"),
+        ("deg", WRAPPED, "2 steps of about 6.28 from one row to the next"),
+        ("rad", 6 * Q, "values of 14.3964 are more than two turns as rad"),
+        ("rad", WRAPPED * DEG, "2 steps of about 360 from one row to the next"),
+        ("rad", Q * 2, None),
+        ("deg", Q * DEG, None),
+        ("deg", WRAPPED * DEG, None),
+        ("rad", WRAPPED, None),
+    ],
+)
+def test_a_given_unit_is_used_and_what_contradicts_it_is_named(
+    unit: str, values: FloatArray, why: str | None, by_column: bool, read: Read, write: Write
+) -> None:
+    """A saved map is applied to a file in other units: not in silence."""
+    given = dict.fromkeys(joints(), unit) if by_column else {"": unit}
+    log = read(csv(joints(), values), unit=given)
+    np.testing.assert_allclose(log.q, values / (DEG if unit == "deg" else 1.0), atol=PRINTED)
+    assert assumed(log) == ([(f"the joints are in {unit}", "joint", False)] if why else [])
+    if why is not None:
+        (warning,) = log.warnings
+        other = "rad" if unit == "deg" else "deg"
+        assert f": {unit} (given as an option) is used, though {why}" in warning.message
+        assert warning.hints[0].value == dict.fromkeys(joints(), other)
+        lab = write(format_map(map_of(log)), "lab.toml")
+        again = read_log([write(csv(joints(), values))], read_map(lab))
+        assert (again.units, assumed(again)) == (log.units, assumed(log))
+
+
+@pytest.mark.parametrize(
+    ("unit", "values", "taken"),
+    [("rad", EULER * DEG, "rad"), ("deg", EULER, "deg"), ("deg", EULER * DEG, None), ("rad", SPINNING, None)],
+)
+def test_a_given_unit_of_an_orientation_is_compared_with_its_size_and_wraps(
+    unit: str, values: FloatArray, taken: str | None, read: Read
+) -> None:
+    table = csv([*joints(" [rad]"), *XYZ, *RPY], Q, FLANGE, values)
+    log = read(table, unit=dict.fromkeys(RPY, unit))
+    assert log.units["yaw"] == unit
+    assert assumed(log) == ([(f"the orientation is in {taken}", "rotation", False)] if taken else [])
+
+
+def test_a_given_form_or_unit_of_an_orientation_that_contradicts_the_kinematics_is_used(read: Read) -> None:
+    table = csv([*joints(" [rad]"), *XYZ, "rx", "ry", "rz"], Q, FLANGE, ROTATION.as_rotvec())
+    log = read(table, UR5E, rotation="rpy")
+    assert (log.rotation_form, assumed(log)) == (
+        "rpy",
+        [("the orientation is rpy in rad", "rotation", False)],
+    )
+    (warning,) = log.warnings
+    assert "taken as rpy in rad, though as vector in rad it would fit: with it the arm's" in warning.message
+    follow_hints(lambda **given: read(table, UR5E, **given), log)
+    log = read(table, UR5E, rotation="vector", unit=dict.fromkeys(("rx", "ry", "rz"), "deg"))
+    assert (log.units["rx"], assumed(log)) == ("deg", [("the orientation is in deg", "rotation", False)])

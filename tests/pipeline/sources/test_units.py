@@ -98,7 +98,10 @@ def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
     )
     assert log.q[0].tolist() == [30.0, 0.5 * DEG, 0.005]
     assert log.period == 0.6
-    assert not log.warnings
+    assert [(w.message.split(", though")[0], w.assumption) for w in log.warnings] == [
+        ("q1: rad (given as an option) is used", "q1 is in rad"),
+        ("q2: deg (given as an option) is used", "q2 is in deg"),
+    ]
     assert wrong(text, unit={"": "mm"}) == ["unit (--unit): found 'mm', allowed: rad, deg"]
     assert wrong(text, unit={"q1": "inch"}) == [
         "unit (--unit): found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
@@ -167,17 +170,13 @@ def test_speeds_that_no_joint_reaches_are_a_reason_to_assume_degrees(read: Read)
     ]
 
 
-def test_the_robots_limits_tell_degrees(read: Read, arm: Arm, wrong: Wrong) -> None:
-    text = "10,-20,170\n-120,80,90\n"
-    assert wrong(text, arm(3))[0].startswith(
-        "log.csv: found values up to 170 in phi1, phi2, phi3 and no unit"
-    )
+def test_the_robots_limits_prove_no_unit(arm: Arm, wrong: Wrong) -> None:
+    """Values beyond them in rad may be ticks as well as deg."""
     limited = arm(3)
     limited = replace(limited, joints=tuple(replace(j, lower=-6.3, upper=6.3) for j in limited.joints))
-    log = read(text, limited)
-    assert log.units == {"phi1": "deg", "phi2": "deg", "phi3": "deg"}
-    said = "values up to 170 are beyond the robot's limits as rad and within them as deg"
-    assert evidence(log, "unit of phi1, phi2, phi3") == said
+    for robot in (arm(3), limited):
+        asked = wrong("10,-20,170\n-120,80,90\n", robot)[0]
+        assert asked.startswith("log.csv: found values up to 170 in phi1, phi2, phi3 and no unit")
 
 
 def test_slow_large_values_may_be_either(wrong: Wrong) -> None:
@@ -187,17 +186,17 @@ def test_slow_large_values_may_be_either(wrong: Wrong) -> None:
     ]
 
 
-def test_a_few_turns_stay_radians(read: Read) -> None:
-    log = read(csv_of(np.linspace(-20, 20, 2000)[:, np.newaxis]))
-    assert log.units["q1"] == "rad"
+def test_up_to_two_turns_are_radians_and_more_are_asked_about(read: Read, wrong: Wrong) -> None:
+    assert read(csv_of(np.linspace(-12, 12, 2000)[:, np.newaxis])).units["q1"] == "rad"
+    assert " and no unit, allowed: rad or deg" in wrong(csv_of(np.linspace(-20, 20, 2000)[:, np.newaxis]))[0]
 
 
-def test_outliers_and_noise_do_not_tell_degrees(read: Read) -> None:
+def test_outliers_and_noise_prove_no_degrees(read: Read, wrong: Wrong) -> None:
     values = np.linspace(-3, 3, 500)
     values[[100, 200, 300]] = [20.0, -20.0, 15.0]
     assert read(csv_of(values[:, np.newaxis])).units["q1"] == "rad"
     noise = np.random.default_rng(1).normal(0, 5, (500, 1))  # too fast for rad, and for deg as well
-    assert read(csv_of(noise, 0.001)).units["q1"] == "rad"
+    assert " and no unit, allowed: rad or deg" in wrong(csv_of(noise, 0.001))[0]
 
 
 def test_a_joint_without_unit_is_like_the_others(read: Read) -> None:
@@ -225,7 +224,16 @@ def test_positions_are_not_rescaled_because_they_look_too_far(read: Read) -> Non
         told = read(table, unit=hint.value)
         assert told.tcp_position is not None
         np.testing.assert_allclose(told.tcp_position[0], np.array([350, -659, 625]) / per_m, rtol=1e-15)
-        assert not [one for one in told.warnings if one.role == "position"]
+        assumed = [one.assumption for one in told.warnings if one.role == "position"]
+        assert assumed == (["the positions are in m"] if per_m == 1.0 else [])  # m is used, and not likely
+
+
+def test_positions_far_beyond_an_arm_are_in_mm_beside_its_joints(read: Read) -> None:
+    log = read("t,q1 [rad],x,y,z\n0,0.1,350,-659,625\n0.1,0.2,351,-658,625\n")
+    assert log.tcp_position is not None
+    np.testing.assert_allclose(log.tcp_position[0], [0.35, -0.659, 0.625], rtol=1e-15)
+    (warning,) = log.warnings
+    assert (warning.assumption, warning.blocks_verdict) == ("the positions are in mm", False)
 
 
 def test_a_spike_among_positions_changes_no_unit(read: Read) -> None:

@@ -62,7 +62,7 @@ DECOYS = (0.5, 2.0)  # scales of all joints or lengths that a proof excludes as 
 FREE_BASE = 3  # index of the last of the four fits
 MIN_ROWS = (1, 5, 8, 12)  # of each fit: at least twice as many numbers as unknowns
 MAX_COORDINATE = 1e15  # in any unit; a larger one is an error of its file, and its square is infinite
-CELLS = 50  # of the size of the motion: rows at rest count as one
+CELLS = 50  # of the motion of the joint that moves most: rows at rest count as one
 REJECTED = 3.0  # times the median residual, from which a row is left out of a fit
 MIN_TURN = 0.1  # standard deviation as rad, below which a joint is not told apart from another base or tool
 TURNS = 60  # rows whose pairs decide on an orientation
@@ -113,7 +113,7 @@ def has_both(q: FloatArray, position: FloatArray) -> BoolArray:
 
 
 def moving_rows(q: FloatArray, position: FloatArray) -> IndexArray:
-    """Return the rows that decide: with both, each place once, as an arm often rests, and no gross outliers.
+    """Return the rows that decide: with both, each pose once, as an arm often rests, and no gross outliers.
 
     Args:
         q: Joint values in the file's own units, shape (n, joints).
@@ -121,22 +121,22 @@ def moving_rows(q: FloatArray, position: FloatArray) -> IndexArray:
     """
     rows = np.arange(0, len(q), max(1, len(q) // (5 * SAMPLES)))
     rows = rows[has_both(q[rows], position[rows]) & (np.abs(position[rows]) < MAX_COORDINATE).all(axis=1)]
-    sparse = rows
-    for share in (0.99, 0.9, 0.5):  # of the rows that are near enough to tell the size of the motion
-        size = _quantile(_distances(position[rows]), share)
-        cells = np.rint(position[rows] * (CELLS / (size or 1.0)))
-        sparse = rows[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
-        far = _distances(position[sparse])
-        sparse = sparse[far <= 10 * _quantile(far, 0.5)]
+    if not len(rows):
+        return rows
+    turned, sparse = np.abs(q[rows] - np.median(q[rows], axis=0)), rows
+    for share in (0.99, 0.9):  # of the rows, which tell the size of the motion unless they are bad
+        cell = max(_quantile(joint, share) for joint in turned.T) / CELLS or 1.0
+        sparse = rows[np.sort(np.unique(np.rint(q[rows] / cell), axis=0, return_index=True)[1])]
         if len(sparse) >= MIN_ROWS[-1]:
             break
+    far = _distances(position[sparse])
+    sparse = sparse[far <= 10 * _quantile(far, 0.5)]
     return sparse[spread(len(sparse))]
 
 
 def _distances(points: FloatArray) -> FloatArray:
     """Return how far points are from their median, shape (n,)."""
-    middle = np.median(points, axis=0) if len(points) else np.zeros(3)
-    return np.asarray(np.linalg.norm(points - middle, axis=1))
+    return np.asarray(np.linalg.norm(points - np.median(points, axis=0), axis=1))
 
 
 def fit_recorded(

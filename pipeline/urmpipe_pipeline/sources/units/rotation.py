@@ -213,7 +213,7 @@ def _settled_by_kinematics(
     columns: Sequence[Column], stated: Sequence[Choice], found: _Found, *, unit_given: bool, form_given: bool
 ) -> Settled:
     """Return what the kinematics prove, or what the user gave, with a warning if they differ."""
-    best, first = found.choice, found.stated
+    best, first = found.choice, found.stated if unit_given or form_given else stated[0]
     if best in stated:
         return _settled(columns, best, found.evidence)
     is_same_form = any((choice.form, choice.by_columns) == (best.form, best.by_columns) for choice in stated)

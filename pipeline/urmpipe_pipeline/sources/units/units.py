@@ -197,7 +197,8 @@ def find_doubt(unit: str, values: FloatArray, t_ns: IntArray | None, turns: floa
     size = usual_peak(values)
     if unit == "rad":
         is_small = size <= turns or wraps_as_radians(values)
-        return None if is_small else f"values of {size:.6g} are more than a turn as rad"
+        limit = "a turn" if turns == ONE_TURN else "two turns"
+        return None if is_small else f"values of {size:.6g} are more than {limit} as rad"
     if (
         size > TWO_TURNS
         or not peak(values) > 0
