@@ -204,7 +204,7 @@ def test_a_date_beside_a_number_does_not_matter(read: Read) -> None:
 
 def test_gaps(read: Read) -> None:
     times = np.cumsum([0, *[0.01] * 10, 0.031, *[0.01] * 5, 5.0, *[0.01] * 3])
-    log = read(clocked("t", *(f"{time:.3f}" for time in times)))
+    log = read(clocked("t", *(f"{time:.3f}" for time in times)), unit={"": "deg"})
     assert [(w.kind, w.row, w.message) for w in log.warnings if w.kind == "gap"] == [
         ("gap", 12, "2 gaps: 0.031 s pass before this row, 5 s before row 18; the median period is 0.01 s")
     ]
@@ -288,7 +288,7 @@ def test_rows_that_share_a_time_are_spread(
     read: Read, stamps: list[int], times: list[float], kind: str, assumed: bool
 ) -> None:
     """Up to the next one, or back to the one before where the numbers of rows show it (received chunks)."""
-    log = read(clocked("t [s]", *map(str, sorted(stamps))))
+    log = read(clocked("t [s]", *map(str, sorted(stamps))), unit={"": "deg"})
     np.testing.assert_allclose(log.t, times, rtol=0, atol=1e-9)
     (warning,) = (one for one in log.warnings if "repeat" in one.message)
     assert (warning.kind, bool(warning.assumption)) == (kind, assumed)

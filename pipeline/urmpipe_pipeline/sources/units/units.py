@@ -65,7 +65,7 @@ class StatedUnit:
         by: The user for this column or for every angle, its name, the source, the source that the user gave,
             or its name in a file that urmpipe wrote.
         evidence: The same in words.
-        is_confirmed: Whether the user gives what the name states.
+        is_confirmed: Whether the user gives what the name states, or the source that states it.
     """
 
     unit: Unit
@@ -152,7 +152,7 @@ class UnitSources:
         if self.source is None or default is None:
             return None
         by: Literal["source", "given source"] = "given source" if self.source_given else "source"
-        return StatedUnit(default, by, f"{self.source.name} writes {default.name}")
+        return StatedUnit(default, by, f"{self.source.name} writes {default.name}", self.source_given)
 
     def of_joints(self, columns: Sequence[Column], robot: Chain | None) -> list[StatedUnit | None]:
         """Return the stated units of the joints; raises as `find`, also if one does not fit the robot."""
