@@ -83,7 +83,6 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
     from urmpipe_pipeline.solved_targets.result import IkResult as IkResult
     from urmpipe_pipeline.sources import LogMap as LogMap
-    from urmpipe_pipeline.sources import ReadOptions as ReadOptions
     from urmpipe_pipeline.tables import Exported as Exported
 
 __version__ = "0.1.0"
@@ -115,7 +114,6 @@ _HOME = {
     "PathError": "urmpipe_models.errors",
     "PathRows": "urmpipe_models.planning.path",
     "PlannedPath": "urmpipe_pipeline.planned_paths.result",
-    "ReadOptions": "urmpipe_pipeline.sources",
     "RecordingError": "urmpipe_models.errors",
     "Report": "urmpipe.api.report",
     "RobotError": "urmpipe_models.errors",

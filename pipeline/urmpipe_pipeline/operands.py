@@ -40,7 +40,7 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.sources import MemoryTable, ReadOptions
+from urmpipe_pipeline.sources import LogMap, MemoryTable
 from urmpipe_pipeline.sources.tables.bag_file import is_bag_folder
 from urmpipe_pipeline.sources.tables.lerobot import is_data_set
 from urmpipe_pipeline.sources.vocabulary import key
@@ -65,7 +65,7 @@ def load_runs(
     *,
     sides: tuple[str, str] | None = None,
     robot: Chain | None = None,
-    read: ReadOptions | None = None,
+    read: LogMap | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
     block: str | Sequence[str] | None = None,
@@ -93,7 +93,7 @@ def load_runs(
         OptionError: If there are sides of anything except one log, or blocks without a simulation.
     """
     shared = sum(map(is_log, operands)) > 1
-    read, blocks = replace(read or ReadOptions(), shared=shared), _Blocks(block)
+    read, blocks = replace(read or LogMap(), shared=shared), _Blocks(block)
 
     def load(operand_side: tuple[Operand, tuple[str, str] | None]) -> Run:
         operand, side = operand_side
@@ -139,7 +139,7 @@ def load_runs(
 
 def _ingest(
     log: Path | MemoryTable,
-    read: ReadOptions,
+    read: LogMap,
     robot: Chain | None,
     tsp: float | None,
     derivative: Method | None,
@@ -233,7 +233,7 @@ def _check_sides(operands: Sequence[Operand], sides: tuple[str, str]) -> None:
     raise OptionError(Finding(parameter="sides", found=f"{','.join(sides)}{fault}", allowed=allowed))
 
 
-def _check_columns(read: ReadOptions, runs: Sequence[Run]) -> None:
+def _check_columns(read: LogMap, runs: Sequence[Run]) -> None:
     """Raise an `OptionError` with each column that the options name, and that no log uses."""
     columns = [column for run in runs for column in run.log.columns]
     used = {
@@ -262,7 +262,7 @@ def _check_columns(read: ReadOptions, runs: Sequence[Run]) -> None:
         )
 
 
-def _check_intervals(read: ReadOptions, runs: Sequence[Run]) -> None:
+def _check_intervals(read: LogMap, runs: Sequence[Run]) -> None:
     revolute = (name for run in runs for name in compress(run.log.joints, is_revolute(run.log, run.robot)))
     check_joint_names(read.interval, revolute)
 

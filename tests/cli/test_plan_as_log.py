@@ -12,7 +12,7 @@ from asserting import refusal, there
 from plan_logs import PATHS, planned, planned_alone
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.toml import robot_toml
-from urmpipe_pipeline.sources import LogMap, ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 CATALOGUE = [name for name in PATHS if name.startswith(("ur5e", "urm6"))]
 OWN = [name for name in PATHS if name not in CATALOGUE]
@@ -69,7 +69,7 @@ def test_ik_comes_back_to_it(name: str, tmp_path: Path) -> None:
         place, turn = (
             [f"tcp_{axis}" for axis in axes] for axes in (["x", "y", "z"], ["qx", "qy", "qz", "qw"])
         )
-        given = LogMap(ReadOptions(position=(*place,), orientation=(*turn,), rotation="quat_xyzw"))
+        given = LogMap(LogMap(position=(*place,), orientation=(*turn,), rotation="quat_xyzw"))
     solved = urmpipe.ik(there(plan.log), robot=there(plan.robot), map=given)
     assert [warning.kind for warning in solved.warnings if warning.kind != "singular"] == []
     assert solved.targets.position.tolist() == plan.position.tolist()

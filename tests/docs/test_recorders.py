@@ -22,7 +22,7 @@ import pytest
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.joint_log import PASSED_OVER, JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recording-logs.md").read_text(encoding="utf-8")
 TIMES = 0.05 * np.arange(20)
@@ -260,5 +260,5 @@ def test_the_recipe_of_rtde_names_the_joints_and_the_tool_centre_point(tmp_path:
     np.testing.assert_array_equal(log.q[:, :2], VALUES)
     assert log.qd is not None
     assert (log.rotation_form, log.clock_start) == ("vector", 1234.5)
-    target = read_log([tmp_path / "monday.csv"], ReadOptions(joints=tuple(f"target_q_{k}" for k in range(6))))
+    target = read_log([tmp_path / "monday.csv"], LogMap(joints=tuple(f"target_q_{k}" for k in range(6))))
     assert np.unique(target.q).tolist() == [0.25]

@@ -20,7 +20,7 @@ from urmpipe_pipeline.provenance import Provenance, build_provenance
 from urmpipe_pipeline.runs.derivatives import derivatives
 from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 TSP = 0.005
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
@@ -81,7 +81,7 @@ def ingested(
         tcp_position=position, tcp_rotation=quaternions,
         rotation_form=None if quaternions is None else "quat_xyzw",
     )  # fmt: skip
-    return log_to_run(log, robot, ReadOptions(), provenance=build_provenance("ingest", {}, ()), tsp=tsp)
+    return log_to_run(log, robot, LogMap(), provenance=build_provenance("ingest", {}, ()), tsp=tsp)
 
 
 def off(x: float, samples: int = 100) -> FloatArray:

@@ -44,7 +44,7 @@ from urmpipe_pipeline.results import present, read_recording, result_kind
 from urmpipe_pipeline.runs.recorded_tcp import MISSING_TOOL
 from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.sources import MemoryTable, ReadOptions, TableLike, dataframe_to_table, is_table
+from urmpipe_pipeline.sources import LogMap, MemoryTable, TableLike, dataframe_to_table, is_table
 from urmpipe_pipeline.tables.csv_files import write_table
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 
@@ -98,7 +98,7 @@ def run_comparison(
     logs: Any,
     robot: Robot | None,
     values: Mapping[str, Any],
-    judge: Callable[[object, ReadOptions], CompareOptions | IsoOptions],
+    judge: Callable[[object, LogMap], CompareOptions | IsoOptions],
     judged: Sequence[Hint] = (BASELINE_HINT,),
     finished: Comparison | None = None,
 ) -> Comparison:

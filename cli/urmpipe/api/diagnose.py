@@ -28,7 +28,7 @@ from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.operands import load_comparison
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions, arrays_to_table
+from urmpipe_pipeline.sources import LogMap, arrays_to_table
 from urmpipe_pipeline.trajectories import Trajectory
 
 SAME_POSITION = 1e-9  # m; rounding of positions that the joints of a reference determine
@@ -163,5 +163,5 @@ def _reference_run(reference: Trajectory, run: Run, tcp: str) -> Run:
         reference.joints,
     )
     units = dict(zip(reference.joints, reference.joint_units, strict=True)) if by_joints else {}
-    read = ReadOptions(unit=units, poses=not run.timed)
+    read = LogMap(unit=units, poses=not run.timed)
     return ingest_log([table], robot=robot if by_joints else None, read=read, name=reference.name)

@@ -26,7 +26,7 @@ from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsL
 from urmpipe_pipeline.solved_targets.request import Request, check_request, start_of
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.solving import solve_targets
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 SOLVING_SHARE = 0.7  # of the work, where an output is written, too
@@ -101,7 +101,7 @@ def _require_arm(resolved: ResolvedReading) -> Chain:
 
 
 def _read_targets(
-    targets: TargetsLike, t: ArrayLike | None, tsp: float | None, read: ReadOptions | None
+    targets: TargetsLike, t: ArrayLike | None, tsp: float | None, read: LogMap | None
 ) -> GivenTargets:
     """Return targets with their rows and times; raise a `LogError` if they are a recording."""
     reject_recording(targets, "a table (CSV) of targets")

@@ -22,7 +22,7 @@ from urmpipe_pipeline.planned_paths.command_marks import find_rounded_corners, f
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.solved_targets.given_targets import TargetsLike, given_targets
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 
 @public_function(Iso, robot=kinds.ROBOT)
@@ -51,7 +51,7 @@ def iso(
     """
     values: Mapping[str, Any] = options  # as their kinds read them
 
-    def judge(operand: object, read: ReadOptions) -> IsoOptions:
+    def judge(operand: object, read: LogMap) -> IsoOptions:
         """Return how the test is judged."""
         tolerance = values["tolerance"]
         plan = _find_plan(operand)
@@ -74,7 +74,7 @@ def _find_plan(reference: object) -> PlannedPath | None:
     return reference if isinstance(reference, PlannedPath) else None
 
 
-def _read_targets(targets: TargetsLike, read: ReadOptions) -> Poses:
+def _read_targets(targets: TargetsLike, read: LogMap) -> Poses:
     """Return targets as the poses of a test; raise a `LogError` with the faults of all rows."""
     reject_recording(targets, "a table (CSV) of targets")
     rows = given_targets(targets, None, None, read)

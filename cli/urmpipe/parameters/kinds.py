@@ -2,7 +2,7 @@
 
 1. Readers: each takes a text, a value of TOML or a value of Python, and returns one value for all three. A
    text has units (5ms, 0,0,150mm) and is split at commas where a list is meant; a number is in SI.
-2. How a log is read: the reader only splits texts; `ReadOptions` checks the value, so that a map, an option
+2. How a log is read: the reader only splits texts; `LogMap` checks the value, so that a map, an option
    and a keyword have one rule.
 3. Limits of deviations: with the unit that a text states, or in SI.
 4. Names, files and objects of Python that stand for one.
@@ -198,7 +198,7 @@ def _is_flag(value: Any) -> bool:
 
 
 def _reader(name: str, split: Callable[[Any], Any] = lambda value: value) -> Callable[[Any], Any]:
-    """Return the reader of a field of `ReadOptions`, which checks the value after texts are split."""
+    """Return the reader of a field of `LogMap`, which checks the value after texts are split."""
 
     def read(value: Any) -> Any:
         from urmpipe_pipeline.sources.options import read_options

@@ -25,7 +25,7 @@ from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.grid import REGULAR
-from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.options import READING
 
 NOT_IN_MAP = ("derivative", "tsp")  # options of logs that are no entries of a map
@@ -66,7 +66,7 @@ def read_table(
     names: Sequence[str] | None = None,
     *,
     robot: Chain | None = None,
-    read: ReadOptions | None = None,
+    read: LogMap | None = None,
 ) -> LogTable:
     """Return a log as a table: its motion, or some columns by name.
 

@@ -9,13 +9,13 @@ from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.planned_paths.cube_text import CUBE, read_cube
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.row_checks import checked_rows
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 
 PathLike: TypeAlias = str | Path | PathRows
 """A file, a test cube (cube:wall,a=0.6,...), or rows."""
 
 
-def given_path(given: PathLike, options: ReadOptions | None = None) -> GivenPath:
+def given_path(given: PathLike, options: LogMap | None = None) -> GivenPath:
     """Return the rows of a path.
 
     Args:

@@ -14,7 +14,7 @@ from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.planned_paths.row_checks import are_radii, are_variants, curve_faults
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
 from urmpipe_pipeline.sources.columns.columns import Column, listed
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.text import fingerprint
@@ -58,7 +58,7 @@ class GivenPath:
         return Finding(file=place, line=self.lines.get(row), row=row, found=found, allowed=allowed)
 
 
-def read_path(file: Path, options: ReadOptions | None = None) -> GivenPath:
+def read_path(file: Path, options: LogMap | None = None) -> GivenPath:
     """Return the rows of a path: x, y, z, where it has one the orientation, r or corner_r, and variant.
 
     The table is read as a table of targets. A radius without a unit in its own name has the unit of x, y, z;
@@ -74,7 +74,7 @@ def read_path(file: Path, options: ReadOptions | None = None) -> GivenPath:
 
     Source: [Iso9283]_ section 2, section 4 step 1.
     """
-    timeless = replace(options or ReadOptions(), time="none")
+    timeless = replace(options or LogMap(), time="none")
     table = read_pose_table(file, timeless, _extra_columns(), NAMING)
     rows = _rows(table)
     findings = [*_faults(table, curve_faults(rows))]
@@ -145,4 +145,4 @@ def _times(table: PoseTable) -> tuple[Column, ...]:
     layout, unused = table.plan.tables.layouts[table.plan.main], table.unused
     if layout.header is None or not unused:
         return ()
-    return time_columns(unused, layout, ReadOptions(), None, Whole(layout))[0]
+    return time_columns(unused, layout, LogMap(), None, Whole(layout))[0]

@@ -42,9 +42,9 @@ from urmpipe_pipeline.runs.torques import (
     mass_warnings,
     torque_warnings,
 )
-from urmpipe_pipeline.sources import MemoryTable, ReadOptions
+from urmpipe_pipeline.sources import LogMap, MemoryTable
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
-from urmpipe_pipeline.sources.options import READING, LogMap
+from urmpipe_pipeline.sources.options import READING
 from urmpipe_pipeline.sources.read import read_numbers
 
 MIN_TSP = 1e-9  # s, times of a log are whole nanoseconds
@@ -62,7 +62,7 @@ def ingest_log(
     files: Sequence[Path | MemoryTable],
     *,
     robot: Chain | None = None,
-    read: ReadOptions | None = None,
+    read: LogMap | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
     name: str | None = None,
@@ -81,7 +81,7 @@ def ingest_log(
         LogError: With all errors in the files.
         OptionError: If the value of an option is not allowed.
     """
-    options = read or ReadOptions()
+    options = read or LogMap()
     if tsp is not None and not MIN_TSP <= tsp < MAX_TSP:
         allowed = f"a positive time below {MAX_TSP:g} s"
         if 0 < tsp < MIN_TSP:
@@ -113,7 +113,7 @@ def ingest_log(
 def log_to_run(
     log: JointLog,
     robot: Chain | None,
-    options: ReadOptions,
+    options: LogMap,
     *,
     provenance: Provenance,
     tsp: float | None = None,

@@ -20,7 +20,7 @@ from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarnin
 from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import SLOW, Signal, Simulation
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 SIMULATED = "simulate"
 """The source of a log that is the motion of a block."""
@@ -69,7 +69,7 @@ def run_of_block(simulation: Simulation, block: str | None = None, robot: Chain 
     only = Inference("block", chosen, "it alone has a motion", hints=(Hint("block"),))
     told = (*(() if block else (only,)), *((because,) if because else ()))
     log = _log(simulation, chosen, arm, told)
-    return log_to_run(log, arm, ReadOptions(), provenance=simulation.provenance)
+    return log_to_run(log, arm, LogMap(), provenance=simulation.provenance)
 
 
 def _chosen(simulation: Simulation, block: str | None) -> str:

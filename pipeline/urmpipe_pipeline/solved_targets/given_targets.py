@@ -17,7 +17,7 @@ from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.ik.solutions import ROTATION_TOLERANCE, Targets
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.solved_targets.target_file import read_targets
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 TargetsLike: TypeAlias = str | Path | Targets | ArrayLike
 """A file, or positions in [m], shape (n, 3), or poses as matrices, shape (n, 4, 4)."""
@@ -58,7 +58,7 @@ class GivenTargets:
 
 
 def given_targets(
-    given: TargetsLike, t: ArrayLike | None, tsp: float | None, read: ReadOptions | None
+    given: TargetsLike, t: ArrayLike | None, tsp: float | None, read: LogMap | None
 ) -> GivenTargets:
     """Return targets with their rows and times.
 
@@ -87,7 +87,7 @@ def given_targets(
     return GivenTargets("targets", np.arange(1, count + 1), since, targets, faults or ("",) * count, start)
 
 
-def _of_file(path: Path, tsp: float | None, read: ReadOptions | None) -> GivenTargets:
+def _of_file(path: Path, tsp: float | None, read: LogMap | None) -> GivenTargets:
     """Return the targets of a file."""
     found = read_targets(path, read, tsp)
     faults = tuple(found.faults.get(int(row), "") for row in found.row)

@@ -16,7 +16,7 @@ from urmpipe_pipeline.joint_log import ROW_NS, SOLVED, JointLog, LogColumn, LogW
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 
 def run_of_solutions(
@@ -50,7 +50,7 @@ def run_of_solutions(
         clock_start_ns=clock_start_ns, columns=tuple(_columns(chain, timed=timed)), warnings=warnings,
         timed=timed,
     )  # fmt: skip
-    return log_to_run(log, chain, ReadOptions(), provenance=made)
+    return log_to_run(log, chain, LogMap(), provenance=made)
 
 
 def _columns(chain: Chain, *, timed: bool) -> Iterator[LogColumn]:

@@ -13,7 +13,7 @@ from urmpipe_models.ik.solutions import Targets
 from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
 from urmpipe_pipeline.sources.clocks.clock import even_clock, unused_period
 from urmpipe_pipeline.sources.columns.columns import listed
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.targets.pose_table import PoseTable, read_pose_table
 from urmpipe_pipeline.sources.targets.target_rotation import NAMED
@@ -60,7 +60,7 @@ class TargetFile:
         return Targets(self.position, self.rotation)
 
 
-def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | None = None) -> TargetFile:
+def read_targets(file: Path, options: LogMap | None = None, tsp: float | None = None) -> TargetFile:
     """Return the targets of a file: x, y, z and, where it has one, the orientation.
 
     Lengths are in m and angles in rad unless the header or the options give a unit; rz, ry, rx mean
@@ -80,7 +80,7 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
 
     Source: [UrmArm2021]_ eq. 22 (t = i Tsp).
     """
-    asked = options or ReadOptions()
+    asked = options or LogMap()
     table = read_pose_table(Path(file), asked)
     t_ns, start, said, noticed = _times(table, tsp, asked.period)
     return TargetFile(
@@ -96,7 +96,7 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
     )
 
 
-def _not_used(table: PoseTable, asked: ReadOptions) -> list[LogWarning]:
+def _not_used(table: PoseTable, asked: LogMap) -> list[LogWarning]:
     """Warn if enough columns are left for an orientation, unless the user or urmpipe says what they are."""
     known = table.plan.tables.known
     told = asked.position or (known is not None and known.own)

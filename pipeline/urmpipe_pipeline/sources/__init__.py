@@ -6,7 +6,7 @@ The words by which columns, units and sources are known are in `vocabulary.toml`
 """
 
 from urmpipe_pipeline.sources.log_map import format_map, map_of, read_map
-from urmpipe_pipeline.sources.options import LogMap, ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.read import read_log
 from urmpipe_pipeline.sources.tables.frames import TableLike, dataframe_to_table, is_table
 from urmpipe_pipeline.sources.tables.given_arrays import arrays_to_table
@@ -16,7 +16,6 @@ from urmpipe_pipeline.sources.tables.opening import source_names
 __all__ = [
     "LogMap",
     "MemoryTable",
-    "ReadOptions",
     "TableLike",
     "arrays_to_table",
     "dataframe_to_table",

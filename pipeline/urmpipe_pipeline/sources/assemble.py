@@ -32,7 +32,7 @@ from urmpipe_pipeline.sources.clocks.clock_units import LONGEST, SHORTEST
 from urmpipe_pipeline.sources.columns.blocks import SURE_VARIED, period_of, rounded_period
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of
 from urmpipe_pipeline.sources.content import Content
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
 from urmpipe_pipeline.sources.units.interpolated import without_contradicted, without_interpolated
@@ -78,7 +78,7 @@ class _Measured:
 def assemble(
     plan: Plan,
     content: Content,
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     name: str,
     files: Sequence[SourceFile],
@@ -140,7 +140,7 @@ def assemble(
     )
 
 
-def _not_used(plan: Plan, options: ReadOptions, *, by_source: bool) -> Iterator[LogWarning]:
+def _not_used(plan: Plan, options: LogMap, *, by_source: bool) -> Iterator[LogWarning]:
     """Yield the options that say what the log does not have; a source is used if it told a unit."""
     if plan.tables.foreign and not by_source:
         said = f"{options.source} has no effect: the log has none of its columns or graphs"
@@ -150,7 +150,7 @@ def _not_used(plan: Plan, options: ReadOptions, *, by_source: bool) -> Iterator[
         yield LogWarning("rotation-not-used", said, parameter="rotation")
 
 
-def recorded(plan: Plan, content: Content, options: ReadOptions, robot: Chain | None = None) -> Recorded:
+def recorded(plan: Plan, content: Content, options: LogMap, robot: Chain | None = None) -> Recorded:
     """Return joints and recorded positions before their units are known, with their stated units.
 
     Raises:
@@ -165,7 +165,7 @@ def recorded(plan: Plan, content: Content, options: ReadOptions, robot: Chain | 
     return Recorded(names, q, content.values(roles.position), joints, lengths)
 
 
-def _unit_sources(plan: Plan, options: ReadOptions) -> UnitSources:
+def _unit_sources(plan: Plan, options: LogMap) -> UnitSources:
     file, given = plan.tables.layouts[plan.main].file, options.source is not None
     return UnitSources(plan.units, plan.tables.known, file, given)
 
@@ -175,7 +175,7 @@ def _measured(
     content: Content,
     robot: Chain | None,
     t_ns: IntArray,
-    options: ReadOptions,
+    options: LogMap,
 ) -> _Measured:
     """Return what was recorded in SI: the units of the joints first, since others rest on them."""
     roles, sources = content.roles, _unit_sources(plan, options)
@@ -233,7 +233,7 @@ def _measured(
 
 
 def _times(
-    content: Content, plan: Plan, options: ReadOptions
+    content: Content, plan: Plan, options: LogMap
 ) -> tuple[IntArray, int, tuple[Inference, ...], Sequence[LogWarning]]:
     """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say.
 
@@ -288,7 +288,7 @@ def _like_a_time(plan: Plan, used: Sequence[Column]) -> Column | None:
     return like_a_time([one for one in columns if one.table == plan.main], layout, used)
 
 
-def _corrections(options: ReadOptions, joints: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
+def _corrections(options: LogMap, joints: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """Return the sign and the offset of each joint, having refused others than one a joint."""
     if options.shared and not joints:
         return (), ()

@@ -251,9 +251,6 @@ def _for_all(value: Any) -> Any:
     return {"": value} if isinstance(value, (str, list, tuple)) and value else value
 
 
-ReadOptions = LogMap
-
-
 def read_options(values: Mapping[str, Any], otherwise: LogMap | None = None) -> LogMap:
     """Return the map that some named values give; None means not given.
 

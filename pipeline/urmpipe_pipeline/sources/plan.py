@@ -23,7 +23,7 @@ from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_hea
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
 from urmpipe_pipeline.sources.columns.sides import columns_of_side, columns_of_topic, without_other_side
 from urmpipe_pipeline.sources.columns.simulated import joints_of_blocks
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
 from urmpipe_pipeline.sources.vocabulary import Patterns, Unit
 
@@ -72,7 +72,7 @@ class Plan:
 
 def make_plan(
     tables: Tables,
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     further: Mapping[str, Patterns] | None = None,
 ) -> Plan:
@@ -151,7 +151,7 @@ def _unused_files(tables: Tables, roles: Roles) -> Iterator[LogWarning]:
             yield LogWarning("file-not-used", f"none of the columns of {path.name} is used", hints=hints)
 
 
-def _renamed(roles: Roles, options: ReadOptions) -> Roles:
+def _renamed(roles: Roles, options: LogMap) -> Roles:
     """Return the roles with the joint names that the user gives: one for each joint, all different."""
     names = options.names
     if not names or (options.shared and not roles.joints):
@@ -166,7 +166,7 @@ def _renamed(roles: Roles, options: ReadOptions) -> Roles:
 def _roles(
     columns: Sequence[Column],
     tables: Tables,
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     only: int | None = None,
 ) -> Roles:
@@ -206,7 +206,7 @@ def _roles(
 def _by_names(
     columns: Sequence[Column],
     tables: Tables,
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     own: tuple[Column, ...] | None = None,
 ) -> Roles:
@@ -225,7 +225,7 @@ def _by_names(
 def _refuse_several_logs(
     columns: Sequence[Column],
     tables: Tables,
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     *,
     joints: int | None = None,

@@ -19,7 +19,7 @@ from urmpipe_pipeline.sources.columns.columns import columns_of, lacks_columns
 from urmpipe_pipeline.sources.columns.pose import find_pose
 from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.log_map import shown_entries
-from urmpipe_pipeline.sources.options import READING, LogMap, ReadOptions
+from urmpipe_pipeline.sources.options import READING, LogMap
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.held import MemoryTable, fingerprint_of
 from urmpipe_pipeline.sources.tables.lerobot import episode_file, is_data_set
@@ -38,7 +38,7 @@ class Reading:
 
     plan: Plan
     content: Content
-    options: ReadOptions
+    options: LogMap
     name: str
     files: tuple[SourceFile, ...]
 
@@ -61,10 +61,10 @@ class Reading:
 
 
 def read_numbers(
-    files: Sequence[Path | MemoryTable], options: ReadOptions | None = None, robot: Chain | None = None
+    files: Sequence[Path | MemoryTable], options: LogMap | None = None, robot: Chain | None = None
 ) -> Reading:
     """Return the numbers of a log; arguments and errors are those of `read_log`."""
-    options = options or ReadOptions()
+    options = options or LogMap()
     files = [
         episode_file(file, options.episode) if isinstance(file, Path) and is_data_set(file) else file
         for file in files
@@ -104,7 +104,7 @@ def open_map(files: Sequence[Path | MemoryTable], given: LogMap, error: LogError
 
 
 def read_log(
-    files: Sequence[Path | MemoryTable], options: ReadOptions | None = None, robot: Chain | None = None
+    files: Sequence[Path | MemoryTable], options: LogMap | None = None, robot: Chain | None = None
 ) -> JointLog:
     """Return a log as its files have it, in SI.
 
@@ -121,7 +121,7 @@ def read_log(
     return read_numbers(files, options, robot).log(robot)
 
 
-def _with_own_clock(tables: Tables, options: ReadOptions) -> ReadOptions:
+def _with_own_clock(tables: Tables, options: LogMap) -> LogMap:
     """Return the options with the clock of a file of ours that is not called like one."""
     times = [k for k, role in roles_of(tables.layouts[0]).items() if role == "time"]
     if options.time is not None or len(tables.layouts) != 1 or len(times) != 1:
@@ -131,7 +131,7 @@ def _with_own_clock(tables: Tables, options: ReadOptions) -> ReadOptions:
     return options if called else replace(options, time=str(times[0] + 1))
 
 
-def _without_foreign(tables: Tables, options: ReadOptions) -> ReadOptions:
+def _without_foreign(tables: Tables, options: LogMap) -> LogMap:
     """Return options for several logs without the columns that this one lacks: they are those of another.
 
     Columns by number that are x, y, z by their names are no joints and no time, either.

@@ -16,7 +16,7 @@ from urmpipe_pipeline.sources.clocks.clock import even_clock, find_clocks
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, find_column, given_units
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import read_content
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import open_tables
 from urmpipe_pipeline.sources.tables.reachable import unchanged
@@ -48,7 +48,7 @@ class Series:
     warnings: tuple[LogWarning, ...] = ()
 
 
-def read_series(file: Path, names: Sequence[str], options: ReadOptions | None = None) -> Series:
+def read_series(file: Path, names: Sequence[str], options: LogMap | None = None) -> Series:
     """Return some columns of a table by name, over its clock.
 
     Args:
@@ -60,10 +60,10 @@ def read_series(file: Path, names: Sequence[str], options: ReadOptions | None = 
         LogError: If a column is not there, or with everything that is wrong with the rows.
     """
     with unchanged([file]):
-        return _read(file, names, options or ReadOptions())
+        return _read(file, names, options or LogMap())
 
 
-def _read(file: Path, names: Sequence[str], options: ReadOptions) -> Series:
+def _read(file: Path, names: Sequence[str], options: LogMap) -> Series:
     """Return some columns of a table as `read_series` does."""
     tables = open_tables([file], options)
     columns = columns_of(tables.layouts, tables.titles)

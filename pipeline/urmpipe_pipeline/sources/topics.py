@@ -17,7 +17,7 @@ from urmpipe_models.elementwise import BoolArray, IntArray
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import is_missing
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.opening import Tables
 from urmpipe_pipeline.sources.tables.rows import ROWS_READ, column_texts, with_rows
@@ -29,7 +29,7 @@ MAX_SHARE = 0.5  # a column with values in at most this share of the rows of the
 OTHER_ROWS = "other-rows"  # the warning about groups of columns that are recorded in other rows
 
 
-def plan_topic(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan:
+def plan_topic(tables: Tables, options: LogMap, robot: Chain | None) -> Plan:
     """Return the plan of a log, as `make_plan` does, of the rows of the topic of its joints.
 
     A row is of another topic if all its joint cells are empty and a cell of another topic is not.

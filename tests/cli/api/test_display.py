@@ -25,7 +25,6 @@ OTHERS = {
     "LogMap",
     "LogReading",
     "PathRows",
-    "ReadOptions",
     "Reading",
     "TableReading",
     "Targets",

@@ -23,7 +23,7 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 from urmpipe_pipeline.tables import ExportOptions
 from urmpipe_pipeline.trajectories import AlignMode
 
@@ -116,7 +116,7 @@ def path_at(t: FloatArray, rng: np.random.Generator, name: str) -> Run:
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Run], list[Path]]:
     """Two logs of one motion, ingested, and the TUM files that `urmpipe export` writes of them."""
-    robot, read, folder = load_robot("urm6"), ReadOptions(unit={"": "rad"}), tmp_path_factory.mktemp("tum")
+    robot, read, folder = load_robot("urm6"), LogMap(unit={"": "rad"}), tmp_path_factory.mktemp("tum")
     logs = lay_thinned_logs(folder)
     runs = [ingest_log([logs / f"{name}.csv"], robot=robot, read=read) for name in ("coppeliasim", "matlab")]
     files = [folder / f"{run.name}.tum" for run in runs]

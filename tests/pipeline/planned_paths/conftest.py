@@ -15,7 +15,7 @@ from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.result import PlannedPath
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 Read = Callable[..., GivenPath]
 
@@ -27,7 +27,7 @@ def read(tmp_path: Path) -> Read:
     def read(text: str, **options: Any) -> GivenPath:
         path = tmp_path / "path.csv"
         path.write_text(text, encoding="utf-8")
-        return read_path(path, ReadOptions(**options))
+        return read_path(path, LogMap(**options))
 
     return read
 

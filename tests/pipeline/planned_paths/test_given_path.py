@@ -13,7 +13,7 @@ from asserting import there
 from urmpipe_models.errors import LogError, OptionError, PathError, UrmpipeError
 from urmpipe_models.planning.path import PLANES, PathRows, cube_rows
 from urmpipe_pipeline.planned_paths.given_path import PathLike, given_path
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 CUBE = "a=0.6,r=0.03,x=1.7,y=0,z=1"
 CENTRE = np.array([1.7, 0.0, 1.0])
@@ -34,7 +34,7 @@ def test_a_file_is_a_path_of_its_name(tmp_path: Path, kind: type[str | Path]) ->
     (tmp_path / "contour.csv").write_text(
         "t;x;y;z;corner_r\n0;0;0;0;\n1;1;0;0;100\n2;1;1;0;\n", encoding="utf-8"
     )
-    found = given_path(kind(tmp_path / "contour.csv"), ReadOptions(unit={"corner_r": "mm"}))
+    found = given_path(kind(tmp_path / "contour.csv"), LogMap(unit={"corner_r": "mm"}))
     assert (found.name, len(found.rows), there(found.file).name) == ("contour", 3, "contour.csv")
     assert (found.rows.position.tolist(), found.rows.radius.tolist()) == (LINE, [0.0, 0.1, 0.0])
     assert [warning.kind for warning in found.warnings] == ["time-not-used"]

@@ -18,9 +18,9 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_with_recorded_tcp
 from urmpipe_pipeline.runs.derivatives import WINDOW, Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
-RAD = ReadOptions(unit={"": "rad"})
+RAD = LogMap(unit={"": "rad"})
 TSP = 0.005
 T = TSP * np.arange(400, dtype=np.float64)
 

@@ -14,7 +14,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.plausibility import largest_steps
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 FORMATS: dict[str, tuple[str, Callable[[FloatArray], FloatArray]]] = {
     "exact": ("rad", lambda q: q),
@@ -70,7 +70,7 @@ REAL = {
 def test_sound_real_logs_have_no_warning(file: str, shared: Path) -> None:
     robot = load_robot(name) if (name := REAL[file]) else None
     joints = ("1", "2", "3", "4", "5", "6") if "unitree" in file else ()  # of its twelve columns
-    run = ingest_log([shared / "logs" / file], robot=robot, read=ReadOptions(joints=joints))
+    run = ingest_log([shared / "logs" / file], robot=robot, read=LogMap(joints=joints))
     assert KINDS & {warning.kind for warning in run.warnings} == set()
 
 

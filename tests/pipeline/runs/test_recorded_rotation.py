@@ -15,7 +15,7 @@ from urmpipe_models.math3d import COLUMN_NAMES, RotationForm, column_count
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 from urmpipe_pipeline.tables import ExportOptions
 
 ROWS = 200
@@ -34,7 +34,7 @@ def ingest(
     table = np.column_stack((0.005 * np.arange(ROWS), np.sin(TURN), position, columns))
     header = ",".join(["t [s]", "q1 [rad]", "x [m]", "y [m]", "z [m]", *names])
     np.savetxt(path, table, "%.9f", ",", header=header, comments="")
-    return ingest_log([path], read=ReadOptions(rotation=form), tsp=tsp)
+    return ingest_log([path], read=LogMap(rotation=form), tsp=tsp)
 
 
 def recorded() -> FloatArray:

@@ -16,7 +16,7 @@ from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_r
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.recorded_tcp import recorded_tcp_warnings
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 SIX = [name for name in robot_names() if len(load_robot(name).moving) == 6]
 SAME_KINEMATICS = {"ur3": "ur3e", "ur3e": "ur3"}
@@ -105,7 +105,7 @@ def test_right_logs_have_no_warning() -> None:
 @pytest.mark.parametrize("file", REAL)
 def test_real_logs_differ_from_any_other_robot(file: str, shared: Path) -> None:
     robot, unit = REAL[file]
-    run = ingest_log([shared / "logs" / file], robot=load_robot(robot), read=ReadOptions(unit=unit))
+    run = ingest_log([shared / "logs" / file], robot=load_robot(robot), read=LogMap(unit=unit))
     assert [one for one in run.warnings if one.kind.startswith("recorded-tcp")] == []
     for other in [] if "10rows" in file else sorted({*SIX} - {robot}):
         (warning,) = recorded_tcp_warnings(load_robot(other), run.log)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 Read = Callable[..., TargetFile]
 
@@ -21,6 +21,6 @@ def read(tmp_path: Path) -> Read:
     def read(text: str | bytes, tsp: float | None = None, **options: Any) -> TargetFile:
         path = tmp_path / "targets.csv"
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return read_targets(path, ReadOptions(**options), tsp)
+        return read_targets(path, LogMap(**options), tsp)
 
     return read

@@ -14,7 +14,7 @@ from make_specimens import paths
 from specimen import SPECIMENS, Truth
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
-from urmpipe_pipeline.sources import ReadOptions, read_log, read_map
+from urmpipe_pipeline.sources import LogMap, read_log, read_map
 
 DATASETS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
 LOGS = Path(__file__).resolve().parents[3].parent / "shared" / "logs"
@@ -61,7 +61,7 @@ def test_all_specimens_with_a_tool_are_tried() -> None:
 def test_a_specimen_with_a_tool_gives_its_poses_as_targets(name: str) -> None:
     truth, targets = (
         TRUTHS[name],
-        read_targets(paths(SPECIMENS[name])[0], ReadOptions(**OPTIONS.get(name, {}))),
+        read_targets(paths(SPECIMENS[name])[0], LogMap(**OPTIONS.get(name, {}))),
     )
     assert targets.row.tolist() == list(range(1, len(truth.t) + 1))
     assert targets.faults == {}
@@ -95,7 +95,7 @@ def test_a_matrix_of_a_real_log_without_a_header_is_a_pose() -> None:
     if not path.is_file():
         pytest.skip(f"{path} is not here")
     table = np.loadtxt(path, delimiter=",")[:, -16:].reshape(-1, 4, 4)
-    targets = read_targets(path, ReadOptions(unit={"10": "mm"}))
+    targets = read_targets(path, LogMap(unit={"10": "mm"}))
     np.testing.assert_allclose(targets.position, table[:, :3, 3] / 1e3, rtol=1e-15, atol=0)
     assert_turned(targets, list(table[:, :3, :3]), atol=1e-8)
 

@@ -12,7 +12,7 @@ import pytest
 from asserting import INCREASE
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.solved_targets.target_file import TargetFile
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., TargetFile]
 Wrong = Callable[..., list[str]]
@@ -235,7 +235,7 @@ def test_rows_are_counted_as_ingest_counts_them(read: Read, tmp_path: Path) -> N
     targets = read(text)
     assert (targets.row.tolist(), list(targets.faults)) == ([1, 2, 3, 4], [2, 3])
     with pytest.raises(LogError) as caught:
-        read_log([tmp_path / "targets.csv"], ReadOptions(source="path"))
+        read_log([tmp_path / "targets.csv"], LogMap(source="path"))
     assert [finding.row for finding in caught.value.findings] == [2, 3]
 
 

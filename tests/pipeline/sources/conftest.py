@@ -9,7 +9,7 @@ import pytest
 
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -39,7 +39,7 @@ def read(write: Callable[..., Path]) -> Read:
         encoding: str = "utf-8",
         **options: object,
     ) -> JointLog:
-        return read_log([write(text, name, encoding)], ReadOptions(**options), robot)  # type: ignore[arg-type]
+        return read_log([write(text, name, encoding)], LogMap(**options), robot)  # type: ignore[arg-type]
 
     return read
 

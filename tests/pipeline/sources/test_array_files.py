@@ -18,13 +18,13 @@ from scipy.io import savemat
 from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.options import read_options
 
 ROWS = 60
 T = np.arange(ROWS) * 0.01
 Q = 0.5 * np.sin(2 * np.pi * 0.7 * T[:, None] + np.arange(6))  # [rad], no joint increases throughout
-RAD = ReadOptions(unit={"": "rad"})
+RAD = LogMap(unit={"": "rad"})
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +134,7 @@ def test_episodes_and_lengths_are_questions(tmp_path: Path) -> None:
     texts = ["--episode demo_0", "--episode demo_1", "--episode demo_10"]
     assert follow(path, texts) == [60, 50, 40]
     assert follow(path, texts, episode="2") == [60, 50, 40]
-    log = read_log([path], ReadOptions(episode="1", unit={"": "rad"}))
+    log = read_log([path], LogMap(episode="1", unit={"": "rad"}))
     assert (log.rows, log.joints[0]) == (50, "obs/q[0]")
     h5(
         path,

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from asserting import INCREASE
 from urmpipe_models.arm.chain import Chain
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -80,7 +80,7 @@ def test_any_number_of_rows_and_columns(rows: int, joints: int, lists: bool, new
         cells = [row.tolist() if lists else row for row in values]
         frame = pd.DataFrame({"t": np.arange(rows) * 0.01, "q": cells})
         frame.to_csv(path, index=False, lineterminator=newline)
-        log = read_log([path], ReadOptions(time="t"))
+        log = read_log([path], LogMap(time="t"))
     np.testing.assert_array_equal(log.q, values)
 
 

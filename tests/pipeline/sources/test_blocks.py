@@ -14,7 +14,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.columns.blocks import period_of, proved_blocks
 
 Arm = Callable[..., Chain]
@@ -50,7 +50,7 @@ def written(path: Path, values: FloatArray, sign: str = ",") -> Path:
 
 
 def read(path: Path, robot: Chain | None = None, **options: object) -> JointLog:
-    return read_log([path], ReadOptions(**options), robot)  # type: ignore[arg-type]
+    return read_log([path], LogMap(**options), robot)  # type: ignore[arg-type]
 
 
 def columns_of(log: JointLog, role: str) -> list[int]:

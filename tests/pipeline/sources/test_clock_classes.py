@@ -17,7 +17,7 @@ from asserting import refusal
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.clocks.steps import kind_of_steps
 from urmpipe_pipeline.sources.log_map import format_map, map_of, read_map
 
@@ -332,7 +332,7 @@ def test_a_column_of_another_file_is_the_time(
 ) -> None:
     """A clock of the log itself is neither used nor a joint."""
     path, clock = write(table([seconds(JITTER)], names=names), "q.csv"), write(times, "times: all.csv")
-    log = read_log([path], ReadOptions(time=f"{clock}:{column}"))
+    log = read_log([path], LogMap(time=f"{clock}:{column}"))
     assert_times(log, EVEN)
     assert [file.name for file in log.files] == ["q.csv", "times: all.csv"]
     assert next(one.value for one in log.inferences if one.what == "time column") == f"{clock.name}:{column}"
@@ -341,7 +341,7 @@ def test_a_column_of_another_file_is_the_time(
 def test_a_map_keeps_the_file_of_the_times(write: Write, tmp_path: Path) -> None:
     path, clock = write(table([], names=()), "q.csv"), write(TIMES, "times.csv")
     time = f"{clock}:stamp"
-    log = read_log([path], ReadOptions(time=time))
+    log = read_log([path], LogMap(time=time))
     for text in (format_map(map_of(log, LogMap(time=time))), 'time = "times.csv:stamp"\n'):
         again = read_log([path], read_map(write(text, "lab.toml")))
         np.testing.assert_array_equal(again.t_ns, log.t_ns)
@@ -349,16 +349,16 @@ def test_a_map_keeps_the_file_of_the_times(write: Write, tmp_path: Path) -> None
 
 def test_a_file_of_times_that_does_not_fit(write: Write) -> None:
     path, clock = write(table([]), "q.csv"), write("stamp\n0\n0.1\n", "times.csv")
-    said = refusal(LogError, read_log, [path], ReadOptions(time=f"{clock}:stamp"))
+    said = refusal(LogError, read_log, [path], LogMap(time=f"{clock}:stamp"))
     assert said == f"{clock}: found 2 times, allowed: {ROWS}, as q.csv has rows"
-    said = refusal(LogError, read_log, [path], ReadOptions(time=f"{clock}:clock"))
+    said = refusal(LogError, read_log, [path], LogMap(time=f"{clock}:clock"))
     assert said == "time (--time): found no column 'clock', allowed: stamp"
-    said = refusal(OptionError, read_log, [path, path], ReadOptions(time=f"{clock}:stamp"))
+    said = refusal(OptionError, read_log, [path, path], LogMap(time=f"{clock}:stamp"))
     assert said.endswith(" for 2 tables, allowed: FILE:COLUMN for one table")
 
 
 def test_the_log_of_a_dx200(shared: Path) -> None:
     path = shared / "logs" / "motoman-dx200" / "joint_recording.csv"
-    log = read_log([path], ReadOptions(joints=tuple(str(k) for k in range(2, 8))))
+    log = read_log([path], LogMap(joints=tuple(str(k) for k in range(2, 8))))
     stamps = np.loadtxt(path.read_text().replace(",\n", "\n").splitlines(), delimiter=",")[:, 0]
     np.testing.assert_allclose(log.t_ns / 1e9, stamps - stamps[0], atol=5e-7)  # floats of 1.7e9 s

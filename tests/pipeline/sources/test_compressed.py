@@ -16,7 +16,7 @@ import pytest
 
 from asserting import refusal
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.tables.limits import RATIO, UNPACKED
 
 COMPRESS: dict[str, Callable[[bytes], bytes]] = {
@@ -49,7 +49,7 @@ def test_a_wrong_cell_has_the_line_of_the_text(suffix: str, tmp_path: Path) -> N
     path = tmp_path / f"log.csv.{suffix}"
     path.write_bytes(COMPRESS[suffix](TEXT.replace(ROWS[1998].replace(".", ","), "19,98;x;0").encode()))
     assert refusal(LogError, read_log, [path]).startswith(f"{path}:2000, column Gelenk 1 [°]: found 'x'")
-    assert read_log([path], ReadOptions(skip_bad=True)).rows == 2999
+    assert read_log([path], LogMap(skip_bad=True)).rows == 2999
 
 
 @pytest.mark.parametrize("suffix", COMPRESS)

@@ -12,7 +12,7 @@ import pytest
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.solved_targets.target_file import read_targets
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.tables import conflict
 
 Read = Callable[..., JointLog]
@@ -113,7 +113,7 @@ def test_each_file_of_a_log_and_of_targets_is_looked_through(write: Write) -> No
     rows = [BEGIN, "t,q1", "0,1", MIDDLE, "t,q1", "0,2", END, "0.1,3"]
     files = [write("\n".join(rows), name) for name in ("plot1.csv", "plot2.csv")]
     with pytest.raises(LogError) as error:
-        read_log(files, ReadOptions())
+        read_log(files, LogMap())
     assert [(one.file, one.line) for one in error.value.findings] == [
         (str(file), line) for file in files for line in (1, 4, 7)
     ]

@@ -20,7 +20,7 @@ import pytest
 
 from asserting import refusal
 from urmpipe_models.errors import LogError, python_command
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 Write = Callable[[Path], object]
@@ -88,7 +88,7 @@ def test_the_command_for_a_format_writes_a_table_that_is_read(name: str, tmp_pat
     subprocess.run(command[0], shell=True, cwd=tmp_path, env=env, check=True, capture_output=True)
     (written,) = [file for file in tmp_path.iterdir() if file not in before]
     assert path.stat().st_mtime_ns == before[path]  # the file itself is left as it is
-    log = read_log([written], ReadOptions(unit={"": "rad"}))
+    log = read_log([written], LogMap(unit={"": "rad"}))
     np.testing.assert_array_equal(log.q, Q)
     np.testing.assert_allclose(log.t_ns, T * 1e9, atol=1.0)  # times are whole ns
     assert log.period == 0.01

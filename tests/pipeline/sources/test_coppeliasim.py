@@ -9,7 +9,7 @@ import pytest
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -129,7 +129,7 @@ def test_a_large_export_is_read_in_blocks(write: Callable[..., object]) -> None:
     body = "".join(f"{0.05 * k:.3f},{k % 300:+.3e},{-(k % 200):+.3e}\n" for k in range(rows))
     head = "\n".join(JOINTS.split("\n")[:2])
     path = write(f"{head}\n{body}\n{TIP}")
-    log = read_log([path], ReadOptions(unit={"": "deg"}))  # type: ignore[list-item]
+    log = read_log([path], LogMap(unit={"": "deg"}))  # type: ignore[list-item]
     assert log.rows == rows
     np.testing.assert_array_equal(log.q[:, 0], np.arange(rows) % 300 * DEG)
     np.testing.assert_array_equal(log.t_ns, np.arange(rows) * 50_000_000)

@@ -15,7 +15,7 @@ from asserting import INCREASE, OTHER_TIME
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.tables import blocks, table
 
 Read = Callable[..., JointLog]
@@ -55,13 +55,13 @@ PIECES = [
 ]
 OPTIONS = [
     *(
-        ReadOptions(),
-        ReadOptions(skip_bad=True),
-        ReadOptions(source="path"),
-        ReadOptions(source="coppeliasim"),
-        ReadOptions(time="1"),
+        LogMap(),
+        LogMap(skip_bad=True),
+        LogMap(source="path"),
+        LogMap(source="coppeliasim"),
+        LogMap(time="1"),
     ),
-    *(ReadOptions(joints=("2", "3")), ReadOptions(unit={"": "deg"}), ReadOptions(delimiter=";", decimal=",")),
+    *(LogMap(joints=("2", "3")), LogMap(unit={"": "deg"}), LogMap(delimiter=";", decimal=",")),
 ]
 ROBOTS = [None, *(Chain("arm", tuple(Joint(f"j{k}") for k in range(count))) for count in (1, 2))]
 
@@ -81,11 +81,11 @@ def damaged(draw: st.DrawFn) -> bytes:
 @pytest.mark.filterwarnings("error")
 @settings(max_examples=120, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from(ROBOTS))
-@example(LABELLED.replace(b"q values", b"q\r values", 1), ReadOptions(), None)
-@example(b'connected\nTime:"]" values: [1, 3] Type: 0\n', ReadOptions(), None)
-@example(LABELLED.replace(b"1, 2", b""), ReadOptions(), None)
-@example(LABELLED.replace(b"1, 2", b"").replace(b"1, 3", b""), ReadOptions(), None)
-def test_a_sound_log_or_an_error_of_ours(content: bytes, options: ReadOptions, robot: Chain | None) -> None:
+@example(LABELLED.replace(b"q values", b"q\r values", 1), LogMap(), None)
+@example(b'connected\nTime:"]" values: [1, 3] Type: 0\n', LogMap(), None)
+@example(LABELLED.replace(b"1, 2", b""), LogMap(), None)
+@example(LABELLED.replace(b"1, 2", b"").replace(b"1, 3", b""), LogMap(), None)
+def test_a_sound_log_or_an_error_of_ours(content: bytes, options: LogMap, robot: Chain | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
         path.write_bytes(content)
@@ -105,7 +105,7 @@ def test_a_sound_log_or_an_error_of_ours(content: bytes, options: ReadOptions, r
     assert robot is None or len(log.joints) in (0, len(robot.coordinates))
 
 
-def outcome(path: Path, options: ReadOptions) -> tuple[object, ...]:
+def outcome(path: Path, options: LogMap) -> tuple[object, ...]:
     """What is read of a file, or what is wrong with it."""
     try:
         log = read_log([path], options)
@@ -117,7 +117,7 @@ def outcome(path: Path, options: ReadOptions) -> tuple[object, ...]:
 @pytest.mark.slow
 @settings(max_examples=120, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from([8, 30, 200]))
-def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: ReadOptions, size: int) -> None:
+def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: LogMap, size: int) -> None:
     assume(b"\r" not in content)  # alone it ends a row for the parser, and no line of the file
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         path = Path(folder) / "log.csv"
@@ -284,7 +284,7 @@ def test_a_damaged_log_is_the_sound_one_without_its_wrong_rows(places: set[int],
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
         path.write_text(joined(*lines))
-        log = read_log([path], ReadOptions(skip_bad=True))
+        log = read_log([path], LogMap(skip_bad=True))
     kept = np.delete(np.arange(80_000), sorted(places))
     np.testing.assert_array_equal(log.t_ns, (kept - kept[0]) * 10_000_000)
     np.testing.assert_array_equal(log.q, np.c_[kept % 7 / 10, (kept % 5 + 10) / 10])

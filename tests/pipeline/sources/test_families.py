@@ -13,7 +13,7 @@ import pytest
 
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., JointLog]
 
@@ -132,7 +132,7 @@ def test_a_row_a_joint_is_told_with_the_command_that_makes_a_row_a_sample(
     command = refused.value.findings[0].hints[0].effect
     monkeypatch.chdir(tmp_path)
     subprocess.run([sys.executable, *shlex.split(command)[1:]], check=True)
-    log = read_log([tmp_path / "table.csv"], ReadOptions(joints=names))
+    log = read_log([tmp_path / "table.csv"], LogMap(joints=names))
     assert log.q.tolist() == [[t, t + 1, t + 2] for t in T.tolist()]
     assert log.t.tolist() == T.tolist()
 

@@ -14,7 +14,7 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -67,7 +67,7 @@ def test_unknown_source_and_no_file(tmp_path: Path) -> None:
     with pytest.raises(
         OptionError, match=r"^source \(--source\): found 'vendor', allowed: coppeliasim, .*, path, table$"
     ):
-        read_log([tmp_path / "log.csv"], ReadOptions(source="vendor"))
+        read_log([tmp_path / "log.csv"], LogMap(source="vendor"))
     with pytest.raises(OptionError, match=r"^found no log file, allowed: one, or several"):
         read_log([])
 

@@ -14,7 +14,7 @@ import pytest
 
 from asserting import refusal
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Write = Callable[..., Path]
 
@@ -62,7 +62,7 @@ def test_times_with_more_digits_than_a_double(write: Write) -> None:
     stamps = [f"17000000{k:02d}.123456789" for k in range(20)]
     text = "".join(f'{{"t": {t}, "q1": 0.{k}}}\n' for k, t in enumerate(stamps, start=10))
     for document in (text, f"[{text.strip().replace(chr(10), ',')}]"):
-        log = read_log([write(document, "log.json")], ReadOptions(unit={"": "rad"}))
+        log = read_log([write(document, "log.json")], LogMap(unit={"": "rad"}))
         assert log.clock_start_ns == 1_700_000_000_123_456_789
 
 

@@ -13,14 +13,14 @@ import pytest
 import urmpipe
 from asserting import refusal
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.options import read_options
 
 T = np.arange(60) * 0.02
 Q = (0.5 * np.sin(2 * np.pi * 0.7 * T[:, None] + np.arange(6))).astype(np.float32)
 ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 LENGTHS = {0: 60, 1: 50, 2: 40}
-RAD = ReadOptions(unit={"": "rad"})
+RAD = LogMap(unit={"": "rad"})
 
 
 def episode(number: int) -> pa.Table:
@@ -77,7 +77,7 @@ def test_each_episode_is_a_choice(data_set: Path) -> None:
         prefix, suffix = ("", ".pos") if v3 else ("main_", "")
         assert log.joints == tuple(f"observation.state.{prefix}{name}{suffix}" for name in ARM[:5])
         assert [warning.kind for warning in log.warnings] == ["columns-passed-over"]  # the action
-    assert refusal(OptionError, read_log, [data_set], ReadOptions(episode="9")).endswith(
+    assert refusal(OptionError, read_log, [data_set], LogMap(episode="9")).endswith(
         "found '9', allowed: the number of an episode: 0, 1, 2"
     )
 
@@ -86,7 +86,7 @@ def test_a_file_of_several_episodes_and_both_sides(data_set: Path) -> None:
     path = sorted((data_set / "data" / "chunk-000").iterdir())[0]
     if path.stem == "file-000":
         assert "--episode 1 reads episode 1" in refusal(LogError, read_log, [path], RAD)
-        assert read_log([path], ReadOptions(episode="1", unit={"": "rad"})).rows == 50
+        assert read_log([path], LogMap(episode="1", unit={"": "rad"})).rows == 50
     result = urmpipe.compare(
         data_set, sides="action,state", episode=1, unit="rad", tolerance="joint=0.1rad", sync="start"
     )

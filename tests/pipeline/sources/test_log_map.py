@@ -12,7 +12,7 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import LogMap, ReadOptions, format_map, map_of, read_log, read_map
+from urmpipe_pipeline.sources import LogMap, format_map, map_of, read_log, read_map
 
 Write = Callable[..., Path]
 Read = Callable[..., JointLog]
@@ -86,7 +86,7 @@ def test_everything_that_a_map_says(write: Write) -> None:
 )
 def test_what_was_inferred_reads_the_log_again(text: str, options: dict[str, object], write: Write) -> None:
     path = write(text)
-    log = read_log([path], ReadOptions(**options))  # type: ignore[arg-type]
+    log = read_log([path], LogMap(**options))  # type: ignore[arg-type]
     said = read_map(write(format_map(map_of(log)), "lab.toml"))
     again = read_log([path], said)
     assert (again.joints, again.units, again.columns) == (log.joints, log.units, log.columns)

@@ -18,7 +18,7 @@ from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import PASSED_OVER
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"
 
@@ -139,7 +139,7 @@ def test_candidates_that_no_word_separates_raise_a_question(families: Sequence[s
     assert all(names.split()[0] in message for names in families) and "allowed: one" in message
     joints = families[0].split()
     if "x" not in families[1].split():
-        assert read_log([path], ReadOptions(joints=tuple(joints))).joints == tuple(joints)
+        assert read_log([path], LogMap(joints=tuple(joints))).joints == tuple(joints)
 
 
 def test_orientation_and_rates_are_those_of_what_is_read(tmp_path: Path) -> None:
@@ -149,7 +149,7 @@ def test_orientation_and_rates_are_those_of_what_is_read(tmp_path: Path) -> None
         f"{b}x{e} {b}y{e} {b}z{e} {b}rx{e} {b}ry{e} {b}rz{e}".split() for b, e in (("", ""), ("", "_fb"))
     )
     path = written(tmp_path / "log.csv", joints, rates, pose, done, done_rates, actual)
-    log = read_log([path], ReadOptions(rotation="vector"))
+    log = read_log([path], LogMap(rotation="vector"))
     result = {
         role: [c.header for c in log.columns if c.role == role]
         for role in ("joint", "rate", "position", "rotation")

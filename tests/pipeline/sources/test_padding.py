@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.tables.padding import end_rows
 
 Read = Callable[..., JointLog]
@@ -129,7 +129,7 @@ def test_rows_in_warnings_are_those_of_the_file_beside_bad_ones(read: Read) -> N
 def test_youbot() -> None:
     path = LOGS / "youbot-vrep-scene8" / "configurations.csv"
     table = np.loadtxt(path, delimiter=",")
-    log = read_log([path], ReadOptions(joints=("4", "5", "6", "7", "8")))
+    log = read_log([path], LogMap(joints=("4", "5", "6", "7", "8")))
     np.testing.assert_array_equal(log.q, table[:-1, 3:8])
     assert "data row 1600" in about_rows(log)[0]
 

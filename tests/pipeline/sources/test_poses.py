@@ -18,7 +18,7 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import RotationForm, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import ROW_NS, JointLog
-from urmpipe_pipeline.sources import ReadOptions, format_map, map_of, read_log, read_map
+from urmpipe_pipeline.sources import LogMap, format_map, map_of, read_log, read_map
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -168,7 +168,7 @@ def test_smooth_motions_are_never_poses(
     path = tmp_path_factory.mktemp("motion") / "log.csv"
     wrapped = np.remainder(smooth(rows, shortest, seed, 3.0) + np.pi, 2 * np.pi) - np.pi
     path.write_text(table(wrapped))
-    assert read_log([path], ReadOptions(unit={"": "rad"})).timed
+    assert read_log([path], LogMap(unit={"": "rad"})).timed
 
 
 @pytest.mark.slow
@@ -179,7 +179,7 @@ def test_random_configurations_always_are(
 ) -> None:
     path = tmp_path_factory.mktemp("poses") / "log.csv"
     path.write_text(table(random_poses(rows, seed, reach)))
-    assert not read_log([path], ReadOptions(unit={"": "rad"})).timed
+    assert not read_log([path], LogMap(unit={"": "rad"})).timed
 
 
 def test_who_says_poses_gets_them(read: Read) -> None:
@@ -208,7 +208,7 @@ def test_a_date_of_digits_alone_is_read_as_one(read: Read) -> None:
 def test_a_map_reads_poses_as_they_were_read(write: Write, tmp_path: Path) -> None:
     for clock in (None, STEPS["seconds apart"][:18]):
         path, lab = write(table(random_poses(18), clock)), tmp_path / "lab.toml"
-        log = read_log([path], ReadOptions(unit={"": "rad"}))
+        log = read_log([path], LogMap(unit={"": "rad"}))
         lab.write_text(format_map(map_of(log)))
         again = read_log([path], read_map(lab))
         assert not again.timed

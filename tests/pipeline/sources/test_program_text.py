@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.tables.programs.program_text import read_program
 from urmpipe_pipeline.sources.tables.text import open_text
 from urmpipe_pipeline.sources.targets.pose_table import read_pose_table
@@ -168,7 +168,7 @@ def test_plc_real_identification_run() -> None:
         [float(cell) for cell in lines[name].partition("[")[2].partition("[")[2][:-3].split(",")]
         for name in names
     ]
-    for options in (ReadOptions(), ReadOptions(joints=tuple(names), unit={"": "deg"})):
+    for options in (LogMap(), LogMap(joints=tuple(names), unit={"": "deg"})):
         log = read_log([path], options)
         assert (log.rows, log.period, log.joints) == (12501, 0.0008, tuple(names))
         np.testing.assert_array_equal(log.q, np.transpose(q) * DEG)
@@ -246,7 +246,7 @@ def test_rapid_robtargets_are_a_path(read: Read, write: Write) -> None:
     assert log.tcp_quat_xyzw is not None
     np.testing.assert_allclose(log.tcp_position, XYZ / 1000, rtol=1e-15)  # one rounding of mm to m
     np.testing.assert_allclose(log.tcp_quat_xyzw[0], [0.6, 0.8, 0, 0], atol=1e-15)  # w, x, y, z in RAPID
-    targets = read_pose_table(write(text), ReadOptions())
+    targets = read_pose_table(write(text), LogMap())
     np.testing.assert_allclose(targets.position, XYZ / 1000, rtol=1e-15)
 
 
@@ -380,7 +380,7 @@ def test_programs_that_are_not_read(wrong: Wrong, text: str, what: str) -> None:
     ],
 )
 def test_other_text_is_no_program(write: Write, text: str) -> None:
-    assert read_program(open_text(write(f"{text}\n")), ReadOptions()) is None
+    assert read_program(open_text(write(f"{text}\n")), LogMap()) is None
 
 
 @given(
@@ -404,12 +404,12 @@ def test_plc_values_come_through(write: Write, rows: list[list[float]], comma: s
         return f"[{comma.join(parts)}]"
 
     lines = [f"q{k + 1} : ARRAY[0..{len(rows) - 1}] OF LREAL := {text(values[:, k])};" for k in range(2)]
-    held = read_program(open_text(write("\n".join(lines))), ReadOptions())
+    held = read_program(open_text(write("\n".join(lines))), LogMap())
     assert held is not None
     assert held.columns.column_names == ["q1", "q2"]
     np.testing.assert_array_equal(np.column_stack([column.to_numpy() for column in held.columns]), values)
     held = read_program(
-        open_text(write(f"q : ARRAY[1..{len(rows)},1..2] OF LREAL := {text(values.ravel())};")), ReadOptions()
+        open_text(write(f"q : ARRAY[1..{len(rows)},1..2] OF LREAL := {text(values.ravel())};")), LogMap()
     )
     assert held is not None
     np.testing.assert_array_equal(np.column_stack([column.to_numpy() for column in held.columns]), values)
@@ -433,4 +433,4 @@ def test_truncated_programs(write: Write, text: str, kept: float) -> None:
     for end in (cut, cut[: cut.rindex("\n") + 1]):
         if end.startswith(("VAR", "MODULE", "DEFDAT")) or end is cut:
             with pytest.raises(LogError):
-                read_program(open_text(write(end.rstrip(";\n"))), ReadOptions())
+                read_program(open_text(write(end.rstrip(";\n"))), LogMap())

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.tables.block_parser import clock_scales, parse_block
 from urmpipe_pipeline.sources.tables.blocks import byte_encoding, row_blocks, squeeze
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn
@@ -147,4 +147,4 @@ def test_squeezing_keeps_the_cells(rows: list[list[str]], blanks: list[str], new
 def test_times_of_an_option_are_exact_too(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("when,q1\n0.1,1\n0.30000000000000004,2\n")
-    assert read_log([path], ReadOptions(time="when")).t_ns.tolist() == [0, 200_000_000]
+    assert read_log([path], LogMap(time="when")).t_ns.tolist() == [0, 200_000_000]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 from urmpipe_pipeline.sources.series import read_series
 
 TABLE = "t [ms],u (V),phi [deg],w,speed (mm/s)\n5,1,180,1,1000\n15,2,90,2,0\n25,-0.5,45,nan,1\n"
@@ -40,7 +40,7 @@ def test_a_column_without_a_unit_tells_none_and_the_user_may(tmp_path: Path) -> 
     path = tmp_path / "table.csv"
     path.write_text("t,u\n0,1\n0.1,2\n", encoding="utf-8")
     assert read_series(path, ["u"]).units == (None,)
-    told = read_series(path, ["u"], ReadOptions(unit={"u": "deg"}))
+    told = read_series(path, ["u"], LogMap(unit={"u": "deg"}))
     assert told.units == ("rad",)
     assert told.values[1, 0] == 2.0 * 0.017453292519943295
 
@@ -48,7 +48,7 @@ def test_a_column_without_a_unit_tells_none_and_the_user_may(tmp_path: Path) -> 
 def test_a_table_without_a_clock_takes_its_period(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("u,v\n0,1\n0.1,2\n", encoding="utf-8")
-    series = read_series(path, ["u"], ReadOptions(period=0.02))
+    series = read_series(path, ["u"], LogMap(period=0.02))
     np.testing.assert_array_equal(series.t_ns, [0, 20_000_000])
     assert [one.kind for one in read_series(path, ["u"]).warnings] == ["assumed-period"]
 

@@ -14,7 +14,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import PASSED_OVER
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Arm = Callable[..., Chain]
 
@@ -74,7 +74,7 @@ def test_plotjuggler_with_empty_cells() -> None:
     ):
         read_log([path])
     column = "/turtle2/cmd_vel/angular/z"
-    log = read_log([path], ReadOptions(joints=("/turtle1/cmd_vel/linear/x", column)))
+    log = read_log([path], LogMap(joints=("/turtle1/cmd_vel/linear/x", column)))
     assert (log.source, log.rows, log.joints[1]) == ("plotjuggler", 563, column)
     assert log.clock_start == 1396293888.886
     assert np.isnan(log.q[0, 0])
@@ -89,7 +89,7 @@ def test_plotjuggler_with_empty_cells() -> None:
 def test_quoted_and_padded_dates() -> None:
     """01/20/2021 can only be the 20th of January."""
     path = LOGS / "plotjuggler" / "simple_parse_timestamp.csv"
-    log = read_log([path], ReadOptions(joints=("A", "B", "C", "D"), unit={"": "rad"}))
+    log = read_log([path], LogMap(joints=("A", "B", "C", "D"), unit={"": "rad"}))
     assert log.t_ns.tolist() == [0, 200_000_000, 400_000_000, 600_000_000, 610_000_000]
     assert log.clock_start_ns == 1_611_137_492_332_000_000  # 2021-01-20 10:11:32.332 UTC
     assert log.units["timestamp"] == "date"
@@ -118,7 +118,7 @@ def test_twelve_columns_without_a_header_are_asked_about(arm: Arm, joints: int |
         read_log([path], robot=robot)
     answer = asked.value.findings[0].hints[0].value
     assert answer == ["1-6"]
-    log = read_log([path], ReadOptions(joints=tuple(map(str, answer))), robot)
+    log = read_log([path], LogMap(joints=tuple(map(str, answer))), robot)
     assert log.q.shape == (2099, 6)
     assert log.q[0, 1] == 0.7844660375193842
     assert (log.first_line, log.period) == (1, 0.005)
@@ -129,7 +129,7 @@ def test_twelve_columns_without_a_header_are_asked_about(arm: Arm, joints: int |
     ("name", "first"), [("q_Traj1_PI.txt", 0.76916151), ("q_Traj1_Grad.txt", -0.16159558)]
 )
 def test_matlab_save_ascii(name: str, first: float, arm: Arm) -> None:
-    log = read_log([LOGS / "panda-matlab-ascii" / name], ReadOptions(period=0.01), arm(7))
+    log = read_log([LOGS / "panda-matlab-ascii" / name], LogMap(period=0.01), arm(7))
     assert log.q.shape == (1001, 7)
     assert log.q[0, 0] == first
     np.testing.assert_array_equal(log.q, np.loadtxt(LOGS / "panda-matlab-ascii" / name))
@@ -143,7 +143,7 @@ def test_joints_and_matrices_without_header(arm: Arm) -> None:
         LogError, match=r"found values up to 179 in phi1, .* and no unit, allowed: rad or deg"
     ):
         read_log([path], robot=arm(6))
-    log = read_log([path], ReadOptions(unit={"": "deg"}), arm(6))
+    log = read_log([path], LogMap(unit={"": "deg"}), arm(6))
     np.testing.assert_array_equal(log.q[0], np.array([-45, 147, -39, 96, 49, 67]) * (np.pi / 180))
     assert (log.rows, log.first_line) == (20, 2)
 
@@ -207,5 +207,5 @@ def test_a_grid_that_a_laser_tracker_measured() -> None:
 
 def test_random_poses_without_a_header() -> None:
     path = LOGS / "pybotics-ur10-fk" / "ur10-joints-poses.csv"
-    log = read_log([path], ReadOptions(unit={"": "deg"}), load_robot("ur10"))
+    log = read_log([path], LogMap(unit={"": "deg"}), load_robot("ur10"))
     assert (log.rows, log.timed) == (20, False)

@@ -11,7 +11,7 @@ import pytest
 from asserting import refusal
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Arm = Callable[..., Chain]
 Write = Callable[..., Path]
@@ -55,7 +55,7 @@ def test_numbers_of_the_columns_come_before_those_of_the_files(write: Write) -> 
             " Angular Displacement1 of Plot2.csv, Angular Displacement2 of Plot1.csv",
         )
     ]
-    given = read_log(files, ReadOptions(joints=("Angular Displacement2", "Angular Displacement1")))
+    given = read_log(files, LogMap(joints=("Angular Displacement2", "Angular Displacement1")))
     np.testing.assert_array_equal(given.q, np.array([VALUES[2], VALUES[1]]).T * DEG)
     assert not given.warnings
 
@@ -94,7 +94,7 @@ def test_a_folder_of_several_logs_is_told_as_such(
 def test_a_file_of_torques_or_of_joints_not_named_is_no_log_beside_the_joints(write: Write, arm: Arm) -> None:
     q, torques, others = (write(LOG.replace("q", name), f"{name}.csv") for name in ("q", "tau", "joint"))
     assert read_log([q, torques], robot=arm(2)).joints == ("q1", "q2")
-    assert read_log([q, others], ReadOptions(joints=("joint2", "joint1"))).joints == ("joint2", "joint1")
+    assert read_log([q, others], LogMap(joints=("joint2", "joint1"))).joints == ("joint2", "joint1")
 
 
 def test_german_words_and_equal_titles(write: Write) -> None:
@@ -158,5 +158,5 @@ def test_frames_beside_the_time_are_no_joint(write: Write) -> None:
 
 def test_a_plot_against_frames_has_no_clock(write: Write) -> None:
     text = "Frame;Angular Displacement1 (deg)\n1;1,5\n2;1,6\n3;1,7\n"
-    log = read_log([write(text)], ReadOptions(period=0.04))
+    log = read_log([write(text)], LogMap(period=0.04))
     assert log.t_ns.tolist() == [0, 40_000_000, 80_000_000]

@@ -22,7 +22,7 @@ from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import LogMap, ReadOptions, format_map, map_of, read_log, read_map
+from urmpipe_pipeline.sources import LogMap, format_map, map_of, read_log, read_map
 
 UR = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 NO_TIME = {"period": 0.02}
@@ -258,7 +258,7 @@ def _name(case: Good | Wrong) -> str:
 def read(case: Good) -> JointLog:
     """Read a specimen with what its file cannot tell."""
     robot = load_robot(case.robot) if case.robot else None
-    return read_log(paths(SPECIMENS[case.name]), ReadOptions(**case.options), robot)
+    return read_log(paths(SPECIMENS[case.name]), LogMap(**case.options), robot)
 
 
 def truth_of(case: Good) -> Truth:
@@ -385,7 +385,7 @@ TURNED: list[Any] = [
 def test_a_specimen_that_wraps_goes_on(name: str) -> None:
     case = next(case for case in map(_case, GOOD) if case.name == name)
     truth = truth_of(case)
-    run = ingest_log(paths(SPECIMENS[name]), read=ReadOptions(**case.options))
+    run = ingest_log(paths(SPECIMENS[name]), read=LogMap(**case.options))
     turns = (run.q[: len(truth.t)] - truth.turned) / (2 * np.pi)
     np.testing.assert_allclose(turns, np.rint(turns[:1]).repeat(len(truth.t), axis=0), rtol=0, atol=1e-3)
 

@@ -22,7 +22,7 @@ from urmpipe import ingest
 from urmpipe_models.errors import LogError, OptionError, UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import MemoryTable, ReadOptions, arrays_to_table, dataframe_to_table, read_log
+from urmpipe_pipeline.sources import LogMap, MemoryTable, arrays_to_table, dataframe_to_table, read_log
 
 OF_TEXT = ("encoding", "delimiter", "decimal sign", "header", "significant digits")
 """What only a text can tell."""
@@ -40,7 +40,7 @@ class Outcome:
     said: tuple[Any, ...]
 
 
-def outcome(log: Path | MemoryTable, options: ReadOptions | None = None) -> Outcome:
+def outcome(log: Path | MemoryTable, options: LogMap | None = None) -> Outcome:
     """Return what became of a log; of an error its findings, but for file and line."""
     try:
         run = ingest_log([log], read=options)
@@ -159,7 +159,7 @@ def test_a_query_that_fails_is_one_line() -> None:
 
 def log_of(frame: Any, **options: Any) -> JointLog:
     """Return the log that a table in Python is."""
-    return read_log([dataframe_to_table(frame, "log")], ReadOptions(**options))
+    return read_log([dataframe_to_table(frame, "log")], LogMap(**options))
 
 
 def test_float32_is_read_as_it_is_and_its_clock_by_its_digits() -> None:
@@ -234,9 +234,7 @@ def test_lists_of_many_lengths_are_no_joints() -> None:
 
 def test_structs_are_flattened_by_points() -> None:
     state = [{"q": row, "mode": "run"} for row in Q.tolist()]
-    log = read_log(
-        [dataframe_to_table(pa.table({"t": T, "state": state}), "log")], ReadOptions(unit={"": "rad"})
-    )
+    log = read_log([dataframe_to_table(pa.table({"t": T, "state": state}), "log")], LogMap(unit={"": "rad"}))
     assert log.joints == ("state.q_1", "state.q_2", "state.q_3")
     assert (log.q == Q).all()
 

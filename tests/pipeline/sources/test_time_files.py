@@ -11,7 +11,7 @@ import pytest
 from asserting import INCREASE, OTHER_TIME, refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Write = Callable[..., Path]
 
@@ -19,7 +19,7 @@ JOINTS = "0.5,1.5\n0.25,1.25\n0.125,1\n"
 
 
 def read(*files: Path, **options: object) -> JointLog:
-    return read_log(files, ReadOptions(**options))  # type: ignore[arg-type]
+    return read_log(files, LogMap(**options))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

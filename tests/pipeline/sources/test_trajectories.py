@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., JointLog]
 MakeArm = Callable[..., Chain]
@@ -145,7 +145,7 @@ def test_the_times_of_kitti_stand_in_a_file_of_their_own(
     t, position, quat = poses(60)
     files = [write(text(transforms(position, quat)), "00.txt"), write(text(t), "times.txt")]
     for ordered in (files, files[::-1]):
-        log = read_log(ordered, ReadOptions(), arm(joints) if joints else None)
+        log = read_log(ordered, LogMap(), arm(joints) if joints else None)
         assert_path(log, position, quat)
         np.testing.assert_allclose(log.t, t - t[0], rtol=0.0, atol=1e-9)
         assert not [one for one in log.warnings if one.role == "time"]
@@ -167,5 +167,5 @@ def test_random_joints_are_no_trajectory(
     q = np.cumsum(rng.uniform(-0.02, 0.02, (rows, count)), axis=0) + rng.uniform(1.0, 2.0, count)
     path = tmp_path_factory.mktemp("a") / "a.txt"
     path.write_text(text(np.arange(rows, dtype=np.float64) * 0.01, q))
-    log = read_log([path], ReadOptions(time="1", joints=tuple(str(k) for k in range(2, count + 2))))
+    log = read_log([path], LogMap(time="1", joints=tuple(str(k) for k in range(2, count + 2))))
     np.testing.assert_array_equal(log.q, q)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, format_map, map_of, read_log, read_map
+from urmpipe_pipeline.sources import LogMap, format_map, map_of, read_log, read_map
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.smoothness import flat_ways, goes_along_rows
 
@@ -138,7 +138,7 @@ def test_a_table_in_memory() -> None:
     q = motion()
     columns = MemoryTable("q", pa.table({str(k): column for k, column in enumerate(q)}), named=False)
     assert asked(lambda: read_log([columns]))[1] == ["transposed", "table"]
-    np.testing.assert_array_equal(read_log([columns], ReadOptions(layout="transposed")).q, q)
+    np.testing.assert_array_equal(read_log([columns], LogMap(layout="transposed")).q, q)
 
 
 @pytest.mark.slow
@@ -214,7 +214,7 @@ def test_what_does_not_fit(layout: str, said: str, read: Read) -> None:
 @pytest.mark.parametrize("wrong", ["columns", "flat", "flat:0", "flat:six", "flat-by-joint:", 6])
 def test_other_layouts_are_refused(wrong: object) -> None:
     with pytest.raises(OptionError) as error:
-        ReadOptions(layout=wrong)  # type: ignore[arg-type]
+        LogMap(layout=wrong)  # type: ignore[arg-type]
     assert str(error.value) == (
         f"layout (--layout): found {wrong!r}, allowed: table, transposed, flat:N or flat-by-joint:N,"
         " with N numbers a sample"

@@ -17,11 +17,11 @@ from scipy.io import savemat
 from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 
 T = np.arange(50) * 0.01
 Q = np.sin(9 * T[:, np.newaxis] + np.arange(6.0))
-RAD = ReadOptions(unit={"": "rad"})
+RAD = LogMap(unit={"": "rad"})
 
 
 def frame() -> pd.DataFrame:
@@ -140,7 +140,7 @@ def test_mat_files_of_others(tmp_path: Path, what: str, compressed: bool) -> Non
 def test_a_matrix_alone_has_its_samples_along_its_longer_side(tmp_path: Path) -> None:
     for q in (Q, Q.T):
         savemat(tmp_path / "log.mat", {"q": q})
-        log = read_log([tmp_path / "log.mat"], ReadOptions(unit={"": "rad"}, period=0.01))
+        log = read_log([tmp_path / "log.mat"], LogMap(unit={"": "rad"}, period=0.01))
         is_the_motion(log)
 
 

@@ -20,7 +20,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.repolarization.audit import is_revolute
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import ReadOptions, format_map, map_of, read_log, read_map
+from urmpipe_pipeline.sources import LogMap, format_map, map_of, read_log, read_map
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -355,7 +355,7 @@ def test_joints_turn_by_their_own_columns(write: Write) -> None:
     """A joint may be called as a recorded x is, which slides; one that nobody gave a column turns."""
     names = ["a [deg]", "b [deg]", *XYZ]
     table = csv(names, Q[:, :2] * DEG, FLANGE)
-    options = ReadOptions(joints=("a", "b"), names=("x", "b"))
+    options = LogMap(joints=("a", "b"), names=("x", "b"))
     run = ingest_log([write(table)], read=options)
     assert (is_revolute(run.log, None).tolist(), run.joint_units) == ([True, True], ["rad", "rad"])
     bare = replace(run.log, columns=())

@@ -16,7 +16,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -334,9 +334,9 @@ def test_a_unit_given_for_every_angle_reaches_what_the_source_tells_and_the_orie
 def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None:
     assert read("t,a,b\n0,1,2\n0.1,1,2\n", joints=[3, 2], time=1, unit={2: "deg"}).joints == ("b", "a")
     once: Any = (f"q{k}" for k in (1, 2))
-    assert ReadOptions(joints=once).joints == ("q1", "q2")
+    assert LogMap(joints=once).joints == ("q1", "q2")
     with pytest.raises(OptionError) as caught:
-        ReadOptions(joints="q1", position=3, unit=3, interval=2.0)  # type: ignore[arg-type]
+        LogMap(joints="q1", position=3, unit=3, interval=2.0)  # type: ignore[arg-type]
     columns = "allowed: columns by name or number, such as q1,q2 or 2,3"
     assert str(caught.value).split("\n") == [
         f"joints (--joints): found 'q1', {columns}",
@@ -348,15 +348,15 @@ def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None
     ]
 
 
-@pytest.mark.parametrize("name", [one.name for one in fields(ReadOptions) if one.compare])
+@pytest.mark.parametrize("name", [one.name for one in fields(LogMap) if one.compare])
 def test_each_option_of_reading_refuses_what_is_of_a_wrong_kind(name: str) -> None:
-    default = getattr(ReadOptions(), name)
+    default = getattr(LogMap(), name)
     odd_ones: list[Any] = [None, object(), 3j, {"q1": 3}, [None], pd.DataFrame({"q1": [1.0]})]
     for odd in odd_ones:
         if odd is default:
             continue
         with pytest.raises(OptionError) as caught:
-            ReadOptions(**{name: odd})
+            LogMap(**{name: odd})
         assert re.fullmatch(rf"{name}( \(--[a-z-]+\))?: found .{{1,60}}, allowed: .+", str(caught.value))
 
 

@@ -19,7 +19,7 @@ from asserting import refusal
 from urmpipe.main import run
 from urmpipe_models.errors import Hint, LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.options import read_options
 
 K = np.arange(60)
@@ -169,10 +169,10 @@ def test_of_several_sheets_urmpipe_asks(tmp_path: Path, expected: JointLog) -> N
     )
     counts = [answer(path, hint).rows for hint in caught.value.findings[0].hints]
     assert counts == [60, 9]
-    assert read_log([path], ReadOptions(sheet=3)).rows == 9  # type: ignore[arg-type]  # plain numbers are taken
+    assert read_log([path], LogMap(sheet=3)).rows == 9  # type: ignore[arg-type]  # plain numbers are taken
     same(read_log([write(tmp_path / "one.xlsx", info=info, log=[HEADER, *rows()])]), expected)
     allowed = "allowed: 'info', 'run 1', 'run 2'"
-    assert refusal(OptionError, read_log, [path], ReadOptions(sheet="4")).endswith(f"found '4', {allowed}")
+    assert refusal(OptionError, read_log, [path], LogMap(sheet="4")).endswith(f"found '4', {allowed}")
 
 
 def answer(path: Path, hint: Hint) -> JointLog:
@@ -181,7 +181,7 @@ def answer(path: Path, hint: Hint) -> JointLog:
 
 def test_a_sheet_of_a_text_is_refused(write: Callable[..., Path]) -> None:
     path = write("t,q1\n0,1\n")
-    said = refusal(OptionError, read_log, [path], ReadOptions(sheet="log"))
+    said = refusal(OptionError, read_log, [path], LogMap(sheet="log"))
     assert said == "sheet (--sheet): found 'log', allowed: with a workbook"
 
 

@@ -17,7 +17,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 STEP = 5_000_000
@@ -105,7 +105,7 @@ def test_without_times_there_is_no_time(tmp_path: Path) -> None:
     robot = load_robot("urm6")
     q = motion(20, 6)
     write(tmp_path / "solved.csv", robot, q, None)
-    run = ingest_log([tmp_path / "solved.csv"], robot=robot, read=ReadOptions(period=0.005))
+    run = ingest_log([tmp_path / "solved.csv"], robot=robot, read=LogMap(period=0.005))
     assert run.log.q.tolist() == q.tolist()
     assert list(run.warnings) == []
 

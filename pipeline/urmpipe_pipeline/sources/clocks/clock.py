@@ -31,7 +31,7 @@ from urmpipe_pipeline.sources.clocks.halves import EPOCH
 from urmpipe_pipeline.sources.clocks.steps import steps_of
 from urmpipe_pipeline.sources.clocks.text_times import known_forms, read_cells
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn
 from urmpipe_pipeline.sources.tables.opening import Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -111,7 +111,7 @@ def _unit_of(part: ClockColumn) -> str:
 def find_clocks(
     tables: Tables,
     columns: Sequence[Column],
-    options: ReadOptions,
+    options: LogMap,
     units: Mapping[int, Unit],
     joints: int | None = None,
 ) -> tuple[Clock, ...]:

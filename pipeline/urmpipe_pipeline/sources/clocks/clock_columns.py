@@ -14,7 +14,7 @@ from urmpipe_pipeline.sources.clocks.no_header import without_header
 from urmpipe_pipeline.sources.clocks.steps import increases
 from urmpipe_pipeline.sources.clocks.text_times import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column, Kind, find_column
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -26,7 +26,7 @@ GIVEN = "given as an option"
 def time_columns(
     columns: Sequence[Column],
     layout: Layout,
-    options: ReadOptions,
+    options: LogMap,
     joints: int | None,
     whole: Whole,
 ) -> Chosen:

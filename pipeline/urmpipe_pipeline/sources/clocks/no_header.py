@@ -17,7 +17,7 @@ from urmpipe_pipeline.sources.clocks.steps import Steps, counts_rows, increases,
 from urmpipe_pipeline.sources.columns.columns import Column, chosen_columns
 from urmpipe_pipeline.sources.columns.pose import have_length_1, trailing_matrix, trailing_quaternion
 from urmpipe_pipeline.sources.columns.trajectories import clock_before_pose
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.opening import PATH
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -47,7 +47,7 @@ PAUSE = 20.0
 
 
 def without_header(
-    columns: Sequence[Column], layout: Layout, options: ReadOptions, joints: int | None, whole: Whole
+    columns: Sequence[Column], layout: Layout, options: LogMap, joints: int | None, whole: Whole
 ) -> Chosen | None:
     """Return the clock of a table without a header; None if it has none.
 
@@ -88,7 +88,7 @@ def without_header(
     return _increasing(free, layout, joints, whole, path=path, sure=bool(named))
 
 
-def _before_pose(columns: Sequence[Column], layout: Layout, options: ReadOptions) -> Chosen | None:
+def _before_pose(columns: Sequence[Column], layout: Layout, options: LogMap) -> Chosen | None:
     """Return what stands before x, y, z and the orientation told, if the number of columns says so."""
     pose = 3 + (column_count(options.rotation) if options.rotation else 0)
     if len(columns) == pose:

@@ -16,7 +16,7 @@ from urmpipe_pipeline.sources.clocks.clock import Clock, clock_of
 from urmpipe_pipeline.sources.clocks.clock_columns import given_time, time_columns
 from urmpipe_pipeline.sources.clocks.steps import runs_evenly
 from urmpipe_pipeline.sources.columns.columns import Column, find_column
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
 from urmpipe_pipeline.sources.tables.rows import count_rows, with_rows
 from urmpipe_pipeline.sources.tables.sniff import across
@@ -40,7 +40,7 @@ def named_file(time: str | None) -> tuple[Path, str] | None:
     return None
 
 
-def with_time_file(tables: Tables, options: ReadOptions) -> tuple[Tables, int | None]:
+def with_time_file(tables: Tables, options: LogMap) -> tuple[Tables, int | None]:
     """Return the tables of a log, behind them that of the file whose column the user names as the time.
 
     Returns:
@@ -56,11 +56,11 @@ def with_time_file(tables: Tables, options: ReadOptions) -> tuple[Tables, int | 
     if len(tables.layouts) > 1:
         found = f"{format_value(options.time or '')} for {len(tables.layouts)} tables"
         raise OptionError(Finding(parameter="time", found=found, allowed="FILE:COLUMN for one table"))
-    plain = ReadOptions(delimiter=options.delimiter, decimal=options.decimal)
+    plain = LogMap(delimiter=options.delimiter, decimal=options.decimal)
     try:
         apart = open_tables([named[0]], plain)
     except LogError:
-        apart = open_tables([named[0]], ReadOptions())  # it may be written in another way than the log
+        apart = open_tables([named[0]], LogMap())  # it may be written in another way than the log
     layout, rows = across(apart.layouts[0]), tables.layouts[0].rows
     if rows is not None and rows[-1] < count_rows(layout):
         layout = with_rows(layout, rows)
@@ -69,7 +69,7 @@ def with_time_file(tables: Tables, options: ReadOptions) -> tuple[Tables, int | 
 
 
 def clocks_apart(
-    tables: Tables, columns: Sequence[Column], index: int, options: ReadOptions, units: Mapping[int, Unit]
+    tables: Tables, columns: Sequence[Column], index: int, options: LogMap, units: Mapping[int, Unit]
 ) -> tuple[Clock, ...]:
     """Return the clocks of two tables, of which one has the times of the other.
 

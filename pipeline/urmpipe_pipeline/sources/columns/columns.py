@@ -9,7 +9,7 @@ from enum import IntEnum
 
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.sources.cells.cell import count_numbers, is_missing
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.limits import refuse_wide
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -256,7 +256,7 @@ def columns_named(
     return {what: some[0] for what, some in found.items() if some}
 
 
-def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:
+def given_units(columns: Sequence[Column], options: LogMap) -> dict[int, Unit]:
     """Return the units that the user gave, by the column's number; by 0 that of every angle.
 
     Raises:

@@ -33,7 +33,7 @@ from urmpipe_pipeline.sources.columns.roles import (
 )
 from urmpipe_pipeline.sources.columns.trajectories import path_of_poses
 from urmpipe_pipeline.sources.columns.unnamed import joints_among
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -47,7 +47,7 @@ ASSUMED_JOINTS = "assumed-joints"  # warning: all columns of a table without nam
 def without_header(
     columns: Sequence[Column],
     layouts: Sequence[Layout],
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     whole: Sequence[Whole],
     *,
@@ -111,7 +111,7 @@ def _assumed_joints(joints: Sequence[Column]) -> LogWarning:
 
 
 def _path_by_place(
-    columns: Sequence[Column], layouts: Sequence[Layout], file: str, options: ReadOptions, pose: Pose | None
+    columns: Sequence[Column], layouts: Sequence[Layout], file: str, options: LogMap, pose: Pose | None
 ) -> Roles:
     """Return x, y, z and the orientation behind them: of the form told, or by what its numbers are."""
     if pose is None and len(columns) < 3:

@@ -16,7 +16,7 @@ from urmpipe_models.math3d import FORMS, RotationForm, column_count
 from urmpipe_pipeline.sources.cells.cell import to_float
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import Family, drop_unknown, find_families, prefer_measured
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.sniff import FEW, Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -126,7 +126,7 @@ def _counted_pose(
     return Pose(position, rotation, forms, "the four columns beside them have length 1")
 
 
-def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
+def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
     """Return the pose whose columns the user named; None if none are named.
 
     Raises:
@@ -155,7 +155,7 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
     return Pose(position, rotation, forms if rotation else (), "given as an option")
 
 
-def _measured_pose(columns: Sequence[Column], options: ReadOptions) -> Pose:
+def _measured_pose(columns: Sequence[Column], options: LogMap) -> Pose:
     """Return the pose that the user names as measured from outside."""
     named = tuple(find_column(columns, text, parameter="measured") for text in options.measured)
     position, rotation = named[:3], named[3:]
@@ -169,7 +169,7 @@ def _measured_pose(columns: Sequence[Column], options: ReadOptions) -> Pose:
     return Pose(position, rotation, forms, "given as an option", measured=True)
 
 
-def _forms_of(rotation: Sequence[Column], options: ReadOptions) -> tuple[RotationForm, ...]:
+def _forms_of(rotation: Sequence[Column], options: LogMap) -> tuple[RotationForm, ...]:
     """Return the forms that so many columns of an orientation may have; none of none."""
     many = len(rotation)
     return tuple(

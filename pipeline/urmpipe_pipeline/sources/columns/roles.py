@@ -42,7 +42,7 @@ from urmpipe_pipeline.sources.columns.questions import (
 )
 from urmpipe_pipeline.sources.columns.sides import REST
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.own_tables import stated_joints
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.whole import Whole
@@ -99,7 +99,7 @@ class Roles:
 def assign(
     columns: Sequence[Column],
     layouts: Sequence[Layout],
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     whole: Sequence[Whole] = (),
     *,

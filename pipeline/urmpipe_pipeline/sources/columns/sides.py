@@ -10,7 +10,7 @@ from itertools import combinations
 
 from urmpipe_models.errors import Finding, LogError, OptionError, format_value
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 REST = "rest"  # all columns without the other side's word
@@ -18,7 +18,7 @@ REST = "rest"  # all columns without the other side's word
 MAX_LISTED = 8  # words in a message, those of most columns
 
 
-def columns_of_side(columns: Sequence[Column], options: ReadOptions, file: str) -> list[Column]:
+def columns_of_side(columns: Sequence[Column], options: LogMap, file: str) -> list[Column]:
     """Return the columns of the side that the user chose; all columns without one.
 
     Args:
@@ -48,7 +48,7 @@ def columns_of_side(columns: Sequence[Column], options: ReadOptions, file: str) 
     return chosen or list(columns)
 
 
-def without_other_side(columns: Sequence[Column], options: ReadOptions) -> tuple[Column, ...]:
+def without_other_side(columns: Sequence[Column], options: LogMap) -> tuple[Column, ...]:
     """Return the columns without those of another side, unless no time is left."""
     other = _words(options.pair[1]) if options.pair else frozenset((REST,))
     own = {column.number for column in select_side(columns, options.side or "")}
@@ -140,7 +140,7 @@ def _no_column(columns: Sequence[Column], wanted: str, parameter: str, file: str
     )
 
 
-def columns_of_topic(columns: Sequence[Column], options: ReadOptions, file: str) -> list[Column]:
+def columns_of_topic(columns: Sequence[Column], options: LogMap, file: str) -> list[Column]:
     """Return the columns whose names begin with the topic that the user chose.
 
     Args:

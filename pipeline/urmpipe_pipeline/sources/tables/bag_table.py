@@ -20,7 +20,7 @@ import pyarrow as pa
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError, format_value
 from urmpipe_pipeline.joint_log import Inference, LogWarning
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.bag_file import Message, decoder, open_bag
 from urmpipe_pipeline.sources.tables.column_facts import JOINT, ROLE, UNIT
 from urmpipe_pipeline.sources.tables.held import MemoryTable
@@ -90,7 +90,7 @@ class _Topics(NamedTuple):
         return ", ".join([*shown, *([f"{len(names) - MAX_LISTED} more"] if len(names) > MAX_LISTED else [])])
 
 
-def read_bag(path: Path, options: ReadOptions) -> MemoryTable:
+def read_bag(path: Path, options: LogMap) -> MemoryTable:
     """Return the table of one topic of a recording.
 
     Args:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.array_choice import Question
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.array_table import ask_for_arrays, make_array_table
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked, refuse_wide, unpacked_limit
@@ -16,7 +16,7 @@ from urmpipe_pipeline.subprocess_reader import ReaderCrashError, read_in_subproc
 READER = "urmpipe_pipeline.hdf5_contents"  # it is imported with h5py, which may be missing
 
 
-def read_hdf5(path: Path, options: ReadOptions) -> MemoryTable:
+def read_hdf5(path: Path, options: LogMap) -> MemoryTable:
     """Return the table of an HDF5 file.
 
     Raises:

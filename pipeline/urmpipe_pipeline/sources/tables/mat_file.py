@@ -21,7 +21,7 @@ from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline import mat_variables
 from urmpipe_pipeline.array_choice import Name, Question, choose_arrays
 from urmpipe_pipeline.outputs import EXPORT_HEADER
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.array_table import ArrayColumn, ask_for_arrays, make_array_table
 from urmpipe_pipeline.sources.tables.column_facts import UNIT
@@ -43,7 +43,7 @@ HEADER, COMPRESSED = 128, 15
 """Bytes before the first variable of a file; the kind of a variable that is packed."""
 
 
-def read_mat(path: Path, head: bytes, options: ReadOptions) -> MemoryTable:
+def read_mat(path: Path, head: bytes, options: LogMap) -> MemoryTable:
     """Return the table of a MAT file of version 5.
 
     Raises:
@@ -53,7 +53,7 @@ def read_mat(path: Path, head: bytes, options: ReadOptions) -> MemoryTable:
 
 
 def make_variable_table(
-    path: Path, variables: Mapping[str, Any], options: ReadOptions, *, exported: bool = False
+    path: Path, variables: Mapping[str, Any], options: LogMap, *, exported: bool = False
 ) -> MemoryTable:
     """Return the table of the variables of MATLAB, Octave or SciPy.
 

@@ -11,7 +11,7 @@ from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import is_number
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables import coppeliasim
 from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
 from urmpipe_pipeline.sources.tables.conflict import refuse_among_rows, refuse_conflict
@@ -35,7 +35,7 @@ COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
 
 
 def source_names() -> tuple[str, ...]:
-    """Return the names that `ReadOptions.source` takes."""
+    """Return the names that `LogMap.source` takes."""
     return (COPPELIASIM, *(source.name for source in vocabulary().sources), PATH, TABLE)
 
 
@@ -73,9 +73,7 @@ Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
 """What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
 
 
-def open_tables(
-    files: Sequence[Path | MemoryTable], options: ReadOptions, sniff_plain: Sniff = sniff
-) -> Tables:
+def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plain: Sniff = sniff) -> Tables:
     """Return the tables of a log's files, or of what is in memory.
 
     Raises:
@@ -129,7 +127,7 @@ def open_tables(
     return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, whole, warnings)
 
 
-def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTable:
+def _opened(one: Path | MemoryTable, options: LogMap) -> Segment | MemoryTable:
     """Return a table as it is in memory, a file of typed columns or a program read, any other as text."""
     if isinstance(one, MemoryTable):
         return one
@@ -144,7 +142,7 @@ def _opened(one: Path | MemoryTable, options: ReadOptions) -> Segment | MemoryTa
     return table or text
 
 
-def _shaped(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:
+def _shaped(layouts: Sequence[Layout], options: LogMap) -> list[Layout]:
     """Return tables with a row a sample: the rows that are read, without end marks in what is sampled."""
     alone = len(layouts) == 1
     shaped = map_collecting_errors(lambda one: turned(one, options.layout, alone=alone), layouts)
@@ -162,7 +160,7 @@ def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
         yield Inference("encoding", text.encoding, mark, hints=utf_8)
 
 
-def _layout(one: Segment | MemoryTable, options: ReadOptions, sniff_plain: Sniff) -> Layout:
+def _layout(one: Segment | MemoryTable, options: LogMap, sniff_plain: Sniff) -> Layout:
     """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
     if isinstance(one, MemoryTable):
         return layout_of(one)

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.exact_clock import exact_times
 from urmpipe_pipeline.sources.tables.frames import index_first
 from urmpipe_pipeline.sources.tables.held import MemoryTable
@@ -23,7 +23,7 @@ CLOCK = "clock [ns]"
 """The exact clock of our own files; their times in s, ms and us are doubles."""
 
 
-def read_parquet(path: Path, head: bytes, options: ReadOptions) -> MemoryTable:
+def read_parquet(path: Path, head: bytes, options: LogMap) -> MemoryTable:
     """Return the table of a Parquet file, of which the first bytes are given.
 
     Of a file of episodes (LeRobot), only the rows of a given episode are read, and no images.

@@ -17,7 +17,7 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_v
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_number, split_line, to_float
 from urmpipe_pipeline.sources.cells.text_clock import UNPADDED_NS
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.held import sampled_cells
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn
@@ -35,7 +35,7 @@ _Episodes = Mapping[str, IntArray]
 """The rows of each episode by its name, from 0."""
 
 
-def choose_rows(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:
+def choose_rows(layouts: Sequence[Layout], options: LogMap) -> list[Layout]:
     """Return tables of the rows of the option `rows`, and of these the rows of one episode.
 
     Raises:

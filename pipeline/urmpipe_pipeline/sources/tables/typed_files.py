@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.bag_file import MAGIC, is_bag_folder, is_packed
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 
@@ -15,7 +15,7 @@ HEAD = 128
 """Bytes at the start of a file that show its format."""
 
 
-def read_typed(path: Path, options: ReadOptions) -> MemoryTable | None:
+def read_typed(path: Path, options: LogMap) -> MemoryTable | None:
     """Return the table of a file of typed columns; None of any other file, which may be text.
 
     Args:
@@ -51,7 +51,7 @@ def read_typed(path: Path, options: ReadOptions) -> MemoryTable | None:
     return _read_messages(path, options) if is_recording else None
 
 
-def _read_messages(path: Path, options: ReadOptions) -> MemoryTable:
+def _read_messages(path: Path, options: LogMap) -> MemoryTable:
     for library in ("mcap.reader", "rosbags.typesys"):
         import_optional(library, path, "a recording of messages")
     from urmpipe_pipeline.sources.tables.bag_table import read_bag

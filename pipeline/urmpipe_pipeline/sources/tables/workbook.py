@@ -22,7 +22,7 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_v
 from urmpipe_pipeline import workbook_cells
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_number
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked
 from urmpipe_pipeline.sources.tables.text import Segment, text_segment
 from urmpipe_pipeline.sources.tables.typed_files import import_optional
@@ -38,7 +38,7 @@ _DECIMAL_POINT = re.compile(r"[+-]?\d+\.\d+\Z")
 _SEPARATORS = str.maketrans('\t\r\n"', "   '")  # would end a cell or a line
 
 
-def read_workbook(path: Path, options: ReadOptions) -> Segment | None:
+def read_workbook(path: Path, options: LogMap) -> Segment | None:
     """Return a sheet of a workbook as text; None if the file is no workbook.
 
     Args:

@@ -16,7 +16,7 @@ from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed
 from urmpipe_pipeline.sources.columns.questions import unit_inference
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.numbers import RowFault
 from urmpipe_pipeline.sources.tables.opening import PATH, open_tables
@@ -70,7 +70,7 @@ class PoseTable:
 
 def read_pose_table(
     file: Path,
-    options: ReadOptions,
+    options: LogMap,
     further: Mapping[str, ExtraColumn] | None = None,
     naming: str = "name the columns in a header",
 ) -> PoseTable:
@@ -98,7 +98,7 @@ def read_pose_table(
         return _read(file, options, further, naming)
 
 
-def _read(file: Path, options: ReadOptions, further: Mapping[str, ExtraColumn], naming: str) -> PoseTable:
+def _read(file: Path, options: LogMap, further: Mapping[str, ExtraColumn], naming: str) -> PoseTable:
     """Return the rows of a table as `read_pose_table` does."""
     asked, length = _plain_length(replace(options, joints=(), names=(), signs=(), offsets=()))
     tables = open_tables([file], asked, partial(sniff_targets, position=asked.position))
@@ -120,7 +120,7 @@ def _read(file: Path, options: ReadOptions, further: Mapping[str, ExtraColumn], 
     )
 
 
-def _plain_length(asked: ReadOptions) -> tuple[ReadOptions, Unit | None]:
+def _plain_length(asked: LogMap) -> tuple[LogMap, Unit | None]:
     """Return the options without a plain length (mm), and that unit, which is of x, y, z here."""
     unit = vocabulary().unit(asked.unit.get("", ""))
     if unit is None or unit.quantity != "length" or unit.order:

@@ -16,7 +16,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Hint, Message, UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.sources.options import read_options
 
 LONGEST = 3
@@ -68,7 +68,7 @@ class Reading:
     """What came of one reading, and the answers that led to it."""
 
     came: JointLog | UrmpipeError
-    options: ReadOptions
+    options: LogMap
     robot: Chain | None
     answers: tuple[Hint, ...] = ()
     before: Reading | None = None
@@ -139,7 +139,7 @@ class Verdict:
 
 def outcome(
     paths: Sequence[Path],
-    options: ReadOptions,
+    options: LogMap,
     robot: Chain | None,
     answers: tuple[Hint, ...] = (),
     before: Reading | None = None,
@@ -163,18 +163,18 @@ def readings(paths: Sequence[Path], first: Reading, depth: int = LONGEST) -> Ite
             yield from readings(paths, then, depth - 1)
 
 
-def answered(options: ReadOptions, robot: Chain | None, hint: Hint) -> tuple[ReadOptions, Chain | None]:
+def answered(options: LogMap, robot: Chain | None, hint: Hint) -> tuple[LogMap, Chain | None]:
     """Return options and robot with an answer added, as the printed one would be given; as they are if it is
     none that reading takes.
     """
     if hint.robot or hint.parameter == "robot":
         robot = load_robot(hint.robot or str(hint.value))
-    if hint.call or hint.parameter not in {one.name for one in fields(ReadOptions)}:
+    if hint.call or hint.parameter not in {one.name for one in fields(LogMap)}:
         return options, robot
     return read_options({hint.parameter: hint.value}, options), robot
 
 
-def judge(paths: Sequence[Path], truth: Truth, options: ReadOptions, robot: Chain | None) -> Verdict:
+def judge(paths: Sequence[Path], truth: Truth, options: LogMap, robot: Chain | None) -> Verdict:
     """Return what the reader did with files that hold this."""
     first = outcome(paths, options, robot)
     about = () if first.log is None else differing(first.log, truth)

@@ -17,7 +17,7 @@ from motion import Motion
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 DEG = np.pi / 180
 
@@ -231,7 +231,7 @@ def judged(one: Stranger, folder: Path) -> Verdict:
     robot = load_robot(one.robot) if one.robot else None
     if one.arm:
         robot = Chain("arm", tuple(Joint(f"phi{k + 1}", kind="revolute") for k in range(one.arm)))
-    return judge(one.write(folder), one.truth, ReadOptions(**told), robot)
+    return judge(one.write(folder), one.truth, LogMap(**told), robot)
 
 
 STRANGERS: dict[str, Stranger] = {}

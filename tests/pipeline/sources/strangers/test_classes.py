@@ -21,7 +21,7 @@ from ordinary import well_written
 from stranger import STRANGERS, Stranger, judged
 from urmpipe.main import run
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 ORDINARY: Mapping[str, Stranger] = {f"ordinary-{k + 1}": one for k, one in enumerate(well_written())}
 
@@ -74,7 +74,7 @@ BROKEN: Mapping[str, Sequence[str]] = {
 def test_each_message_about_time_names_its_option(cells: Sequence[str], head: str, tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(with_times(cells, head))
-    came = outcome([path], ReadOptions(), None).came
+    came = outcome([path], LogMap(), None).came
     told = came.warnings if isinstance(came, JointLog) else getattr(came, "findings", ())
     about = [one for one in told if re.search(r"\btimes?\b|clock", one.message + (one.allowed or ""))]
     for one in about:

@@ -16,7 +16,7 @@ from asking import Truth, judge, outcome
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import LogMap
 
 LOGS = Path(__file__).resolve().parents[4].parent / "shared" / "logs"
 pytestmark = pytest.mark.skipif(not LOGS.is_dir(), reason="the real logs in ../shared/logs are not here")
@@ -182,13 +182,13 @@ OTHERS = ("youbot-vrep-scene8/configurations.csv", "plotjuggler/simple_parse_tim
 def test_a_real_log_is_read_right_or_asked_about(name: str) -> None:
     oracle, robot = LOGS_READ[name]
     path = LOGS / name
-    verdict = judge([path], oracle(path), ReadOptions(), load_robot(robot) if robot else None)
+    verdict = judge([path], oracle(path), LogMap(), load_robot(robot) if robot else None)
     assert verdict.good, verdict
 
 
 @pytest.mark.parametrize("name", NO_LOGS)
 def test_what_is_no_log_gets_one_line(name: str) -> None:
-    came = outcome([LOGS / name], ReadOptions(), None).came
+    came = outcome([LOGS / name], LogMap(), None).came
     assert isinstance(came, UrmpipeError), came
     assert len(str(came).splitlines()) == 1
     # No unit of anything would make it a log.
@@ -198,11 +198,11 @@ def test_what_is_no_log_gets_one_line(name: str) -> None:
 def test_the_wheels_of_a_youbot_are_asked_about_before_any_unit() -> None:
     """Which columns are joints only its owner knows: five behind phi, x and y, and before four wheels."""
     path = LOGS / "youbot-vrep-scene8" / "configurations.csv"
-    first = outcome([path], ReadOptions(), None)
+    first = outcome([path], LogMap(), None)
     assert isinstance(first.came, UrmpipeError), first.said
     about = {hint.parameter for one in first.came.findings for hint in one.hints}
     assert "joints" in about and "unit" not in about, first.said
-    verdict = judge([path], youbot(path), ReadOptions(joints=("4", "5", "6", "7", "8")), None)
+    verdict = judge([path], youbot(path), LogMap(joints=("4", "5", "6", "7", "8")), None)
     assert verdict.good, verdict
 
 

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Program:
     path: Path
     text: str
     language: str
-    options: ReadOptions
+    options: LogMap
 
     def statements(self) -> Iterator[tuple[int, str]]:
         """Yield each statement that a semicolon ends, or the file, with the offset where it begins."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import LogMap
 from urmpipe_pipeline.sources.tables.held import MemoryTable
 from urmpipe_pipeline.sources.tables.programs import krl, rapid, structured_text
 from urmpipe_pipeline.sources.tables.programs.program import Program, blanked
@@ -80,7 +80,7 @@ _LANGUAGES = (
 )
 
 
-def read_program(segment: Segment, options: ReadOptions) -> MemoryTable | None:
+def read_program(segment: Segment, options: LogMap) -> MemoryTable | None:
     """Return the table that the text of a program holds; None of any other text, by its head.
 
     Raises:
