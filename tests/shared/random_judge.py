@@ -34,7 +34,7 @@ from urmpipe_pipeline.sources import read_log
 
 UNIT = "assumed-unit doubted-unit unit-contradiction "
 SAYS = {  # kinds of warnings that are about what is wrong
-    "joints": "columns-not-read",
+    "joints": "columns-not-read assumed-joints",
     "order": "plot-order columns-not-read",
     "rows": "end-rows skipped-row other-lines",
     "unit": UNIT,
@@ -128,7 +128,7 @@ def assess(log: Log, read: JointLog, *, asked: bool = False) -> Verdict:
 def _is_said(log: Log, read: JointLog, role: str, what: str) -> bool:
     """Return whether a warning is about it; of columns that are not read, it has the name of one of them."""
     said = [str(warning) for warning in read.warnings if warning.kind in SAYS.get(role, "").split()]
-    names = log.truth.names["joint"] if role in ("joints", "order") else []
+    names = log.truth.names["joint"] if role in ("joints", "order") and "header" not in log.unsaid else []
     if "not read" in what:
         names = log.truth.names["position"] + log.truth.names["rotation"]
     return bool(said) and (not names or any(_plain(name) in _plain(text) for name in names for text in said))
