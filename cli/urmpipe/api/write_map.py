@@ -50,5 +50,5 @@ def map_of_run(run: Run, path: Path, robot: str | None) -> LogMap:
     elif Path(robot).suffix:
         robot = os.path.relpath(robot, path.parent)
     frames = (arm.base, arm.tool) if arm else ()
-    given = LogMap(**(run.provenance.options.get("read") or {}))
-    return map_of(run.log, given, robot, *(offset_of(frame) for frame in frames))
+    log_map = LogMap(**(run.provenance.options.get("read") or {}))
+    return map_of(run.log, log_map, robot, *(offset_of(frame) for frame in frames))

@@ -55,10 +55,10 @@ def ingest(call: Call, logs: tuple[Path, ...], output: Path | None, explain: boo
         try:
             run = urmpipe.ingest(logs, output=output, progress=progress, **options)
         except LogError as error:
-            asked = _open_map(logs, options, error) if explain and not call.json else None
-            if asked is None or not asked.questions:
+            open_map = _open_map(logs, options, error) if explain and not call.json else None
+            if open_map is None or not open_map.questions:
                 raise
-            return Answer(print_text=partial(_print_map, asked), errors=error.findings)
+            return Answer(print_text=partial(_print_map, open_map), errors=error.findings)
     text = partial(_print_run_map, run, options["robot"]) if explain else None
     return Answer(run, _iter_lines(run, is_replaced, options), print_text=text)
 
@@ -79,7 +79,7 @@ def _print_map(log_map: LogMap, headline: str = "") -> None:
 
 
 def _open_map(logs: tuple[Path, ...], options: Mapping[str, Any], error: LogError) -> LogMap:
-    """Return what is known of logs that cannot be read, and the questions."""
+    """Return the map of logs that cannot be read yet, with its questions."""
     from urmpipe.reading import to_log_map
     from urmpipe_pipeline.operands import log_files
     from urmpipe_pipeline.sources.read import open_map

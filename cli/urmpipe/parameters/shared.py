@@ -60,7 +60,7 @@ class TextTable(TypedDict, total=False):
     ]
     orientation: Annotated[
         str | Sequence[str | int] | None,
-        _reading(kinds.COLUMNS, "Columns of the orientation beside them, in the order of its form."),
+        _reading(kinds.COLUMNS, "Columns of the orientation, in the order of its form."),
     ]
     rotation: Annotated[
         str | None,
