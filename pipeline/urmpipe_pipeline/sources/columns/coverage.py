@@ -11,6 +11,7 @@ from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, take
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 COLUMNS_NOT_READ = "columns-not-read"
+FEWEST = 3  # columns next to a path that may be joints; fewer are a radius, a speed, a flag
 
 _DERIVATIVE = re.compile(r"d{1,2}_?[a-z]|q2d|q?dd?_")  # ddq1, d_q1, q2d_1
 _MARKERS = frozenset({"limit", "limits", "index", "min", "max"})  # of other values of a joint
@@ -60,6 +61,15 @@ def coverage_warnings(
     hint = NAME_JOINTS if robot else take(every, "takes all of them")
     message = f"{listed(alike, most=8)} named like the joints and not read"
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
+
+
+def path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
+    """Return the warning that several columns of angles stand next to a path and are not read, or nothing."""
+    angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"] or list(unused)
+    if len(angles) < FEWEST:
+        return []
+    message = f"x, y, z are read as a path, and {listed(angles, most=8)} are not read"
+    return [LogWarning(COLUMNS_NOT_READ, message, hints=(take(angles, "takes them as the joints"),))]
 
 
 def _words(column: Column) -> list[str]:

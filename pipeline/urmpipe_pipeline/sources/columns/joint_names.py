@@ -158,6 +158,10 @@ def _without_number(free: Sequence[Column], file: str, count: int | None, *, hal
         return NamedJoints(family, evidence, names=names, alternatives=same_quantities(family, every))
     sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
     turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
+    several = [family for family in numbered_alike(sized) if len(family) > 1]
+    if turning and count is None and len(several) > 1:  # each number several times: no single arm
+        shown = "; ".join(f"{family[0].header} to {family[-1].header}" for family in several)
+        raise which_joints(file, f"several groups of numbered columns: {shown}", several, "one")
     if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
         return NamedJoints(
             sized, "their units; the order is the file's", alternatives=same_quantities(sized, every)

@@ -17,7 +17,7 @@ from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
 from urmpipe_pipeline.sources.columns.columns import Column, Kind, chosen_columns, listed
-from urmpipe_pipeline.sources.columns.coverage import coverage_warnings
+from urmpipe_pipeline.sources.columns.coverage import coverage_warnings, path_warnings
 from urmpipe_pipeline.sources.columns.families import find_families
 from urmpipe_pipeline.sources.columns.joint_names import (
     NamedJoints,
@@ -36,6 +36,7 @@ from urmpipe_pipeline.sources.columns.questions import (
     NAME_JOINTS,
     OTHER_ROBOT,
     TIMES_OF_ANOTHER,
+    UNKNOWN,
     by_arm,
     take,
     which_joints,
@@ -293,10 +294,17 @@ def _path(
             choices = {"side": min(vocabulary().goals), "source": "path"}
             hints = tuple(Hint(option, value, "takes them") for option, value in choices.items())
             raise LogError(Finding(message, file, hints=hints))
+        rest = () if path else _may_move(numeric, pose)
+        if robot and len(rest) >= len(robot.coordinates):
+            found = f"x, y, z ({listed(pose.position)}) and no columns that are known to be the"
+            found += f" {len(robot.coordinates)} joints of {robot.name}"
+            as_path = Hint("source", "path", "reads the path without joints")
+            raise which_joints(file, found, _may_be(rest, columns, layouts, robot), UNKNOWN, as_path)
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
-        return _with_rest(roles, said, numeric, layouts, robot, (), pose.alternatives)
+        roles = _with_rest(roles, said, numeric, layouts, robot, (), pose.alternatives)
+        return replace(roles, warnings=(*roles.warnings, *path_warnings(rest)))
     _refuse_thousands(layouts, file)
     if path:
         hints = (Hint("", effect="name them so in the header"), Hint("position", None, "names them"))
@@ -315,6 +323,17 @@ def _path(
     none = f"no joint columns in {listed(columns)}" if columns else "no column of numbers except times"
     times = () if columns else (TIMES_OF_ANOTHER,)
     raise which_joints(file, none, _may_be(numeric, columns, layouts, robot), need, *times)
+
+
+def _may_move(numeric: Sequence[Column], pose: Pose) -> list[Column]:
+    """Return the columns next to a position that may be joints: no rates, torques and such."""
+    words = vocabulary()
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"] | words.other | words.outside
+    used = {*pose.position, *pose.rotation, *(c for group in pose.alternatives for c in group)}
+    free = (c for c in numeric if c not in used and not c.words & moving)
+    return [
+        c for c in free if c.unit is None or (c.unit.quantity in ("angle", "length") and not c.unit.order)
+    ]
 
 
 def _may_be(
