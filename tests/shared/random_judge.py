@@ -142,7 +142,7 @@ def _iter_wrong(log: Log, read: JointLog, *, asked: bool) -> Iterator[str]:
     """Yield what differs from the truth, each with a word of `SAYS` first."""
     truth, used = log.truth, sorted(read.columns, key=lambda column: column.index)
     joints = [column.number for column in used if column.role == "joint"]
-    groups = [truth.joints, truth.sides] if asked else [truth.joints]
+    groups = [truth.joints, *([truth.sides] if asked and truth.sides else [])]
     group = next((group for group in groups if set(group) == set(joints)), None)
     if group is None:
         yield f"joints {joints} for {list(truth.joints)}"
