@@ -69,7 +69,7 @@ def test_ik_comes_back_to_it(name: str, tmp_path: Path) -> None:
         place, turn = (
             [f"tcp_{axis}" for axis in axes] for axes in (["x", "y", "z"], ["qx", "qy", "qz", "qw"])
         )
-        given = LogMap(LogMap(position=(*place,), orientation=(*turn,), rotation="quat_xyzw"))
+        given = LogMap(position=(*place,), orientation=(*turn,), rotation="quat_xyzw")
     solved = urmpipe.ik(there(plan.log), robot=there(plan.robot), map=given)
     assert [warning.kind for warning in solved.warnings if warning.kind != "singular"] == []
     assert solved.targets.position.tolist() == plan.position.tolist()

@@ -238,7 +238,9 @@ class _Writer:
             else self.pick(CLOCKS).replace("_%H", " %H")
         )
         self.kinds.append(f"clock {kind}")
-        start = int(self.random.integers(1_500_000_000_000_000_000, 1_750_000_000_000_000_000)) // 10**6 * 10**6
+        start = (
+            int(self.random.integers(1_500_000_000_000_000_000, 1_750_000_000_000_000_000)) // 10**6 * 10**6
+        )
         name = self.pick(TIMES)
         if kind == "none":
             return []

@@ -92,9 +92,8 @@ def test_what_is_asked(names: str, answers: list[str], read: Read) -> None:
     with pytest.raises(LogError) as asked:
         read(table(names))
     (finding,) = asked.value.findings
-    given = [
-        hint.value if isinstance(hint.value, str) else " ".join(hint.value or []) for hint in finding.hints
-    ]
+    values = [hint.value or [] for hint in finding.hints]
+    given = [value if isinstance(value, str) else " ".join(map(str, value)) for value in values]  # type: ignore[arg-type]
     assert given == [*answers, ""]
     first = finding.hints[0]
     joints = tuple(name for name in names.split() if name in answers[0].split() or answers[0] in name)
