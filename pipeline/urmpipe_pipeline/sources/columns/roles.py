@@ -296,10 +296,10 @@ def _path(
             raise LogError(Finding(message, file, hints=hints))
         rest = () if path else _may_move(numeric, pose)
         if robot and len(rest) >= len(robot.coordinates):
-            found = f"x, y, z ({listed(pose.position)}) and no columns that are known to be the"
-            found += f" {len(robot.coordinates)} joints of {robot.name}"
+            message = f"x, y, z ({listed(pose.position)}) and no columns that are known to be the"
+            message += f" {len(robot.coordinates)} joints of {robot.name}"
             as_path = Hint("source", "path", "reads the path without joints")
-            raise which_joints(file, found, _may_be(rest, columns, layouts, robot), UNKNOWN, as_path)
+            raise which_joints(file, message, _may_be(rest, columns, layouts, robot), UNKNOWN, as_path)
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
