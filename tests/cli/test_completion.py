@@ -27,6 +27,7 @@ FREE = {
     "--planes", "--band", "--cycles", "--base", "--tool", "--base-link", "--tip-link", "--period", "--tsp",
     "--start", "--restarts", "--seed", "--velocity", "--velocities", "--acceleration", "--jerk", "--limit",
     "--force", "--step", "--duration", "--timeout", "--q", "--block", "--figure-names",
+    "--sheet", "--topic", "--side", "--episode", "--rows", "--names", "--signs", "--offsets",
     "--figure-font", "--figure-dpi", "--steps", "--branch", "--point", "--wrenches", "--torques",
 }  # fmt: skip
 """Options whose values are numbers, or names in a file that is slow to read."""

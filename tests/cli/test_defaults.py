@@ -19,7 +19,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     work = tmp_path / "lab" / "today"
     work.mkdir(parents=True)
     rows = "".join(f"{k * 0.005},{k},1,2,3,4,5\n" for k in range(20))
-    (work / "log.csv").write_text("t [s],a,b,c,d,e,f\n" + rows)
+    (work / "log.csv").write_text("t [s],q1,q2,q3,q4,q5,q6\n" + rows)
     (work.parent / "urmpipe.toml").write_text('robot = "ur5e"\nunit = "deg"\n')
     monkeypatch.chdir(work)
     return work.parent

@@ -26,6 +26,7 @@ from urmpipe_pipeline.sources.tables.table import read_table
 from urmpipe_pipeline.sources.tables.whole import Whole
 
 MAX_SHARE = 0.5  # a column with values in at most this share of the rows of the joints is of another topic
+FEWEST = 4  # rows; fewer stand at equal distances by chance
 OTHER_ROWS = "other-rows"  # the warning about groups of columns that are recorded in other rows
 
 
@@ -108,7 +109,7 @@ def _find_other_topics(
     steps = np.unique(np.diff(rows))
     topic = os.path.commonprefix([column.header for column in needed]).rpartition("/")[0]  # noqa: RUF071
     is_named = [bool(topic) and not column.header.startswith(f"{topic}/") for column in columns]
-    is_sampled = len(steps) == 1 and bool(steps[0] > 1)
+    is_sampled = len(rows) >= FEWEST and len(steps) == 1 and bool(steps[0] > 1)
     few = np.count_nonzero(is_filled, axis=0) <= MAX_SHARE * len(rows)
     return np.array([is_sampled or a or b for a, b in zip(is_named, few, strict=True)], dtype=np.bool_)
 

@@ -202,7 +202,7 @@ def _forms(*forms: str) -> str:
     return " or ".join(f"--rotation {form}" for form in forms) + " specifies it"
 
 
-@pytest.mark.parametrize("names", ["W,P,R", "alpha,beta,gamma", "r11,r12,r13,r21", "j1,j2,j3,j4,j5,j6"])
+@pytest.mark.parametrize("names", ["alpha,beta,gamma", "r11,r12,r13,r21", "j1,j2,j3,j4,j5,j6"])
 def test_columns_that_may_be_an_orientation_are_not_left_out_in_silence(read: Read, names: str) -> None:
     cells = ",".join("1" for _ in names.split(","))
     targets = read(f"nr,note,t,x,y,z,{names}\n1,home,0,0.3,0.1,0.5,{cells}\n")
@@ -214,7 +214,7 @@ def test_columns_that_may_be_an_orientation_are_not_left_out_in_silence(read: Re
 
 
 def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
-    assert wrong("x,y,z,W,P,R\n1,2,3,0,0,0\n", rotation="rpy") == [
+    assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", rotation="rpy") == [
         "targets.csv: rotation (--rotation): found rpy given for x, y, z and no orientation, allowed: its"
         " columns beside"
         f" them; {NAMED}"

@@ -221,7 +221,7 @@ def test_a_matrix_that_is_no_rotation_is_a_fault(read: Read) -> None:
 
 def test_empty_rows_of_a_spreadsheet_at_the_end_are_none(read: Read) -> None:
     assert len(read("x,y,z\n0.3,0.1,0.5\n,,\n,,\n")) == 1
-    assert len(read("t,x,y,z\n0,0.3,0.1,0.5\n1,0.3,0.1,0.5\n,,,\n")) == 2
+    assert len(read("t [s],x,y,z\n0,0.3,0.1,0.5\n1,0.3,0.1,0.5\n,,,\n")) == 2
     assert read("x,y,z\n0.3,0.1,0.5\n,,\n0.3,0.1,0.5\n").faults == {
         2: "columns x, y, z: found no number, allowed: a finite number"
     }
