@@ -26,7 +26,7 @@ from urmpipe_pipeline.sources.tables.table import read_table
 from urmpipe_pipeline.sources.tables.whole import Whole
 
 MAX_SHARE = 0.5  # a column with values in at most this share of the rows of the joints is of another topic
-FEWEST = 4  # rows; fewer stand at equal distances by chance
+FEWEST = 4  # rows; fewer are at equal distances by chance
 OTHER_ROWS = "other-rows"  # the warning about groups of columns that are recorded in other rows
 
 

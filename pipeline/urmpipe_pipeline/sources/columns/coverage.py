@@ -1,4 +1,4 @@
-"""Columns of numbers that are named like columns in use, and are not used."""
+"""Columns of numbers that are named as columns in use, and are not used."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ def coverage_warnings(
     apart = words.other | words.joint_words["rate"] | words.joint_words["acceleration"] | _MARKERS
 
     def is_alike(column: Column) -> bool:
-        own = _words(column)
+        words_of_name = _words(column)
         slides = _SLIDES.fullmatch(column.key)
         if slides and numbers and int(slides["n"]) == max(numbers) + 1:
             return True
         if column.kind == Kind.COMMANDED or column.words & apart or _DERIVATIVE.match(column.bare):
             return False
         return bool(
-            ("joint" in shared and "joint" in own)
-            or (shared and shared <= {*own} and len(own) <= longest)
+            ("joint" in shared and "joint" in words_of_name)
+            or (shared and shared <= {*words_of_name} and len(words_of_name) <= longest)
             or (not shared and column.unit in units)
         )
 
@@ -64,7 +64,7 @@ def coverage_warnings(
 
 
 def path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
-    """Return the warning that several columns of angles stand next to a path and are not read, or nothing."""
+    """Return the warning that several columns of angles next to a path are not read, or nothing."""
     angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"] or list(unused)
     if len(angles) < FEWEST:
         return []
