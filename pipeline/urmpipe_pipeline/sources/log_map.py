@@ -218,7 +218,9 @@ def _evidence(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> I
     clock = [compared(split_unit(column.header)[0]) for column in _columns(log, "time")]
     named = {"source", "delimiter", "decimal"}
     named |= {"time"} if any(word.search(name) for name in clock for word in words) else set()
-    named |= {"joints"} if all(column.header for column in _columns(log, "joint")) else set()
+    labelled = "labels" in found  # names stand before the values of each row
+    named |= {"joints"} if labelled or all(column.header for column in _columns(log, "joint")) else set()
+    named |= {"time"} if labelled and clock else set()
     named |= {"position", "orientation"} if all(c.header for c in _columns(log, "position")) else set()
     named |= {"rotation"} if "form" in found and found["form"].evidence == THEIR_NAMES else set()
     robot = found["robot"].value if "robot" in found else ""
@@ -227,7 +229,12 @@ def _evidence(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> I
     for field, kind in kinds.items():
         if kind in found:
             basis: Basis = "given" if getattr(given, field) else "named" if field in named else "proved"
-            if (field == "period" and log.period_assumed) or (field == "joints" and assumed_joints):
+            is_assumed = {
+                "period": log.period_assumed,
+                "joints": assumed_joints,
+                "time": not found[kind].columns,
+            }
+            if basis != "given" and is_assumed.get(field):
                 basis = "assumed"
             yield field, Evidence(basis, found[kind].evidence)
     source = vocabulary().source(log.source)

@@ -98,7 +98,9 @@ def without_header(
     joints, rates, evidence = joints_among(free, layout, whole[free[0].table] if free else None, robot)
     check_count(joints, file, robot)
     roles = _by_place(joints, columns, robot, evidence, pose, rates)
-    return roles if robot or rates else replace(roles, warnings=(*roles.warnings, _assumed_joints(joints)))
+    if robot or rates or behind:  # their count, their rates, or a pose that begins where they end
+        return roles
+    return replace(roles, warnings=(*roles.warnings, _assumed_joints(joints)))
 
 
 def _assumed_joints(joints: Sequence[Column]) -> LogWarning:
