@@ -111,17 +111,17 @@ def read_map(path: Path) -> LogMap:
     if faults:
         raise OptionError(*faults)
     result = LogMap(**values)
-    beside, file = f"{path.parent / str(result.time)}", result.robot and Path(result.robot)
+    time, file = f"{path.parent / str(result.time)}", result.robot and Path(result.robot)
     return replace(
         result,
-        time=beside if result.time and named_file(beside) else result.time,
+        time=time if result.time and named_file(time) else result.time,
         robot=str(path.parent / file) if file and file.suffix else result.robot,
     )
 
 
 def map_of(
     log: JointLog,
-    given: LogMap | None = None,
+    options: LogMap | None = None,
     robot: str | None = None,
     base: Sequence[float] = (),
     tool: Sequence[float] = (),
@@ -130,20 +130,20 @@ def map_of(
 
     Args:
         log: The log.
-        given: The map with which it was read.
+        options: The map with which it was read.
         robot: Name or file of the arm.
         base: Its frame: X, Y, Z[, RX, RY, RZ] in [m] and [rad]; nothing for the origin.
         tool: Its tool centre point, in the same form; nothing for the tip.
     """
-    given = given or LogMap()
-    found = {inference.kind: inference for inference in log.inferences}
+    options = options or LogMap()
+    by_kind = {inference.kind: inference for inference in log.inferences}
     values: dict[str, Any] = {
-        name: getattr(given, name) for name in READING if name not in ("shared", "pair")
+        name: getattr(options, name) for name in READING if name not in ("shared", "pair")
     }
     values |= {"robot": robot, "base": tuple(base), "tool": tuple(tool)}
-    values["source"] = log.source if given.source or log.source != TABLE else None
+    values["source"] = log.source if options.source or log.source != TABLE else None
     values |= shown_entries(log.inferences)
-    values |= _clock_entries(log, found, given)
+    values |= _clock_entries(log, by_kind, options)
     joints, position, rotation = (_columns(log, role) for role in ("joint", "position", "rotation"))
     signs, offsets = tuple(c.sign for c in joints), tuple(c.offset for c in joints)
     values |= {"signs": signs if -1 in signs else (), "offsets": offsets if any(offsets) else ()}
@@ -154,60 +154,62 @@ def map_of(
     place, turn, outside = _names(log, position), _names(log, rotation), log.externally_measured
     values |= {"measured": place + turn if outside else ()}
     values |= {"position": () if outside else place, "orientation": () if outside else turn}
-    values["unit"] = _unit_entries(log, found, given, values["time"])
-    intervals = {name: given.interval.get(name, given.interval.get("")) for name in log.joints}
+    values["unit"] = _unit_entries(log, by_kind, options, values["time"])
+    intervals = {name: options.interval.get(name, options.interval.get("")) for name in log.joints}
     turning = [column.unit in ("rad", "deg") for column in joints]
     values["interval"] = {
         name: ends for (name, ends), turns in zip(intervals.items(), turning, strict=False) if ends and turns
     }
-    return LogMap(**values, evidence=dict(_evidence(log, found, given)))
+    return LogMap(**values, evidence=dict(_evidence(log, by_kind, options)))
 
 
 def shown_entries(inferences: Sequence[Inference]) -> dict[str, Any]:
     """Return delimiter, decimal sign and layout of the files, and the notes, of what was inferred."""
-    found = {inference.kind: inference for inference in inferences}
+    by_kind = {inference.kind: inference for inference in inferences}
     kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout"}
     entries: dict[str, Any] = {
-        key: found[kind].value if kind in found else None for key, kind in kinds.items()
+        key: by_kind[kind].value if kind in by_kind else None for key, kind in kinds.items()
     }
-    notes = (found[kind] for kind in NOTES if kind in found)
+    notes = (by_kind[kind] for kind in NOTES if kind in by_kind)
     return entries | {"notes": tuple(f"{note.what}: {note.value} ({note.evidence})" for note in notes)}
 
 
-def _clock_entries(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> dict[str, Any]:
+def _clock_entries(log: JointLog, by_kind: Mapping[str, Inference], options: LogMap) -> dict[str, Any]:
     """Return time, period and poses; a stamp in halves and a file of times are found anew.
 
     A file whose column was given as the time is entered with its whole path.
     """
     columns = _columns(log, "time")
     if not log.timed:
-        labels = found["time column"].columns if "time column" in found else ()
+        labels = by_kind["time column"].columns if "time column" in by_kind else ()
         time = labels[0] if len(labels) == 1 else None if labels else "none"
         return {"time": time, "period": None, "poses": True}
     if not columns:
         return {"time": "none", "period": log.period or None, "poses": False}
-    file = named_file(given.time)
-    if len(columns) > 1 or (TIME_FILE in found and not file):
+    file = named_file(options.time)
+    if len(columns) > 1 or (TIME_FILE in by_kind and not file):
         return {"time": None, "period": None, "poses": False}
     time = f"{file[0].resolve()}:{file[1]}" if file else _name(log, columns[0])
     return {"time": time, "period": None, "poses": False}
 
 
 def _unit_entries(
-    log: JointLog, found: Mapping[str, Inference], given: LogMap, time: str | None
+    log: JointLog, by_kind: Mapping[str, Inference], options: LogMap, time: str | None
 ) -> dict[str, str]:
-    """Return the units of the columns; of the clock where it is one column of numbers, or given."""
+    """Return the units of the columns; of the clock where it is one column of numbers, or options."""
     clock, file = _columns(log, "time"), named_file(time)
     names = {name for c in clock for name in (c.name, c.header, str(c.number)) if name}
-    units = {name: unit for name, unit in given.unit.items() if name in names}
+    units = {name: unit for name, unit in options.unit.items() if name in names}
     named = any(vocabulary().unit(split_unit(column.header)[1] or "") for column in clock)
-    if len(clock) == 1 and "unit of the time" in found and time and not named:
+    if len(clock) == 1 and "unit of the time" in by_kind and time and not named:
         units = {file[1] if file else time: clock[0].unit}
     used = [column for column in log.columns if column.role in ("joint", "position", "rotation")]
     return units | {_name(log, column): column.unit for column in used if column.unit != PURE.name}
 
 
-def _evidence(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> Iterator[tuple[str, Evidence]]:
+def _evidence(
+    log: JointLog, by_kind: Mapping[str, Inference], options: LogMap
+) -> Iterator[tuple[str, Evidence]]:
     """Yield the evidence of the entries, by field or "unit.COLUMN"."""
     whose = "measured" if log.externally_measured else "recorded"
     kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout", "source": "source"}
@@ -218,25 +220,25 @@ def _evidence(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> I
     clock = [compared(split_unit(column.header)[0]) for column in _columns(log, "time")]
     named = {"source", "delimiter", "decimal"}
     named |= {"time"} if any(word.search(name) for name in clock for word in words) else set()
-    labelled = "labels" in found  # names stand before the values of each row
+    labelled = "labels" in by_kind  # names stand before the values of each row
     named |= {"joints"} if labelled or all(column.header for column in _columns(log, "joint")) else set()
     named |= {"time"} if labelled and clock else set()
     named |= {"position", "orientation"} if all(c.header for c in _columns(log, "position")) else set()
-    named |= {"rotation"} if "form" in found and found["form"].evidence == THEIR_NAMES else set()
-    robot = found["robot"].value if "robot" in found else ""
+    named |= {"rotation"} if "form" in by_kind and by_kind["form"].evidence == THEIR_NAMES else set()
+    robot = by_kind["robot"].value if "robot" in by_kind else ""
     named |= {"robot"} if all(robot in column.header for column in _columns(log, "joint")) else set()
     assumed_joints = any(one.kind == ASSUMED_JOINTS for one in log.warnings)
     for field, kind in kinds.items():
-        if kind in found:
-            basis: Basis = "given" if getattr(given, field) else "named" if field in named else "proved"
+        if kind in by_kind:
+            basis: Basis = "given" if getattr(options, field) else "named" if field in named else "proved"
             is_assumed = {
                 "period": log.period_assumed,
                 "joints": assumed_joints,
-                "time": not found[kind].columns,
+                "time": not by_kind[kind].columns,
             }
             if basis != "given" and is_assumed.get(field):
                 basis = "assumed"
-            yield field, Evidence(basis, found[kind].evidence)
+            yield field, Evidence(basis, by_kind[kind].evidence)
     source = vocabulary().source(log.source)
     assumed_time = [one.message for one in log.warnings if one.assumption and one.role == "time"]
     why = {name: one.evidence for one in log.inferences if one.kind in UNITS for name in one.columns}
@@ -247,8 +249,8 @@ def _evidence(log: JointLog, found: Mapping[str, Inference], given: LogMap) -> I
         by_source = source is not None and quantity in source.units
         is_named = split_unit(column.header)[1] or by_source or reason.startswith("as ")  # as the others
         basis = "named" if is_named else "proved"
-        if names & given.unit.keys() or (
-            quantity == "angle" and "" in given.unit and not split_unit(column.header)[1]
+        if names & options.unit.keys() or (
+            quantity == "angle" and "" in options.unit and not split_unit(column.header)[1]
         ):
             basis = "given"
         if column.role == "time" and assumed_time:

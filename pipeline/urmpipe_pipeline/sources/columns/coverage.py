@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Sequence
 
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
 from urmpipe_pipeline.sources.columns.columns import Column, Kind, listed
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, take
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -66,7 +67,7 @@ def coverage_warnings(
 def path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
     """Return the warning that several columns of angles next to a path are not read, or nothing."""
     angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"] or list(unused)
-    if len(angles) < FEWEST:
+    if not FEWEST <= len(angles) <= MOST_JOINTS:
         return []
     message = f"x, y, z are read as a path, and {listed(angles, most=8)} are not read"
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(take(angles, "takes them as the joints"),))]
