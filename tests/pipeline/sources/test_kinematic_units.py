@@ -65,7 +65,7 @@ def test_a_header_that_says_degrees_over_radians(read: Read) -> None:
     every = " ".join(f"--unit q{k}=deg" for k in range(1, 7))
     assert re.fullmatch(
         "q1, q2, q3, q4, q5, q6: deg (its name) contradicts the kinematics: taken as rad: with it the"
-        " kinematics follow the recorded TCP within 0.00 % of its distance (median), as deg within"
+        " kinematics follow the recorded TCP within 0.00 mm (median), 0.00 % of its distance, as deg within"
         f" 2.. %; {every} overrides this".replace("(", r"\(").replace(")", r"\)"),
         str(warning),
     )

@@ -333,7 +333,8 @@ class KinematicUnits:
         off = f"{100 * share[second]:.3g} %" if np.isfinite(share[second]) else "no base"
         return (
             f"with it the kinematics{_FREED[self.freedom].format(tool)} follow the recorded TCP within"
-            f" {100 * share[reading]:.2f} % of its {size} (median), as {name} within {off}"
+            f" {1e3 * fits[reading].distances[self.freedom]:.2f} mm (median), {100 * share[reading]:.2f} % of"
+            f" its {size}, as {name} within {off}"
         )
 
 
