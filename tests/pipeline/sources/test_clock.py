@@ -112,7 +112,7 @@ def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> 
         (20, 0.02, "ms"),  # 1 mrad/s as s
         (20, 0.0, "ms"),
         (1, 0.01, None),  # 10 rad/s or 10 mrad/s
-        (4, 0.0, None),
+        (4, 0.0, "s"),
         (17, 0.2, None),
         (2.5, 0.002, None),
     ],

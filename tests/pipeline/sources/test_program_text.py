@@ -159,7 +159,7 @@ def test_plc_text_that_is_no_table(wrong: Wrong, text: str, said: str) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not LOGS.is_dir(), reason="the real logs in ../shared/logs are not here")
 def test_plc_real_identification_run() -> None:
-    """12,501 samples at 0.8 ms of six joints: the joints are phi_r, in deg by their speeds."""
+    """12,501 samples at 0.8 ms of six joints: the joints are phi_r, which name no unit."""
     path = LOGS / "kuka-weigand-plc" / "data_target_system.txt"
     text = path.read_text()
     lines = {line.partition(" ")[0]: line for line in text.splitlines()}
@@ -168,7 +168,7 @@ def test_plc_real_identification_run() -> None:
         [float(cell) for cell in lines[name].partition("[")[2].partition("[")[2][:-3].split(",")]
         for name in names
     ]
-    for options in (LogMap(), LogMap(joints=tuple(names), unit={"": "deg"})):
+    for options in (LogMap(unit={"": "deg"}), LogMap(joints=tuple(names), unit={"": "deg"})):
         log = read_log([path], options)
         assert (log.rows, log.period, log.joints) == (12501, 0.0008, tuple(names))
         np.testing.assert_array_equal(log.q, np.transpose(q) * DEG)

@@ -141,7 +141,7 @@ def unit_by_speed(
         return None
     integers, in_s = not any(number % 1 for number in times), speed()
     if in_s is None:
-        turn, unit = "no joint moves", "ms" if integers else "s"
+        turn, unit = "no joint moves", "ms" if integers and step >= SHORTEST_MS else "s"
     else:
         turn = f"the joints turn at up to {1e3 * in_s:.2g} rad/s as ms, at {in_s:.2g} rad/s as s"
         usual = 1e3 * in_s <= USUAL

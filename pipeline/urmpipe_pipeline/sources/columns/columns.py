@@ -24,7 +24,9 @@ from urmpipe_pipeline.sources.vocabulary import (
     vocabulary,
 )
 
-_UNIT_WORDS = re.compile(r"_(rad|deg)(_(per_)?s(ec)?2?)?(?=_|$)|_(mm|cm|m)$")
+_UNIT_WORDS = re.compile(
+    r"_(rad(ian)?s?|deg(ree)?s?|grad)(_(per_)?s(ec)?2?)?(?=_|$)|_(mm|cm|m|met(er|re)s?|millimet(er|re)s?)$"
+)
 _RANGE = re.compile(r"(?P<first>\d{1,5})-(?P<last>\d{1,5})")
 _NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
 SHOWN_TWINS = 12

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os.path
 import re
 from collections.abc import Collection, Sequence
 
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
 from urmpipe_pipeline.sources.columns.columns import Column, Kind, listed
+from urmpipe_pipeline.sources.columns.pose import OF_POSITION
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, take
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 COLUMNS_NOT_READ = "columns-not-read"
+TOOL = frozenset({"tcp", "tool", "pose", "cartesian"})  # words of the tool itself
 FEWEST = 3  # columns next to a path that may be joints; fewer are a radius, a speed, a flag
 
 _DERIVATIVE = re.compile(r"d{1,2}_?[a-z]|q2d|q?dd?_")  # ddq1, d_q1, q2d_1
@@ -61,6 +64,27 @@ def coverage_warnings(
     every = sorted({*joints, *alike}, key=lambda column: column.number)
     hint = NAME_JOINTS if robot else take(every, "takes all of them")
     message = f"{listed(alike, most=8)} named like the joints and not read"
+    return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
+
+
+def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -> list[LogWarning]:
+    """Return the warning that columns that may be the orientation at a position are not read, or nothing.
+
+    They are three or four, and begin as the names of the position, or are angles if these begin with x, y, z.
+
+    Args:
+        position: The columns of the recorded position.
+        unused: The columns of numbers without a use.
+    """
+    words = vocabulary()
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"] | (words.other - TOOL)
+    stem = OF_POSITION.sub("", os.path.commonprefix([c.key for c in position]))  # noqa: RUF071 (names)
+    free = (c for c in unused if not c.words & moving and (c.unit is None or c.unit.quantity == "angle"))
+    near = [c for c in free if c.key.startswith(stem) if stem or (c.unit and not c.unit.order)]
+    if len(near) not in (3, 4):
+        return []
+    message = f"{listed(near)} may be the orientation at {listed(position)} and are not read"
+    hint = take(near, "with --position and --rotation takes them", parameter="orientation")
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
 
 

@@ -98,15 +98,14 @@ def without_header(
     joints, rates, evidence = joints_among(free, layout, whole[free[0].table] if free else None, robot)
     check_count(joints, file, robot)
     roles = _by_place(joints, columns, robot, evidence, pose, rates)
-    if robot or rates or behind:  # their count, their rates, or a pose that begins where they end
+    if robot or rates or behind or len(joints) == 1:  # a count, rates, a pose that begins behind them
         return roles
     return replace(roles, warnings=(*roles.warnings, _assumed_joints(joints)))
 
 
 def _assumed_joints(joints: Sequence[Column]) -> LogWarning:
     """Return the warning that columns without names are taken as the joints, as nothing shows it."""
-    ends = f"column {joints[0].number}" if len(joints) == 1 else f"{joints[0].number} to {joints[-1].number}"
-    taken = f"{ends} is the joint" if len(joints) == 1 else f"columns {ends} are the joints"
+    taken = f"columns {joints[0].number} to {joints[-1].number} are the joints"
     hints = (take(joints, "confirms it"), Hint("joints", None, "names others"))
     said = f"no header names the columns: {taken}, in order"
     return LogWarning(ASSUMED_JOINTS, said, hints=hints, assumption=taken, role="joint")

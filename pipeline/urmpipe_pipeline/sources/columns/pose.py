@@ -27,7 +27,7 @@ ORTHOGONAL = 1e-2
 _LIKE_JOINT = re.compile(r"q_?\d")
 """Names that quaternions and joints have."""
 
-_OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)_$")
+OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)_$")
 """What the names of x, y, z may have behind the device, and those of the orientation have not."""
 
 _UNIT_LENGTH = 1e-2
@@ -101,7 +101,7 @@ def find_pose(
     rest = [column for column in numeric if column not in position]
     if measured and position:
         stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
-        stem = _OF_POSITION.sub("", stem)
+        stem = OF_POSITION.sub("", stem)
         rest = [column for column in rest if stem and column.key.startswith(stem)]
     if alternatives:  # the orientation of another position is not that of this one
         rest, lone = [column for column in rest if column.kind == position[0].kind], True

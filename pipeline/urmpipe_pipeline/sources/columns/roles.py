@@ -17,7 +17,11 @@ from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
 from urmpipe_pipeline.sources.columns.columns import Column, Kind, chosen_columns, listed
-from urmpipe_pipeline.sources.columns.coverage import coverage_warnings, path_warnings
+from urmpipe_pipeline.sources.columns.coverage import (
+    coverage_warnings,
+    orientation_warnings,
+    path_warnings,
+)
 from urmpipe_pipeline.sources.columns.families import find_families
 from urmpipe_pipeline.sources.columns.joint_names import (
     NamedJoints,
@@ -410,6 +414,8 @@ def _with_rest(
     if inferences[0].evidence != GIVEN:  # who names the joints knows the others
         numbers = family_of(roles.joints)[0]
         warnings += coverage_warnings(roles.joints, unused, numbers, robot=robot is not None)
+    if roles.position and not roles.rotation:
+        warnings += orientation_warnings(roles.position, unused)
     return replace(
         roles, inferences=tuple(inferences), warnings=(*_about_passed_over(passed, roles), *warnings)
     )

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 
@@ -89,6 +88,8 @@ def _iter_episodes(folder: Path) -> Iterator[tuple[int, Path]]:
 
 def with_names(table: pa.Table, path: Path) -> pa.Table:
     """Return a table with a column NAME.ENTRY for each entry of lists whose names are in meta/info.json."""
+    import pyarrow.compute as pc  # takes long
+
     names = _feature_names(path)
     fields, columns = [], []
     for field, column in zip(table.schema, table.columns, strict=True):
