@@ -19,7 +19,7 @@ FEWEST = 3  # columns next to a path that may be joints; fewer are a radius, a s
 
 _DERIVATIVE = re.compile(r"d{1,2}_?[a-z]|q2d|q?dd?_")  # ddq1, d_q1, q2d_1
 _MARKERS = frozenset({"limit", "limits", "index", "min", "max"})  # of other values of a joint
-_SLIDES = re.compile(r"[dsl]_?(?P<n>\d+)")  # what a prismatic joint is called beside q1, q2
+_SLIDES = re.compile(r"[dsl]_?(?P<n>\d+)")  # what a prismatic joint is called next to q1, q2
 
 
 def coverage_warnings(
@@ -28,7 +28,7 @@ def coverage_warnings(
     """Return the warning that columns named like the joints are not used, or nothing.
 
     A column is named like the joints if it has all words that they share, or "joint" as they do; if they
-    share no word, if it has their unit. "d4" is named like a joint that slides behind q3.
+    share no word, if it has their unit. "d4" is named like a joint that slides after q3.
 
     Args:
         joints: The joint columns.
@@ -45,7 +45,7 @@ def coverage_warnings(
     units = {column.unit for column in joints} - {None}
     apart = words.other | words.joint_words["rate"] | words.joint_words["acceleration"] | _MARKERS
 
-    def is_alike(column: Column) -> bool:
+    def is_named_as_joints(column: Column) -> bool:
         words_of_name = _words(column)
         slides = _SLIDES.fullmatch(column.key)
         if slides and numbers and int(slides["n"]) == max(numbers) + 1:
@@ -58,12 +58,12 @@ def coverage_warnings(
             or (not shared and column.unit in units)
         )
 
-    alike = [column for column in unused if not column.text and column.header and is_alike(column)]
-    if not alike:
+    named = [column for column in unused if not column.text and column.header and is_named_as_joints(column)]
+    if not named:
         return []
-    every = sorted({*joints, *alike}, key=lambda column: column.number)
+    every = sorted({*joints, *named}, key=lambda column: column.number)
     hint = NAME_JOINTS if robot else take(every, "takes all of them")
-    message = f"{listed(alike, most=8)} named like the joints and not read"
+    message = f"{listed(named, most=8)} named like the joints and not read"
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
 
 

@@ -98,7 +98,7 @@ def without_header(
     joints, rates, evidence = joints_among(free, layout, whole[free[0].table] if free else None, robot)
     check_count(joints, file, robot)
     roles = _by_place(joints, columns, robot, evidence, pose, rates)
-    if robot or rates or behind or len(joints) == 1:  # a count, rates, a pose that begins behind them
+    if robot or rates or behind or len(joints) == 1:  # a count, rates, or a pose after them
         return roles
     return replace(roles, warnings=(*roles.warnings, _assumed_joints(joints)))
 
@@ -107,8 +107,8 @@ def _assumed_joints(joints: Sequence[Column]) -> LogWarning:
     """Return the warning that columns without names are taken as the joints, as nothing shows it."""
     taken = f"columns {joints[0].number} to {joints[-1].number} are the joints"
     hints = (take(joints, "confirms it"), Hint("joints", None, "names others"))
-    said = f"no header names the columns: {taken}, in order"
-    return LogWarning(ASSUMED_JOINTS, said, hints=hints, assumption=taken, role="joint")
+    message = f"no header names the columns: {taken}, in order"
+    return LogWarning(ASSUMED_JOINTS, message, hints=hints, assumption=taken, role="joint")
 
 
 def _path_by_place(
