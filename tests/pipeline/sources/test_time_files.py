@@ -54,7 +54,7 @@ def test_a_row_of_times_longer_than_what_is_sniffed(write: Write) -> None:
     joints = write("".join(f"{k % 7}.5,{k % 3}.25\n" for k in range(count)), "q.csv")
     times = write(",".join(f"{0.005 * k:.3f}" for k in range(count)) + "\n", "time.csv")
     assert times.stat().st_size > 4 * 64 * 1024
-    log = read_log([joints, times], LogMap(unit="rad"))
+    log = read_log([joints, times], LogMap(unit={"": "rad"}))
     np.testing.assert_array_equal(log.t_ns, np.arange(count) * 5_000_000)
     assert log.q[-1].tolist() == [(count - 1) % 7 + 0.5, (count - 1) % 3 + 0.25]
     assert [(i.value, i.evidence) for i in log.inferences if i.what == "time column"] == [
