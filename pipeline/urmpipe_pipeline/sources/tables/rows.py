@@ -115,7 +115,7 @@ def _rows_read(rows: int, count: int, why: str) -> Inference:
 
 
 def format_ranges(rows: IntArray) -> str:
-    """Return ascending numbers of rows as text: "rows 1 to 5 and 9"."""
+    """Return ascending numbers of rows [-], shape (n,), as text: "rows 1 to 5 and 9"."""
     breaks = np.flatnonzero(np.diff(rows) > 1)
     starts, ends = rows[np.r_[0, breaks + 1]].tolist(), rows[np.r_[breaks, len(rows) - 1]].tolist()
     parts = [str(a) if a == b else f"{a} to {b}" for a, b in zip(starts, ends, strict=True)]

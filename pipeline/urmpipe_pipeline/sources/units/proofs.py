@@ -113,7 +113,7 @@ def has_both(q: FloatArray, position: FloatArray) -> BoolArray:
 
 
 def moving_rows(q: FloatArray, position: FloatArray) -> IndexArray:
-    """Return the rows that decide: with both, each pose once, as an arm often rests, and no gross outliers.
+    """Return the rows [-], shape (k,), that decide: with both, each pose once, and no gross outliers.
 
     Args:
         q: Joint values in the file's own units, shape (n, joints).
@@ -259,7 +259,7 @@ class Recorded:
 
     @cached_property
     def rows(self) -> tuple[FloatArray, FloatArray]:
-        """Joints, shape (k, joints), and positions, shape (k, 3), of the rows that decide."""
+        """Joints and positions in the file's own units, shapes (k, joints) and (k, 3), of the rows that decide."""
         rows = moving_rows(self.q, self.position)
         return self.q[rows], self.position[rows]
 
