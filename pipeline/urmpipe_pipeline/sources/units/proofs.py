@@ -259,7 +259,7 @@ class Recorded:
 
     @cached_property
     def rows(self) -> tuple[FloatArray, FloatArray]:
-        """Joints and positions in the file's own units, shapes (k, joints) and (k, 3), of the rows that decide."""
+        """Joints and positions of the rows that decide, in the file's units, (k, joints) and (k, 3)."""
         rows = moving_rows(self.q, self.position)
         return self.q[rows], self.position[rows]
 
