@@ -389,7 +389,7 @@ def _with_rest(
     robot: Chain | None,
     *alternatives: Sequence[tuple[Column, ...]],
 ) -> Roles:
-    """Return the roles with what is inferences of the columns that are not used.
+    """Return the roles with the inferences and warnings about the columns that are not used.
 
     Args:
         roles: The roles.
