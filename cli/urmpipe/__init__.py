@@ -76,13 +76,13 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.diagnosis.result import Diagnosis as Diagnosis
     from urmpipe_pipeline.joint_log import JointLog as JointLog
+    from urmpipe_pipeline.logs import LogMap as LogMap
     from urmpipe_pipeline.networks.network_motion import NetworkMotion as NetworkMotion
     from urmpipe_pipeline.networks.result import NetworkResult as NetworkResult
     from urmpipe_pipeline.planned_paths.result import PlannedPath as PlannedPath
     from urmpipe_pipeline.runs.run import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
     from urmpipe_pipeline.solved_targets.result import IkResult as IkResult
-    from urmpipe_pipeline.sources import LogMap as LogMap
     from urmpipe_pipeline.tables import Exported as Exported
 
 __version__ = "0.1.0"
@@ -103,7 +103,7 @@ _HOME = {
     "JointLog": "urmpipe_pipeline.joint_log",
     "LogError": "urmpipe_models.errors",
     "LogReading": "urmpipe.parameters.shared",
-    "LogMap": "urmpipe_pipeline.sources",
+    "LogMap": "urmpipe_pipeline.logs",
     "Network": "urmpipe_models.networks.file",
     "NetworkError": "urmpipe_models.errors",
     "NetworkMotion": "urmpipe_pipeline.networks.network_motion",

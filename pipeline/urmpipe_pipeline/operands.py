@@ -32,6 +32,10 @@ from urmpipe_models.errors import (
 )
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
+from urmpipe_pipeline.logs import LogMap, MemoryTable
+from urmpipe_pipeline.logs.tables.bag_file import is_bag_folder
+from urmpipe_pipeline.logs.tables.lerobot import is_data_set
+from urmpipe_pipeline.logs.vocabulary import key
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.repolarization.audit import is_revolute
 from urmpipe_pipeline.repolarization.interval import check_joint_names
@@ -40,10 +44,6 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log, with_robot
 from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.sources import LogMap, MemoryTable
-from urmpipe_pipeline.sources.tables.bag_file import is_bag_folder
-from urmpipe_pipeline.sources.tables.lerobot import is_data_set
-from urmpipe_pipeline.sources.vocabulary import key
 
 NOT_A_RUN = (
     "found the recording of {}, allowed: one with a motion, such as ingest, ik, plan or network drive write"

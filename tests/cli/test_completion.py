@@ -20,7 +20,7 @@ from urmpipe.parameters.outputs import Export
 from urmpipe.parameters.param import params_of
 from urmpipe_models import math3d
 from urmpipe_pipeline.comparison.verdict import UNITS
-from urmpipe_pipeline.sources import source_names
+from urmpipe_pipeline.logs import source_names
 from urmpipe_pipeline.tables import FORMATS
 
 FREE = {

@@ -12,7 +12,7 @@ from asserting import refusal, there
 from plan_logs import PATHS, planned, planned_alone
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.toml import robot_toml
-from urmpipe_pipeline.sources import LogMap
+from urmpipe_pipeline.logs import LogMap
 
 CATALOGUE = [name for name in PATHS if name.startswith(("ur5e", "urm6"))]
 OWN = [name for name in PATHS if name not in CATALOGUE]

@@ -13,8 +13,8 @@ import pytest
 from urmpipe.defaults import defaults_for
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.logs import read_map
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import read_map
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")

@@ -22,7 +22,7 @@ import pytest
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.joint_log import PASSED_OVER, JointLog
-from urmpipe_pipeline.sources import LogMap, read_log
+from urmpipe_pipeline.logs import LogMap, read_log
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recording-logs.md").read_text(encoding="utf-8")
 TIMES = 0.05 * np.arange(20)

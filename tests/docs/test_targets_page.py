@@ -11,9 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from asserting import there
+from urmpipe_pipeline.logs import read_log
 from urmpipe_pipeline.outputs import TARGET_ROW
 from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
-from urmpipe_pipeline.sources import read_log
 
 PAGE = (Path(__file__).parents[2] / "docs" / "targets.md").read_text(encoding="utf-8")
 POSES, GERMAN, PATH, WRONG, LOG = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)

@@ -16,11 +16,11 @@ from urmpipe_models.math3d import RotationForm
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.provenance import Provenance, build_provenance
 from urmpipe_pipeline.runs.derivatives import derivatives
 from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import LogMap
 
 TSP = 0.005
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)

@@ -30,7 +30,7 @@ from urmpipe.reading import resolve_reading
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Hint, UrmpipeError
 from urmpipe_models.math3d import to_quaternions
-from urmpipe_pipeline.sources import read_log
+from urmpipe_pipeline.logs import read_log
 
 UNIT = "assumed-unit doubted-unit unit-contradiction "
 SAYS = {  # kinds of warnings that are about what is wrong

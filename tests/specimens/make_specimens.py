@@ -25,7 +25,7 @@ README = """\
 Small logs of one known motion, as people's tools write them; `wrong/` holds those that must be refused or
 warned of. `make_specimens.py` writes them byte for byte, as a test holds, and does not know the reader.
 The motion and its rounding are in `specimen.py`; what must be read of each file, with the option where it
-cannot tell, in `tests/pipeline/sources/test_specimens.py`. To add one: a function with `@specimen` and a line
+cannot tell, in `tests/pipeline/logs/test_specimens.py`. To add one: a function with `@specimen` and a line
 of docstring, run `make_specimens.py`, and add its row to the table of that test.
 """
 

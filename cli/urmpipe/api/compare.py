@@ -32,6 +32,7 @@ from urmpipe_pipeline.comparison.compare import (
 from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.comparison.iso import IsoOptions, measure_iso
 from urmpipe_pipeline.comparison.warnings import CLOCKS_DIFFER, LARGE_NOISE, SWAPPED, large_noises
+from urmpipe_pipeline.logs import LogMap, MemoryTable, TableLike, dataframe_to_table, is_table
 from urmpipe_pipeline.operands import (
     BASELINE_HINT,
     is_log,
@@ -44,7 +45,6 @@ from urmpipe_pipeline.results import present, read_recording, result_kind
 from urmpipe_pipeline.runs.recorded_tcp import MISSING_TOOL
 from urmpipe_pipeline.runs.run import Run, RunLike
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.sources import LogMap, MemoryTable, TableLike, dataframe_to_table, is_table
 from urmpipe_pipeline.tables.csv_files import write_table
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 

@@ -25,10 +25,10 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs, co
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.diagnosis.result import Diagnosis
+from urmpipe_pipeline.logs import LogMap, arrays_to_table
 from urmpipe_pipeline.operands import load_comparison
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import LogMap, arrays_to_table
 from urmpipe_pipeline.trajectories import Trajectory
 
 SAME_POSITION = 1e-9  # m; rounding of positions that the joints of a reference determine

@@ -20,13 +20,13 @@ from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
 from urmpipe_models.ik.solutions import SearchOptions
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.outputs import check_output, safe_output
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
 from urmpipe_pipeline.solved_targets.request import Request, check_request, start_of
 from urmpipe_pipeline.solved_targets.result import IkResult
 from urmpipe_pipeline.solved_targets.solving import solve_targets
-from urmpipe_pipeline.sources import LogMap
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 SOLVING_SHARE = 0.7  # of the work, where an output is written, too

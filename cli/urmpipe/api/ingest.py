@@ -18,12 +18,12 @@ from urmpipe.public_functions import PathLike, as_list, check_types, public_func
 from urmpipe.reading import map_files, resolve_reading
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
+from urmpipe_pipeline.logs import MemoryTable, TableLike, arrays_to_table, dataframe_to_table, is_table
 from urmpipe_pipeline.operands import log_files, recording_to_run
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.presenter import audit_rows
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import MemoryTable, TableLike, arrays_to_table, dataframe_to_table, is_table
 from urmpipe_pipeline.tables.csv_files import write_table
 
 LOG_ALLOWED = "a file, several of one log, a folder of them, a DataFrame or Arrow table, or arrays by t=, q="

@@ -18,11 +18,11 @@ from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.iso import IsoOptions
 from urmpipe_pipeline.iso9283.poses import Poses
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.planned_paths.command_marks import find_rounded_corners, find_stops
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.solved_targets.given_targets import TargetsLike, given_targets
-from urmpipe_pipeline.sources import LogMap
 
 
 @public_function(Iso, robot=kinds.ROBOT)

@@ -21,6 +21,8 @@ from urmpipe.reading import map_files, resolve_reading
 from urmpipe_models.errors import Finding, LogError, OptionError, map_collecting_errors
 from urmpipe_models.networks import file as network_file
 from urmpipe_models.networks.file import Network
+from urmpipe_pipeline.logs import TableLike, dataframe_to_table
+from urmpipe_pipeline.logs.tables.text import fingerprint
 from urmpipe_pipeline.networks.drawing import network_svg
 from urmpipe_pipeline.networks.drive_request import DriveRequest, drive_network
 from urmpipe_pipeline.networks.finding import Search, find_network
@@ -30,8 +32,6 @@ from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import TableLike, dataframe_to_table
-from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 NetworkLike: TypeAlias = PathLike | Mapping[str, Any] | Network

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from urmpipe.parameters import kinds
 from urmpipe.public_functions import PathLike, public_function
-from urmpipe_pipeline import sources
-from urmpipe_pipeline.sources import LogMap
+from urmpipe_pipeline import logs
+from urmpipe_pipeline.logs import LogMap
 
 
 @public_function(path=kinds.MAP_FILE)
@@ -20,4 +20,4 @@ def read_map(path: PathLike) -> LogMap:
     Raises:
         OptionError: With everything that is wrong with it.
     """
-    return sources.read_map(Path(path))
+    return logs.read_map(Path(path))

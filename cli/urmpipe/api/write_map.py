@@ -10,9 +10,9 @@ from urmpipe.arm_placing import offset_of
 from urmpipe.parameters import kinds
 from urmpipe.public_functions import PathLike, as_paths, public_function
 from urmpipe_models.robots.catalogue import robot_names
+from urmpipe_pipeline.logs import LogMap, format_map, map_of, read_map
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import LogMap, format_map, map_of, read_map
 
 
 @public_function(run=kinds.RUN, output=kinds.MAP_FILE, robot=kinds.ROBOT_FILE, inputs=kinds.PATHS)

@@ -19,8 +19,8 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.files import log_stem
 
 if TYPE_CHECKING:
+    from urmpipe_pipeline.logs import LogMap
     from urmpipe_pipeline.runs.run import Run
-    from urmpipe_pipeline.sources import LogMap
 
 
 @command(Ingest, robot=ROBOT)
@@ -72,7 +72,7 @@ def _print_run_map(run: Run, robot: str | None) -> None:
 
 def _print_map(log_map: LogMap, headline: str = "") -> None:
     from urmpipe.printing.terminal import print_line
-    from urmpipe_pipeline.sources import format_map
+    from urmpipe_pipeline.logs import format_map
 
     for line in (*([f"# {headline}"] if headline else ()), *format_map(log_map).splitlines()):
         print_line(line)
@@ -81,8 +81,8 @@ def _print_map(log_map: LogMap, headline: str = "") -> None:
 def _open_map(logs: tuple[Path, ...], options: Mapping[str, Any], error: LogError) -> LogMap:
     """Return the map of logs that cannot be read yet, with its questions."""
     from urmpipe.reading import to_log_map
+    from urmpipe_pipeline.logs.read import open_map
     from urmpipe_pipeline.operands import log_files
-    from urmpipe_pipeline.sources.read import open_map
 
     files = [file for log in logs for file in log_files(log)]
     return open_map(files, replace(to_log_map(options), robot=options["robot"]), error)

@@ -201,7 +201,7 @@ def _reader(name: str, split: Callable[[Any], Any] = lambda value: value) -> Cal
     """Return the reader of a field of `LogMap`, which checks the value after texts are split."""
 
     def read(value: Any) -> Any:
-        from urmpipe_pipeline.sources.options import read_options
+        from urmpipe_pipeline.logs.options import read_options
 
         if value is None:
             raise TypeError
@@ -242,7 +242,7 @@ def _split_assignments(text: str) -> list[str]:
 
 def _split_intervals(value: Any) -> Any:
     """Split LOW:HIGH, JOINT=LOW:HIGH and lists of them by joint; "" is all joints that turn."""
-    from urmpipe_pipeline.sources.options import is_interval
+    from urmpipe_pipeline.logs.options import is_interval
 
     texts = [value] if isinstance(value, str) else value
     if isinstance(value, Mapping):
@@ -386,7 +386,7 @@ def _read_file_or(value: Any, classes: Sequence[str]) -> Any:
 def _is_run_or_table(value: Any) -> bool:
     if isinstance(value, (str, Path)) or value is None:
         return False
-    from urmpipe_pipeline.sources import is_table
+    from urmpipe_pipeline.logs import is_table
 
     return _is_instance(value, ("Run",)) or is_table(value)
 

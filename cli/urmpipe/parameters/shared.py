@@ -14,7 +14,7 @@ from urmpipe.parameters.param import Heading, Param
 
 if TYPE_CHECKING:
     from urmpipe.arm_placing import Frame
-    from urmpipe_pipeline.sources import LogMap
+    from urmpipe_pipeline.logs import LogMap
 
 PathLike: TypeAlias = str | Path
 Quantity: TypeAlias = float | str  # a number in SI, or a text with a unit: 0.005 or "5ms"

@@ -24,8 +24,8 @@ from urmpipe.parameters.shared import (
 
 if TYPE_CHECKING:
     from urmpipe_models.networks.forces import Wrench
+    from urmpipe_pipeline.logs import LogMap, TableLike
     from urmpipe_pipeline.runs.run import Run
-    from urmpipe_pipeline.sources import LogMap, TableLike
 
 _running = partial(Param, heading=Heading.RUNNING)
 _solving = partial(Param, heading=Heading.SOLVING)

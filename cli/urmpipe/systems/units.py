@@ -19,7 +19,7 @@ from urmpipe_models.errors import Finding, Hint, OptionError
 from urmpipe_models.robots.catalogue import load_robot
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.sources import LogMap
+    from urmpipe_pipeline.logs import LogMap
 
 Backend = Literal["native", "python"]
 

@@ -22,12 +22,12 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.math3d import fit_rotation, to_matrices
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.logs.cells.text_clock import DATE
+from urmpipe_pipeline.logs.checks import REBUILT, SPREAD
+from urmpipe_pipeline.logs.clocks.halves import EPOCH
+from urmpipe_pipeline.logs.clocks.text_times import ZONED
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources.cells.text_clock import DATE
-from urmpipe_pipeline.sources.checks import REBUILT, SPREAD
-from urmpipe_pipeline.sources.clocks.halves import EPOCH
-from urmpipe_pipeline.sources.clocks.text_times import ZONED
 from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory, extent, joint_order, run_finding
 
 SyncOption: TypeAlias = Literal["stamps", "start", "auto"] | float

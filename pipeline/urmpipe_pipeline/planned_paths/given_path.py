@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TypeAlias
 
 from urmpipe_models.planning.path import PathRows
+from urmpipe_pipeline.logs.options import LogMap
 from urmpipe_pipeline.planned_paths.cube_text import CUBE, read_cube
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.row_checks import checked_rows
-from urmpipe_pipeline.sources.options import LogMap
 
 PathLike: TypeAlias = str | Path | PathRows
 """A file, a test cube (cube:wall,a=0.6,...), or rows."""

@@ -11,17 +11,17 @@ import numpy as np
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.planning.path import PROPER, PathRows
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.logs.clocks.clock_columns import time_columns
+from urmpipe_pipeline.logs.columns.columns import Column, listed
+from urmpipe_pipeline.logs.options import LogMap
+from urmpipe_pipeline.logs.tables.numbers import capped
+from urmpipe_pipeline.logs.tables.row_reader import lines_of_rows
+from urmpipe_pipeline.logs.tables.text import fingerprint
+from urmpipe_pipeline.logs.tables.whole import Whole
+from urmpipe_pipeline.logs.targets.pose_table import PoseTable, read_pose_table
+from urmpipe_pipeline.logs.targets.row_faults import ExtraColumn
+from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.planned_paths.row_checks import are_radii, are_variants, curve_faults
-from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
-from urmpipe_pipeline.sources.columns.columns import Column, listed
-from urmpipe_pipeline.sources.options import LogMap
-from urmpipe_pipeline.sources.tables.numbers import capped
-from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
-from urmpipe_pipeline.sources.tables.text import fingerprint
-from urmpipe_pipeline.sources.tables.whole import Whole
-from urmpipe_pipeline.sources.targets.pose_table import PoseTable, read_pose_table
-from urmpipe_pipeline.sources.targets.row_faults import ExtraColumn
-from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 MEANINGS = {
     "r": "the first tangent point of the arc of radius r",

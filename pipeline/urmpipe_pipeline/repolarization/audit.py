@@ -29,12 +29,12 @@ from urmpipe_models.wraps import (
 )
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import MISSED_SAMPLE, Inference, JointLog, LogWarning, ns_to_seconds
+from urmpipe_pipeline.logs.options import GivenInterval
 from urmpipe_pipeline.repolarization.interval import (
     find_double_turn_joints,
     interval_inferences,
     wrap_periods,
 )
-from urmpipe_pipeline.sources.options import GivenInterval
 
 AuditKind = Literal["wrap", "in-between", "repaired", "unexplained", "ambiguous"]
 

@@ -15,10 +15,10 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
+from urmpipe_pipeline.logs.checks import REBUILT
+from urmpipe_pipeline.logs.clocks.text_times import ZONED
+from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
-from urmpipe_pipeline.sources.checks import REBUILT
-from urmpipe_pipeline.sources.clocks.text_times import ZONED
-from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 from urmpipe_pipeline.text import drop_surrogates
 
 MAX_DIGITS = 15  # decimal numbers with up to 15 digits have different doubles

@@ -21,6 +21,10 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, LogError, OptionError, check_choice
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, number_rows
+from urmpipe_pipeline.logs import LogMap, MemoryTable
+from urmpipe_pipeline.logs.clocks.clock import unused_for_poses, unused_period
+from urmpipe_pipeline.logs.options import READING
+from urmpipe_pipeline.logs.read import read_numbers
 from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING, mesh_warnings
 from urmpipe_pipeline.provenance import Provenance, build_provenance
 from urmpipe_pipeline.repolarization.audit import AuditResult, audit_log, is_revolute
@@ -42,10 +46,6 @@ from urmpipe_pipeline.runs.torques import (
     mass_warnings,
     torque_warnings,
 )
-from urmpipe_pipeline.sources import LogMap, MemoryTable
-from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
-from urmpipe_pipeline.sources.options import READING
-from urmpipe_pipeline.sources.read import read_numbers
 
 MIN_TSP = 1e-9  # s, times of a log are whole nanoseconds
 MAX_TSP = 1e9  # s, longer times in [ns] do not fit into 64 bits

@@ -22,8 +22,8 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_bloc
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.logs.poses import FASTEST
 from urmpipe_pipeline.repolarization.interval import fold_rows
-from urmpipe_pipeline.sources.poses import FASTEST
 
 JOINT_LIMIT = "joint-limit"
 SPEED_LIMIT = "speed-limit"

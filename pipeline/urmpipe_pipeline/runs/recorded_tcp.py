@@ -34,9 +34,7 @@ from urmpipe_models.math3d import (
 from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot, robot_names
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, JointLog, LogWarning
-from urmpipe_pipeline.runs.reading_errors import Edit, robot_edits, sign_edits, swap_edits
-from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources.units.proofs import (
+from urmpipe_pipeline.logs.units.proofs import (
     MARGIN,
     SAMPLES,
     Fit,
@@ -47,7 +45,9 @@ from urmpipe_pipeline.sources.units.proofs import (
     mean_turn,
     spread,
 )
-from urmpipe_pipeline.sources.vocabulary import key, split_unit
+from urmpipe_pipeline.logs.vocabulary import key, split_unit
+from urmpipe_pipeline.runs.reading_errors import Edit, robot_edits, sign_edits, swap_edits
+from urmpipe_pipeline.runs.run import Run
 
 RECORDED_START = "recorded-tcp-start"
 FAR_RECORDED = "recorded-tcp-far"

@@ -17,10 +17,10 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, Role
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.simulations.simulation import SLOW, Signal, Simulation
-from urmpipe_pipeline.sources import LogMap
 
 SIMULATED = "simulate"
 """The source of a log that is the motion of a block."""

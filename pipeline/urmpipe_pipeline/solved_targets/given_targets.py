@@ -16,8 +16,8 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.ik.solutions import ROTATION_TOLERANCE, Targets
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.solved_targets.target_file import read_targets
-from urmpipe_pipeline.sources import LogMap
 
 TargetsLike: TypeAlias = str | Path | Targets | ArrayLike
 """A file, or positions in [m], shape (n, 3), or poses as matrices, shape (n, 4, 4)."""

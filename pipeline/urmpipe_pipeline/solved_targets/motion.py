@@ -13,10 +13,10 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.joint_log import ROW_NS, SOLVED, JointLog, LogColumn, LogWarning
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import log_to_run
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import LogMap
 
 
 def run_of_solutions(

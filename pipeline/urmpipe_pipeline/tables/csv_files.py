@@ -20,11 +20,11 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.logs.cells.cell import printable
+from urmpipe_pipeline.logs.vocabulary import key
 from urmpipe_pipeline.outputs import EXPORT_HEADER, TARGET_ROW
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportTable, Poses, Times
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Table, Value
-from urmpipe_pipeline.sources.cells.cell import printable
-from urmpipe_pipeline.sources.vocabulary import key
 from urmpipe_pipeline.text import format_exact, to_csv_text
 
 SLICE = 65_536  # rows written at a time: memory stays low

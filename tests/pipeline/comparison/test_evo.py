@@ -21,9 +21,9 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import LogMap
 from urmpipe_pipeline.tables import ExportOptions
 from urmpipe_pipeline.trajectories import AlignMode
 

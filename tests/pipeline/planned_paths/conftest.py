@@ -13,9 +13,9 @@ from made_plans import CONTOUR, SMALL, limited, planned
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.result import PlannedPath
-from urmpipe_pipeline.sources import LogMap
 
 Read = Callable[..., GivenPath]
 

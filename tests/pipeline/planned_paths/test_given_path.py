@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from asserting import there
 from urmpipe_models.errors import LogError, OptionError, PathError, UrmpipeError
 from urmpipe_models.planning.path import PLANES, PathRows, cube_rows
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.planned_paths.given_path import PathLike, given_path
-from urmpipe_pipeline.sources import LogMap
 
 CUBE = "a=0.6,r=0.03,x=1.7,y=0,z=1"
 CENTRE = np.array([1.7, 0.0, 1.0])

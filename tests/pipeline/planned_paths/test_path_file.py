@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from asserting import there
+from urmpipe_pipeline.logs import read_map
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
-from urmpipe_pipeline.sources import read_map
 
 Read = Callable[..., GivenPath]
 Wrong = Callable[..., list[str]]

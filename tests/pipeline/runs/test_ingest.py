@@ -16,9 +16,9 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_with_recorded_tcp
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.runs.derivatives import WINDOW, Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.sources import LogMap
 
 RAD = LogMap(unit={"": "rad"})
 TSP = 0.005

@@ -12,9 +12,9 @@ from arm_motion import KINDS, arm, clock, found
 from urmpipe_datasets import LOGS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.plausibility import largest_steps
-from urmpipe_pipeline.sources import LogMap
 
 FORMATS: dict[str, tuple[str, Callable[[FloatArray], FloatArray]]] = {
     "exact": ("rad", lambda q: q),

@@ -12,10 +12,10 @@ from asserting import there
 from exported import export_result
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import COLUMN_NAMES, RotationForm, column_count
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import LogMap
 from urmpipe_pipeline.tables import ExportOptions
 
 ROWS = 200

@@ -14,9 +14,9 @@ from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
 from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot, robot_names
 from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.recorded_tcp import recorded_tcp_warnings
-from urmpipe_pipeline.sources import LogMap
 
 SIX = [name for name in robot_names() if len(load_robot(name).moving) == 6]
 SAME_KINEMATICS = {"ur3": "ur3e", "ur3e": "ur3"}

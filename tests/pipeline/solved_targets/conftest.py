@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from urmpipe_pipeline.logs import LogMap
 from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
-from urmpipe_pipeline.sources import LogMap
 
 Read = Callable[..., TargetFile]
 

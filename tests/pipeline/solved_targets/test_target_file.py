@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from make_specimens import paths
 from specimen import SPECIMENS, Truth
+from urmpipe_pipeline.logs import LogMap, read_log, read_map
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
-from urmpipe_pipeline.sources import LogMap, read_log, read_map
 
 DATASETS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
 LOGS = Path(__file__).resolve().parents[3].parent / "shared" / "logs"

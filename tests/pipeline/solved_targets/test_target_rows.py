@@ -11,8 +11,8 @@ import pytest
 
 from asserting import INCREASE
 from urmpipe_models.errors import LogError
+from urmpipe_pipeline.logs import LogMap, read_log
 from urmpipe_pipeline.solved_targets.target_file import TargetFile
-from urmpipe_pipeline.sources import LogMap, read_log
 
 Read = Callable[..., TargetFile]
 Wrong = Callable[..., list[str]]

@@ -14,10 +14,10 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OutputError
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.logs import LogMap, read_log
 from urmpipe_pipeline.outputs import safe_output
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.run import Run
-from urmpipe_pipeline.sources import LogMap, read_log
 from urmpipe_pipeline.tables.csv_files import write_joint_log
 
 STEP = 5_000_000
