@@ -12,7 +12,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import map_collecting_errors
 from urmpipe_models.math3d import from_offset
 from urmpipe_pipeline.logs import LogMap, read_map
-from urmpipe_pipeline.logs.options import read_options
+from urmpipe_pipeline.logs.log_map import read_options
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,8 +33,8 @@ from urmpipe_models.errors import (
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.comparison.comparison import Comparison, FailedLog
 from urmpipe_pipeline.logs import LogMap, MemoryTable
-from urmpipe_pipeline.logs.tables.bag_file import is_bag_folder
-from urmpipe_pipeline.logs.tables.lerobot import is_data_set
+from urmpipe_pipeline.logs.formats.bag import is_bag_folder
+from urmpipe_pipeline.logs.formats.parquet import is_data_set
 from urmpipe_pipeline.logs.vocabulary import key
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.repolarization.audit import is_revolute

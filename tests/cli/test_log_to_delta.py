@@ -13,7 +13,7 @@ from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.logs.tables.text import fingerprint
+from urmpipe_pipeline.logs.formats.text import fingerprint
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError, map_collecting
 from urmpipe_models.networks import file as network_file
 from urmpipe_models.networks.file import Network
 from urmpipe_pipeline.logs import TableLike, dataframe_to_table
-from urmpipe_pipeline.logs.tables.text import fingerprint
+from urmpipe_pipeline.logs.formats.text import fingerprint
 from urmpipe_pipeline.networks.drawing import network_svg
 from urmpipe_pipeline.networks.drive_request import DriveRequest, drive_network
 from urmpipe_pipeline.networks.finding import Search, find_network

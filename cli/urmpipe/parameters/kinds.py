@@ -201,7 +201,7 @@ def _reader(name: str, split: Callable[[Any], Any] = lambda value: value) -> Cal
     """Return the reader of a field of `LogMap`, which checks the value after texts are split."""
 
     def read(value: Any) -> Any:
-        from urmpipe_pipeline.logs.options import read_options
+        from urmpipe_pipeline.logs.log_map import read_options
 
         if value is None:
             raise TypeError
@@ -242,7 +242,7 @@ def _split_assignments(text: str) -> list[str]:
 
 def _split_intervals(value: Any) -> Any:
     """Split LOW:HIGH, JOINT=LOW:HIGH and lists of them by joint; "" is all joints that turn."""
-    from urmpipe_pipeline.logs.options import is_interval
+    from urmpipe_pipeline.logs.log_map import is_interval
 
     texts = [value] if isinstance(value, str) else value
     if isinstance(value, Mapping):

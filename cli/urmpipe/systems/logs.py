@@ -24,7 +24,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.options import READING
+from urmpipe_pipeline.logs.log_map import READING
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.runs.grid import REGULAR
 
@@ -84,7 +84,7 @@ def read_table(
         LogError: With all faults of the files, or if a row lacks a value.
     """
     if names is not None:
-        from urmpipe_pipeline.logs.series import read_series
+        from urmpipe_pipeline.logs.read import read_series
 
         series = read_series(Path(log), names, read)
         units = (unit or "" for unit in series.units)

@@ -27,7 +27,7 @@ from urmpipe_models.measure_units import readings
 from urmpipe_models.toml_tables import quote_toml
 from urmpipe_pipeline.comparison.verdict import DeltaMeterResult, judge_delta_meter
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.logs.tables.text import fingerprint
+from urmpipe_pipeline.logs.formats.text import fingerprint
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.simulations.coupling import coupling_warnings
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedArm, SimulatedBlock, Simulation

@@ -22,10 +22,10 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.math3d import fit_rotation, to_matrices
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.logs.cells.text_clock import DATE
-from urmpipe_pipeline.logs.checks import REBUILT, SPREAD
-from urmpipe_pipeline.logs.clocks.halves import EPOCH
-from urmpipe_pipeline.logs.clocks.text_times import ZONED
+from urmpipe_pipeline.logs.clock_columns import EPOCH
+from urmpipe_pipeline.logs.clock_text import ZONED
+from urmpipe_pipeline.logs.formats.clock_forms import DATE
+from urmpipe_pipeline.logs.row_checks import REBUILT, SPREAD
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory, extent, joint_order, run_finding

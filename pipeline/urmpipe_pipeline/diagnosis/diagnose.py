@@ -62,7 +62,7 @@ from urmpipe_pipeline.diagnosis.models import JointModel
 from urmpipe_pipeline.diagnosis.problem import AT_REST, Problem, build_problem
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.diagnosis.search import Search
-from urmpipe_pipeline.logs.units.proofs import MARGIN
+from urmpipe_pipeline.logs.proofs import MARGIN
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.reading_errors import Edits
 from urmpipe_pipeline.runs.recorded_tcp import RecordedPoses, distances_from_recorded

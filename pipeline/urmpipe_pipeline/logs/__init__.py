@@ -5,13 +5,13 @@ columns?), `table` (its numbers, and where it is wrong, with line and column), `
 The words by which columns, units and sources are known are in `vocabulary.toml`.
 """
 
-from urmpipe_pipeline.logs.log_map import format_map, map_of, read_map
-from urmpipe_pipeline.logs.options import LogMap
+from urmpipe_pipeline.logs.formats.arrays import arrays_to_table
+from urmpipe_pipeline.logs.formats.memory import MemoryTable
+from urmpipe_pipeline.logs.formats.opening import source_names
+from urmpipe_pipeline.logs.formats.parquet import TableLike, dataframe_to_table, is_table
+from urmpipe_pipeline.logs.log_map import LogMap
+from urmpipe_pipeline.logs.map_file import format_map, map_of, read_map
 from urmpipe_pipeline.logs.read import read_log
-from urmpipe_pipeline.logs.tables.frames import TableLike, dataframe_to_table, is_table
-from urmpipe_pipeline.logs.tables.given_arrays import arrays_to_table
-from urmpipe_pipeline.logs.tables.held import MemoryTable
-from urmpipe_pipeline.logs.tables.opening import source_names
 
 __all__ = [
     "LogMap",

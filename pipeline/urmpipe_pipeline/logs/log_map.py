@@ -1,304 +1,272 @@
-"""Maps of logs as TOML: what was found of one log, or is known of a lab's logs, reads the next ones.
+"""The map of a log: its columns, and how each is known. Its fields are options, keywords and keys of TOML.
 
-- `read_map`: the map of a file.
-- `map_of`: the map by which a log reads as it was read, with the evidence of each entry.
-- `format_map`: a map as TOML with the evidence as comments; a unit that is only assumed is a comment.
-
-docs/logs.md has an example: "Maps and defaults".
+- `LogMap`: the map, as given or as it was found.
+- `read_options`: the fields among named values, such as those of a command.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from numbers import Real
+from typing import Any, Literal, NamedTuple, TypeAlias
 
-from urmpipe_models.errors import Finding, OptionError, escape_line
-from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
-from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, Role
-from urmpipe_pipeline.logs.clocks.time_file import TIME_FILE, named_file
-from urmpipe_pipeline.logs.columns.places import ASSUMED_JOINTS
-from urmpipe_pipeline.logs.options import READING, Basis, Evidence, LogMap
-from urmpipe_pipeline.logs.tables.opening import TABLE
-from urmpipe_pipeline.logs.tables.rows import ROWS_READ
-from urmpipe_pipeline.logs.units.rotation import PURE
-from urmpipe_pipeline.logs.vocabulary import key as compared
-from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
-from urmpipe_pipeline.outputs import MAP_HEADER
+from urmpipe_models.errors import Finding, OptionError, format_value
+from urmpipe_models.math3d import FORMS, RotationForm
+from urmpipe_models.measure_units import compatible_units, quantity_to_si
 
-TABLES = ("unit", "interval")
-KEYS = (
-    *(
-        "source",
-        "robot",
-        "base",
-        "tool",
-        "delimiter",
-        "decimal",
-        "layout",
-        "sheet",
-        "topic",
-        "episode",
-        "rows",
-        "side",
-    ),
-    *(
-        "time",
-        "period",
-        "poses",
-        "joints",
-        "names",
-        "signs",
-        "offsets",
-        "position",
-        "orientation",
-        "rotation",
-    ),
-    *("measured", "skip_bad", "repair"),
-)
-"""The keys of a map before its tables, in this order."""
+COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
+UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
+SIDE = "a word in the names of columns, such as actual, or several, such as arm2_solved"
+EPISODES = "an episode by number or name, or COLUMN=VALUE"
+ROWS = "rows from 1, both ends included, such as 2:-1 or 1:99,101:-1; -1 is the last"
+INTERVALS = "two ends for all revolute joints, or ends by joint, such as q1=-180:180"
 
-FRAME_UNITS = ("m", "m", "m", "rad", "rad", "rad")
-
-CORRECTIONS = (
-    "# signs = [1, -1, ...] and offsets = [0, 90, ...] correct the joints: q = sign * value + offset.",
-    "# interval.q1 = [-180, 180] is the interval to which the program limits a joint.",
-)
-"""What may be added to a map by hand."""
-
-NOTES = (
-    *("encoding", "header", "labels", "arrays", "program", ROWS_READ),
-    *("clock", "form of the time", "columns not used"),
-)
-"""Kinds of inferences that are no entries of a map."""
+GivenInterval: TypeAlias = tuple[float | str, float | str]
+"""LOW and HIGH of a joint: numbers in the file's own unit, or both angles as texts with units."""
 
 
-THEIR_NAMES = "their names"
-"""Evidence of a form of orientation that the names of its columns state."""
-
-UNITS = ("unit", "form", "unit of the time")
-"""Kinds of inferences about units."""
-
-QUANTITIES = {"rad": "angle", "deg": "angle", "": "angle"}
+Basis: TypeAlias = Literal["given", "named", "proved", "assumed"]
+"""How an entry of a map is known: by the user, by a name of the file, by its numbers, or not at all."""
 
 
-def read_map(path: Path) -> LogMap:
-    """Return the map of a file.
+class Evidence(NamedTuple):
+    """How an entry of a map is known, and why."""
 
-    Raises:
-        OptionError: With everything that is wrong with it.
+    basis: Basis
+    why: str
+
+
+@dataclass(frozen=True)
+class LogMap:
+    """The columns of a log, as the user gives them or as they were found.
+
+    Attributes:
+        source: Name of the source, as `source_names` lists them.
+        delimiter: Sign between cells, or comma, semicolon, tab, spaces, bar.
+        decimal: Decimal sign, or point, comma.
+        layout: What a row of the table is: "table" a sample, "transposed" a joint; of a flat array, sample by
+            sample or joint by joint, "flat:N" or "flat-by-joint:N" with N numbers a sample.
+        sheet: Name or number (from 1) of the sheet of a workbook.
+        topic: Name of the topic of a bag, or what the names of its columns begin with in a table of several.
+        episode: The episode of a file of several: its number or name, or "COLUMN=VALUE".
+        rows: Data rows to read, from 1, both ends included; negative ones count from the last, -1: "2:-1", or
+            several such ranges, "1:99,101:-1".
+        time: Name or number (from 1) of the time column; FILE:COLUMN of one in another file, with as many
+            rows; "none" if there is none.
+        joints: Names or numbers (from 1) of the joint columns, in the robot's order.
+        names: What to call the joints, in the same order; by default as their columns.
+        signs: 1 or -1 for each joint: -1 where the file counts against the robot's axis.
+        offsets: Added to each joint after its sign, in the unit of its column.
+        position: Names or numbers of the recorded x, y, z.
+        orientation: Names or numbers of the columns of the recorded orientation, in the order of its form.
+        rotation: Form of the recorded orientation, as `RotationForm` lists them.
+        unit: Unit of a column by its name or number; by "" that of every angle (joints that turn, recorded
+            orientation) of which neither its own name nor the kinematics tell one.
+        period: Time between rows in [s], of a log without a time column.
+        skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
+        interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
+            of all joints that turn; in the file's own unit, or angles as texts with units.
+        side: A word in the names of the columns to read, "actual" or "arm1", or several, "arm2_solved":
+            columns with a word of another side are left out.
+        repair: Whether samples that a linear resampling left on a wrap are put on the line through their
+            neighbours.
+        poses: Whether the rows are static poses, which no motion joins: a clock of theirs is a label.
+        measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of
+            its own, and behind them of its orientation, if it was.
+        shared: Whether they apply to several logs: columns and joints that a log lacks belong to another.
+        pair: Of a comparison of two sides of a table, the word of this side, or "rest", and of the other.
+        robot: Name or file of the arm, or None.
+        base: Frame of the arm: X, Y, Z[, RX, RY, RZ] in [m] and [rad], or empty.
+        tool: Tool centre point in the same form, or empty.
+        evidence: How the entries are known: by field, the unit of a column by "unit.COLUMN".
+        notes: Properties of the file that are no entries, each with its value and reason.
+        questions: The entries that are open, with their choices as hints.
     """
-    faults: list[Finding] = []
-    table = CheckedTable(read_toml(path, OptionError), faults, str(path))
-    values: dict[str, Any] = {}
-    for key in (*KEYS, *TABLES):
-        if not table.has(key):
-            continue
-        if key == "period":
-            values[key] = table.number(key, si="s")
-        elif key in ("base", "tool"):
-            values[key] = [*table.numbers(key, None, si=FRAME_UNITS)]
-        else:
-            values[key] = table.value(key)
-        try:
-            LogMap(**{key: values[key]})
-        except OptionError as error:
-            del values[key]
-            for finding in error.findings:
-                table.add_error(key, f"found {finding.found}, allowed: {finding.allowed}")
-    table.report_unknown_keys()
-    if faults:
-        raise OptionError(*faults)
-    result = LogMap(**values)
-    time, file = f"{path.parent / str(result.time)}", result.robot and Path(result.robot)
-    return replace(
-        result,
-        time=time if result.time and named_file(time) else result.time,
-        robot=str(path.parent / file) if file and file.suffix else result.robot,
-    )
+
+    source: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    layout: str | None = None
+    sheet: str | None = None
+    topic: str | None = None
+    episode: str | None = None
+    rows: str | None = None
+    time: str | None = None
+    joints: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    signs: tuple[int, ...] = ()
+    offsets: tuple[float, ...] = ()
+    position: tuple[str, ...] = ()
+    orientation: tuple[str, ...] = ()
+    rotation: RotationForm | None = None
+    unit: Mapping[str, str] = field(default_factory=dict)
+    period: float | None = None
+    skip_bad: bool = False
+    interval: Mapping[str, GivenInterval] = field(default_factory=dict)
+    repair: bool = False
+    side: str | None = None
+    poses: bool = False
+    measured: tuple[str, ...] = ()
+    shared: bool = False
+    pair: tuple[str, str] | None = None
+    robot: str | None = None
+    base: tuple[float, ...] = ()
+    tool: tuple[float, ...] = ()
+    evidence: Mapping[str, Evidence] = field(default_factory=dict, compare=False, repr=False)
+    notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    questions: tuple[Finding, ...] = field(default=(), compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
+
+        Raises:
+            OptionError: With everything that is of a wrong kind.
+        """
+        for one in fields(self):
+            if isinstance(value := getattr(self, one.name), Iterator):  # can be looked through only once
+                object.__setattr__(self, one.name, tuple(value))
+        for name in ("unit", "interval"):
+            object.__setattr__(self, name, _for_all(getattr(self, name)))
+        wrong = [
+            Finding(parameter=one.name, found=format_value(value), allowed=allowed)
+            for one in fields(self)
+            if one.name in _KINDS
+            for value, (fits, allowed) in [(getattr(self, one.name), _KINDS[one.name])]
+            if not ((value is None and one.default is None) or fits(value))
+        ]
+        if wrong:
+            raise OptionError(*wrong)
+        for name in ("joints", "names", "position", "orientation", "measured"):
+            object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
+        object.__setattr__(self, "signs", tuple(int(s) if s == int(s) else s for s in self.signs))
+        for name in ("offsets", "base", "tool"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name in ("sheet", "episode", "time"):
+            value = getattr(self, name)
+            object.__setattr__(self, name, None if value is None else str(value))
+        object.__setattr__(self, "unit", {str(column): unit for column, unit in self.unit.items()})
+        intervals = {joint: (low, high) for joint, (low, high) in self.interval.items()}
+        object.__setattr__(self, "interval", intervals)
 
 
-def map_of(
-    log: JointLog,
-    options: LogMap | None = None,
-    robot: str | None = None,
-    base: Sequence[float] = (),
-    tool: Sequence[float] = (),
-) -> LogMap:
-    """Return the map by which a log reads as it was read, with the evidence of its entries.
+def _is_word(value: Any) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _is_column(value: Any) -> bool:
+    return isinstance(value, str) or _is_number(value)
+
+
+def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    """Return what tells whether a value is a list of such; a text and a table are none."""
+
+    def fit(value: Any) -> bool:
+        alone = isinstance(value, (str, Mapping)) or hasattr(value, "columns")
+        return not alone and isinstance(value, Iterable) and all(map(fits, value))
+
+    return fit
+
+
+def _are_named(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, Mapping) and all(map(fits, value.values()))
+
+
+def is_interval(value: Any) -> bool:
+    """Return whether a value is two ends: numbers in the file's own unit, or angles with units."""
+    angle = compatible_units("rad")
+    kinds = (_is_number, lambda end: isinstance(end, str) and math.isfinite(quantity_to_si(end, angle)))
+    return any(_are(fits)(value) for fits in kinds) and len(value) == 2
+
+
+def _is_name(value: Any) -> bool:
+    return _is_column(value) and value != ""
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, str) and re.fullmatch(_ROWS, value) is not None
+
+
+def _is_layout(value: Any) -> bool:
+    return isinstance(value, str) and re.fullmatch(_LAYOUTS, value) is not None
+
+
+_ROWS = r"(-?[1-9]\d*)?:(-?[1-9]\d*)?(,(-?[1-9]\d*)?:(-?[1-9]\d*)?)*"
+_LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
+_WORDS = re.compile(r"[^\W_]")
+_TEXT = (_is_word, "a non-empty text")
+_COLUMNS = (_are(_is_column), COLUMNS)
+_FRAME = (
+    lambda value: _are(_is_number)(value) and len(value) in (0, 3, 6),
+    "X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
+)
+_FLAG = (lambda value: isinstance(value, bool), "True or False")
+
+_KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+    "source": _TEXT,
+    "delimiter": _TEXT,
+    "decimal": _TEXT,
+    "layout": (_is_layout, "table, transposed, flat:N or flat-by-joint:N, with N numbers a sample"),
+    "sheet": (_is_name, "a sheet by name or number"),
+    "topic": _TEXT,
+    "episode": (_is_name, EPISODES),
+    "rows": (_is_rows, ROWS),
+    "time": (_is_name, "a column by name or number, or FILE:COLUMN"),
+    "joints": _COLUMNS,
+    "names": (_are(_is_column), "a list of names, such as ['q1', 'q2']"),
+    "signs": (_are(_is_number), "a list of 1 or -1, such as [1, -1]"),
+    "offsets": (_are(_is_number), "a list of numbers, such as [0.0, 90.0]"),
+    "position": _COLUMNS,
+    "orientation": _COLUMNS,
+    "rotation": (lambda value: isinstance(value, str) and value in FORMS, ", ".join(FORMS)),
+    "unit": (_are_named(_is_word), UNITS),
+    "period": (_is_number, "a number, in s"),
+    "skip_bad": _FLAG,
+    "interval": (_are_named(is_interval), INTERVALS),
+    "repair": _FLAG,
+    "shared": _FLAG,
+    "side": (lambda value: _is_word(value) and _WORDS.search(value) is not None, SIDE),
+    "pair": (lambda value: _are(_is_word)(value) and len(value) == 2, "two words"),
+    "poses": _FLAG,
+    "measured": _COLUMNS,
+    "robot": _TEXT,
+    "base": _FRAME,
+    "tool": _FRAME,
+}
+"""What each field takes, and what to say of anything else."""
+
+
+READING = tuple(name for name in _KINDS if name not in ("robot", "base", "tool"))
+"""The fields that say how a log is read, without its arm."""
+
+
+def _for_all(value: Any) -> Any:
+    """Return a value that is given for all joints that turn as a mapping; what is one already as it is."""
+    return {"": value} if isinstance(value, (str, list, tuple)) and value else value
+
+
+def read_options(values: Mapping[str, Any], otherwise: LogMap | None = None) -> LogMap:
+    """Return the map that some named values give; None means not given.
 
     Args:
-        log: The log.
-        options: The map with which it was read.
-        robot: Name or file of the arm.
-        base: Its frame: X, Y, Z[, RX, RY, RZ] in [m] and [rad]; nothing for the origin.
-        tool: Its tool centre point, in the same form; nothing for the tip.
+        values: Options by name, others among them.
+        otherwise: What holds where nothing is given, such as that of a map. Units of single columns and
+            intervals of single joints add up; joints given anew leave behind what belonged to the others:
+            names, signs, offsets and intervals.
     """
-    options = options or LogMap()
-    by_kind = {inference.kind: inference for inference in log.inferences}
-    values: dict[str, Any] = {
-        name: getattr(options, name) for name in READING if name not in ("shared", "pair")
-    }
-    values |= {"robot": robot, "base": tuple(base), "tool": tuple(tool)}
-    values["source"] = log.source if options.source or log.source != TABLE else None
-    values |= shown_entries(log.inferences)
-    values |= _clock_entries(log, by_kind, options)
-    joints, position, rotation = (_columns(log, role) for role in ("joint", "position", "rotation"))
-    signs, offsets = tuple(c.sign for c in joints), tuple(c.offset for c in joints)
-    values |= {"signs": signs if -1 in signs else (), "offsets": offsets if any(offsets) else ()}
-    values |= {"joints": _names(log, joints), "rotation": log.rotation_form if rotation else None}
-    numbered = tuple(f"q{k}" for k in range(1, len(joints) + 1))
-    if joints and not joints[0].header and log.joints != numbered:
-        values["names"] = log.joints  # those of the robot
-    place, turn, outside = _names(log, position), _names(log, rotation), log.externally_measured
-    values |= {"measured": place + turn if outside else ()}
-    values |= {"position": () if outside else place, "orientation": () if outside else turn}
-    values["unit"] = _unit_entries(log, by_kind, options, values["time"])
-    intervals = {name: options.interval.get(name, options.interval.get("")) for name in log.joints}
-    turning = [column.unit in ("rad", "deg") for column in joints]
-    values["interval"] = {
-        name: ends for (name, ends), turns in zip(intervals.items(), turning, strict=False) if ends and turns
-    }
-    return LogMap(**values, evidence=dict(_evidence(log, by_kind, options)))
-
-
-def shown_entries(inferences: Sequence[Inference]) -> dict[str, Any]:
-    """Return delimiter, decimal sign and layout of the files, and the notes, of what was inferred."""
-    by_kind = {inference.kind: inference for inference in inferences}
-    kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout"}
-    entries: dict[str, Any] = {
-        key: by_kind[kind].value if kind in by_kind else None for key, kind in kinds.items()
-    }
-    notes = (by_kind[kind] for kind in NOTES if kind in by_kind)
-    return entries | {"notes": tuple(f"{note.what}: {note.value} ({note.evidence})" for note in notes)}
-
-
-def _clock_entries(log: JointLog, by_kind: Mapping[str, Inference], options: LogMap) -> dict[str, Any]:
-    """Return time, period and poses; a stamp in halves and a file of times are found anew.
-
-    A file whose column was given as the time is entered with its whole path.
-    """
-    columns = _columns(log, "time")
-    if not log.timed:
-        labels = by_kind["time column"].columns if "time column" in by_kind else ()
-        time = labels[0] if len(labels) == 1 else None if labels else "none"
-        return {"time": time, "period": None, "poses": True}
-    if not columns:
-        return {"time": "none", "period": log.period or None, "poses": False}
-    file = named_file(options.time)
-    if len(columns) > 1 or (TIME_FILE in by_kind and not file):
-        return {"time": None, "period": None, "poses": False}
-    time = f"{file[0].resolve()}:{file[1]}" if file else _name(log, columns[0])
-    return {"time": time, "period": None, "poses": False}
-
-
-def _unit_entries(
-    log: JointLog, by_kind: Mapping[str, Inference], options: LogMap, time: str | None
-) -> dict[str, str]:
-    """Return the units of the columns; of the clock where it is one column of numbers, or options."""
-    clock, file = _columns(log, "time"), named_file(time)
-    names = {name for c in clock for name in (c.name, c.header, str(c.number)) if name}
-    units = {name: unit for name, unit in options.unit.items() if name in names}
-    named = any(vocabulary().unit(split_unit(column.header)[1] or "") for column in clock)
-    if len(clock) == 1 and "unit of the time" in by_kind and time and not named:
-        units = {file[1] if file else time: clock[0].unit}
-    used = [column for column in log.columns if column.role in ("joint", "position", "rotation")]
-    return units | {_name(log, column): column.unit for column in used if column.unit != PURE.name}
-
-
-def _evidence(
-    log: JointLog, by_kind: Mapping[str, Inference], options: LogMap
-) -> Iterator[tuple[str, Evidence]]:
-    """Yield the evidence of the entries, by field or "unit.COLUMN"."""
-    whose = "measured" if log.externally_measured else "recorded"
-    kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout", "source": "source"}
-    kinds |= {"time": "time column", "period": "period", "poses": "rows", "joints": "joint columns"}
-    kinds |= {"position": f"{whose} TCP", "measured": f"{whose} TCP", "orientation": f"{whose} orientation"}
-    kinds |= {"rotation": "form", "robot": "robot"}
-    words = (*vocabulary().time, *vocabulary().dates)
-    clock = [compared(split_unit(column.header)[0]) for column in _columns(log, "time")]
-    named = {"source", "delimiter", "decimal"}
-    named |= {"time"} if any(word.search(name) for name in clock for word in words) else set()
-    labelled = "labels" in by_kind  # names stand before the values of each row
-    named |= {"joints"} if labelled or all(column.header for column in _columns(log, "joint")) else set()
-    named |= {"time"} if labelled and clock else set()
-    named |= {"position", "orientation"} if all(c.header for c in _columns(log, "position")) else set()
-    named |= {"rotation"} if "form" in by_kind and by_kind["form"].evidence == THEIR_NAMES else set()
-    robot = by_kind["robot"].value if "robot" in by_kind else ""
-    named |= {"robot"} if all(robot in column.header for column in _columns(log, "joint")) else set()
-    assumed_joints = any(one.kind == ASSUMED_JOINTS for one in log.warnings)
-    for field, kind in kinds.items():
-        if kind in by_kind:
-            basis: Basis = "given" if getattr(options, field) else "named" if field in named else "proved"
-            is_assumed = {
-                "period": log.period_assumed,
-                "joints": assumed_joints,
-                "time": not by_kind[kind].columns,
-            }
-            if basis != "given" and is_assumed.get(field):
-                basis = "assumed"
-            yield field, Evidence(basis, by_kind[kind].evidence)
-    source = vocabulary().source(log.source)
-    assumed_time = [one.message for one in log.warnings if one.assumption and one.role == "time"]
-    why = {name: one.evidence for one in log.inferences if one.kind in UNITS for name in one.columns}
-    for column in log.columns:
-        quantity = column.role if column.role == "time" else QUANTITIES.get(column.unit, "length")
-        reason = why.get(column.name, "its name")
-        names = {column.name, column.header, str(column.number)} - {""}
-        by_source = source is not None and quantity in source.units
-        is_named = split_unit(column.header)[1] or by_source or reason.startswith("as ")  # as the others
-        basis = "named" if is_named else "proved"
-        if names & options.unit.keys() or (
-            quantity == "angle" and "" in options.unit and not split_unit(column.header)[1]
-        ):
-            basis = "given"
-        if column.role == "time" and assumed_time:
-            basis, reason = "assumed", assumed_time[0]
-        elif column.uncertainty:
-            basis, reason = "assumed", column.uncertainty
-        yield f"unit.{_name(log, column)}", Evidence(basis, reason)
-
-
-def _columns(log: JointLog, role: Role) -> list[LogColumn]:
-    return [column for column in log.columns if column.role == role]
-
-
-def _names(log: JointLog, columns: Sequence[LogColumn]) -> tuple[str, ...]:
-    return tuple(_name(log, column) for column in columns)
-
-
-def _name(log: JointLog, column: LogColumn) -> str:
-    """Return what distinguishes a column: its header, or its number where several share that."""
-    twins = [other for other in log.columns if other.header == column.header]
-    return column.header if column.header and len(twins) == 1 else str(column.number)
-
-
-def format_map(log_map: LogMap) -> str:
-    """Return a map as TOML: each entry with its evidence behind it, what is only assumed as a comment."""
-    lines = [MAP_HEADER, *(f"# {note}" for note in log_map.notes), ""]
-    for key in KEYS:
-        value = getattr(log_map, key)
-        if value not in (None, (), False):
-            lines += _lines(key, value, log_map.evidence.get(key))
-    lines += ["", *CORRECTIONS] if log_map.joints and not (log_map.signs or log_map.offsets) else []
-    for table in TABLES:
-        entries = getattr(log_map, table)
-        lines += ["", f"[{table}]"] if entries else []
-        for name, value in entries.items():
-            lines += _lines(quote_toml(name), value, log_map.evidence.get(f"{table}.{name}"))
-    for question in log_map.questions:
-        lines += ["", f"# open: {replace(question, hints=())}"]
-        lines += [f"#   {hint}  # {hint.effect}" for hint in question.hints if str(hint)]
-    return "\n".join(lines) + "\n"
-
-
-def _lines(key: str, value: Any, evidence: Evidence | None) -> Iterator[str]:
-    (text,) = format_toml({"": list(value) if isinstance(value, tuple) else value})
-    text = f"{key}{text}"
-    if evidence is None:
-        yield text
-        return
-    open_entry = evidence.basis == "assumed" and (key in ("period", "joints") or key.startswith('"'))
-    why = evidence.basis if evidence.basis == "given" else f"{evidence.basis}: {evidence.why}"
-    yield f"{'# ' if open_entry else ''}{text}  # {escape_line(why)}"
+    base = otherwise or LogMap()
+    given = {name: value for name, value in values.items() if name in READING and value is not None}
+    given |= {name: _for_all(given[name]) for name in ("unit", "interval") if name in given}
+    if isinstance(given.get("unit", {}), Mapping):
+        given["unit"] = {**base.unit, **given.get("unit", {})}
+    if "joints" in given:
+        given = {"names": (), "signs": (), "offsets": (), "interval": {}, **given}
+    elif isinstance(given.get("interval"), Mapping) and "" not in given["interval"]:
+        given["interval"] = {**base.interval, **given["interval"]}
+    return replace(base, **given)

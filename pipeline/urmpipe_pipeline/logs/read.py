@@ -1,4 +1,7 @@
-"""One log from its files."""
+"""One log from its files.
+
+Any columns of a table over its time: what drives a model that is no arm, such as a voltage.
+"""
 
 from __future__ import annotations
 
@@ -9,27 +12,30 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.errors import LogError
+from urmpipe_models.display import format_count
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, LogError, map_collecting_errors
 from urmpipe_models.files import log_stem
-from urmpipe_pipeline.joint_log import JointLog, SourceFile
-from urmpipe_pipeline.logs.assemble import assemble, recorded
-from urmpipe_pipeline.logs.clocks.time_file import named_file
-from urmpipe_pipeline.logs.columns.columns import columns_of, lacks_columns
-from urmpipe_pipeline.logs.columns.pose import find_pose
-from urmpipe_pipeline.logs.content import Content, read_content
-from urmpipe_pipeline.logs.log_map import shown_entries
-from urmpipe_pipeline.logs.options import READING, LogMap
-from urmpipe_pipeline.logs.plan import Plan, make_plan
-from urmpipe_pipeline.logs.tables.held import MemoryTable, fingerprint_of
-from urmpipe_pipeline.logs.tables.lerobot import episode_file, is_data_set
-from urmpipe_pipeline.logs.tables.opening import Tables, open_tables
-from urmpipe_pipeline.logs.tables.own_tables import roles_of
-from urmpipe_pipeline.logs.tables.reachable import unchanged
-from urmpipe_pipeline.logs.tables.text import fingerprint
-from urmpipe_pipeline.logs.topics import plan_topic
-from urmpipe_pipeline.logs.units.proofs import Recorded
-from urmpipe_pipeline.logs.vocabulary import key, split_unit, vocabulary
+from urmpipe_pipeline.joint_log import JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.logs.clock import even_clock, find_clocks, named_file
+from urmpipe_pipeline.logs.columns import Column, columns_of, find_column, given_units, lacks_columns
+from urmpipe_pipeline.logs.convert import Content, assemble, read_content, recorded
+from urmpipe_pipeline.logs.formats.memory import MemoryTable, fingerprint_of
+from urmpipe_pipeline.logs.formats.opening import Tables, open_tables
+from urmpipe_pipeline.logs.formats.own import roles_of
+from urmpipe_pipeline.logs.formats.parquet import episode_file, is_data_set
+from urmpipe_pipeline.logs.formats.reachable import unchanged
+from urmpipe_pipeline.logs.formats.text import fingerprint
+from urmpipe_pipeline.logs.log_map import READING, LogMap
+from urmpipe_pipeline.logs.map_file import shown_entries
+from urmpipe_pipeline.logs.plan import Plan, make_plan, plan_topic
+from urmpipe_pipeline.logs.pose_columns import find_pose
+from urmpipe_pipeline.logs.proofs import Recorded
+from urmpipe_pipeline.logs.roles import Roles
+from urmpipe_pipeline.logs.vocabulary import Unit, key, split_unit, vocabulary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,3 +171,85 @@ def _name(files: Sequence[Path | MemoryTable]) -> str:
     stems = [file.name if isinstance(file, MemoryTable) else log_stem(file) for file in files]
     shared = os.path.commonprefix(stems)  # noqa: RUF071 (stems, not paths)
     return stems[0] if len(stems) == 1 else shared.strip(" _-.,()[]#") or stems[0]
+
+
+SI = {"angle": "rad", "length": "m", "time": "s"}
+"""What the quantities are in that urmpipe knows."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """Columns of a table over its time.
+
+    Attributes:
+        file: The file.
+        names: Names of the columns without their units.
+        t_ns: Time of each row in integer [ns] from the first row, shape (n,), rising.
+        values: In `units`, shape (n, columns), all finite.
+        units: Of each column: SI where urmpipe knows the unit, else as the file has it; None where it has
+            none.
+        warnings: What a person should know.
+    """
+
+    file: Path
+    names: tuple[str, ...]
+    t_ns: IntArray
+    values: FloatArray
+    units: tuple[str | None, ...]
+    warnings: tuple[LogWarning, ...] = ()
+
+
+def read_series(file: Path, names: Sequence[str], options: LogMap | None = None) -> Series:
+    """Return some columns of a table by name, over its clock.
+
+    Args:
+        file: A CSV file.
+        names: The columns, with or without their units, or their numbers from 1.
+        options: What the user says where the file need not, or cannot, tell.
+
+    Raises:
+        LogError: If a column is not there, or with everything that is wrong with the rows.
+    """
+    with unchanged([file]):
+        return _read(file, names, options or LogMap())
+
+
+def _read(file: Path, names: Sequence[str], options: LogMap) -> Series:
+    """Return some columns of a table as `read_series` does."""
+    tables = open_tables([file], options)
+    columns = columns_of(tables.layouts, tables.titles)
+    chosen = map_collecting_errors(lambda name: find_column(columns, name, file=str(file)), names)
+    units = given_units(columns, options)
+    plan = Plan(tables, find_clocks(tables, columns, options, units), Roles(joints=tuple(chosen)), units)
+    content = read_content(plan, skip_bad=options.skip_bad)
+    values = content.values(plan.roles.joints).copy()
+    _refuse_missing(file, chosen, values)
+    if content.clock is not None:
+        t_ns, noticed = content.clock - content.clock[0], list[LogWarning]()
+    else:
+        t_ns, _, noticed = even_clock(content.rows, options.period)
+    known = [units.get(column.number) or column.unit for column in chosen]
+    for place, unit in enumerate(known):
+        values[:, place] *= unit.factor if unit else 1.0
+    spelled = tuple(_spelled(column, unit) for column, unit in zip(chosen, known, strict=True))
+    warnings = (*content.warnings, *plan.clock.warnings, *noticed)
+    return Series(file, tuple(one.name for one in chosen), t_ns, values, spelled, warnings)
+
+
+def _refuse_missing(file: Path, columns: Sequence[Column], values: FloatArray) -> None:
+    """Raise a `LogError` with each column that has a row without a number."""
+    findings = []
+    for place, column in enumerate(columns):
+        missing = np.flatnonzero(~np.isfinite(values[:, place]))
+        if len(missing):
+            said = f"found {format_count(len(missing), 'row')} without a number, allowed: one in every row"
+            findings.append(Finding(said, str(file), row=int(missing[0]) + 1, column=column.header))
+    if findings:
+        raise LogError(*findings)
+
+
+def _spelled(column: Column, unit: Unit | None) -> str | None:
+    """Return the unit that the values are in now."""
+    if unit is None or unit.quantity not in SI:
+        return column.unit_text
+    return SI[unit.quantity] + ("", "/s", "/s2")[unit.order]

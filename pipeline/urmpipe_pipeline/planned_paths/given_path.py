@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from urmpipe_models.planning.path import PathRows
-from urmpipe_pipeline.logs.options import LogMap
+from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.planned_paths.cube_text import CUBE, read_cube
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.row_checks import checked_rows

@@ -11,15 +11,15 @@ import numpy as np
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.planning.path import PROPER, PathRows
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.logs.clocks.clock_columns import time_columns
-from urmpipe_pipeline.logs.columns.columns import Column, listed
-from urmpipe_pipeline.logs.options import LogMap
-from urmpipe_pipeline.logs.tables.numbers import capped
-from urmpipe_pipeline.logs.tables.row_reader import lines_of_rows
-from urmpipe_pipeline.logs.tables.text import fingerprint
-from urmpipe_pipeline.logs.tables.whole import Whole
-from urmpipe_pipeline.logs.targets.pose_table import PoseTable, read_pose_table
-from urmpipe_pipeline.logs.targets.row_faults import ExtraColumn
+from urmpipe_pipeline.logs.clock_columns import time_columns
+from urmpipe_pipeline.logs.columns import Column, listed
+from urmpipe_pipeline.logs.formats.numbers import capped
+from urmpipe_pipeline.logs.formats.rows import lines_of_rows
+from urmpipe_pipeline.logs.formats.table import Whole
+from urmpipe_pipeline.logs.formats.text import fingerprint
+from urmpipe_pipeline.logs.log_map import LogMap
+from urmpipe_pipeline.logs.target_rows import ExtraColumn
+from urmpipe_pipeline.logs.targets import PoseTable, read_pose_table
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.planned_paths.row_checks import are_radii, are_variants, curve_faults
 

@@ -29,7 +29,7 @@ from urmpipe_models.wraps import (
 )
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import MISSED_SAMPLE, Inference, JointLog, LogWarning, ns_to_seconds
-from urmpipe_pipeline.logs.options import GivenInterval
+from urmpipe_pipeline.logs.log_map import GivenInterval
 from urmpipe_pipeline.repolarization.interval import (
     find_double_turn_joints,
     interval_inferences,

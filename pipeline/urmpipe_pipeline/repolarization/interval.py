@@ -18,7 +18,7 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.measure_units import compatible_units, quantity_to_si
 from urmpipe_models.wraps import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
-from urmpipe_pipeline.logs.options import GivenInterval
+from urmpipe_pipeline.logs.log_map import GivenInterval
 
 Interval = tuple[float, float]
 

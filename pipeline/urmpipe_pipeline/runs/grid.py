@@ -17,7 +17,7 @@ import numpy as np
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, is_inside_gap
-from urmpipe_pipeline.logs.clocks.rounded import Regular, behind_rounded
+from urmpipe_pipeline.logs.row_checks import Regular, behind_rounded
 
 REGULAR = 0.01  # share of the period: no sample of a regular log is further from its place on the grid
 ROUNDING_NS = 1000  # clocks are printed to the microsecond or finer: a time this far outside is at the end

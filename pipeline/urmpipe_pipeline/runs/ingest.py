@@ -22,8 +22,8 @@ from urmpipe_models.errors import Finding, LogError, OptionError, check_choice
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, number_rows
 from urmpipe_pipeline.logs import LogMap, MemoryTable
-from urmpipe_pipeline.logs.clocks.clock import unused_for_poses, unused_period
-from urmpipe_pipeline.logs.options import READING
+from urmpipe_pipeline.logs.clock import unused_for_poses, unused_period
+from urmpipe_pipeline.logs.log_map import READING
 from urmpipe_pipeline.logs.read import read_numbers
 from urmpipe_pipeline.presentation.meshes import VISUAL_MISSING, mesh_warnings
 from urmpipe_pipeline.provenance import Provenance, build_provenance

@@ -22,7 +22,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_bloc
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.logs.poses import FASTEST
+from urmpipe_pipeline.logs.row_checks import FASTEST
 from urmpipe_pipeline.repolarization.interval import fold_rows
 
 JOINT_LIMIT = "joint-limit"

@@ -34,7 +34,7 @@ from urmpipe_models.math3d import (
 from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot, robot_names
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, JointLog, LogWarning
-from urmpipe_pipeline.logs.units.proofs import (
+from urmpipe_pipeline.logs.proofs import (
     MARGIN,
     SAMPLES,
     Fit,

@@ -11,12 +11,12 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.ik.solutions import Targets
 from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
-from urmpipe_pipeline.logs.clocks.clock import even_clock, unused_period
-from urmpipe_pipeline.logs.columns.columns import listed
-from urmpipe_pipeline.logs.options import LogMap
-from urmpipe_pipeline.logs.tables.text import fingerprint
-from urmpipe_pipeline.logs.targets.pose_table import PoseTable, read_pose_table
-from urmpipe_pipeline.logs.targets.target_rotation import NAMED
+from urmpipe_pipeline.logs.clock import even_clock, unused_period
+from urmpipe_pipeline.logs.columns import listed
+from urmpipe_pipeline.logs.formats.text import fingerprint
+from urmpipe_pipeline.logs.log_map import LogMap
+from urmpipe_pipeline.logs.target_rows import NAMED
+from urmpipe_pipeline.logs.targets import PoseTable, read_pose_table
 
 FEWEST = 3
 """An orientation has at least so many columns."""

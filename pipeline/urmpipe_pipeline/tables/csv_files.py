@@ -20,7 +20,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_pipeline.logs.cells.cell import printable
+from urmpipe_pipeline.logs.formats.cells import printable
 from urmpipe_pipeline.logs.vocabulary import key
 from urmpipe_pipeline.outputs import EXPORT_HEADER, TARGET_ROW
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportTable, Poses, Times

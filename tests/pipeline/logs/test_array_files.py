@@ -19,7 +19,7 @@ from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.options import read_options
+from urmpipe_pipeline.logs.log_map import read_options
 
 ROWS = 60
 T = np.arange(ROWS) * 0.01

@@ -15,7 +15,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.columns.blocks import period_of, proved_blocks
+from urmpipe_pipeline.logs.rates import period_of, proved_blocks
 
 Arm = Callable[..., Chain]
 

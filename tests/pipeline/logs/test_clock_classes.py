@@ -18,8 +18,8 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.clocks.steps import kind_of_steps
-from urmpipe_pipeline.logs.log_map import format_map, map_of, read_map
+from urmpipe_pipeline.logs.clock_columns import kind_of_steps
+from urmpipe_pipeline.logs.map_file import format_map, map_of, read_map
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

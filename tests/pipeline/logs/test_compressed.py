@@ -17,7 +17,7 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.tables.limits import RATIO, UNPACKED
+from urmpipe_pipeline.logs.formats.text import RATIO, UNPACKED
 
 COMPRESS: dict[str, Callable[[bytes], bytes]] = {
     "gz": gzip.compress,

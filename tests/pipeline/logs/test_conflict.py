@@ -12,7 +12,7 @@ import pytest
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.tables import conflict
+from urmpipe_pipeline.logs.formats import conflict
 from urmpipe_pipeline.solved_targets.target_file import read_targets
 
 Read = Callable[..., JointLog]

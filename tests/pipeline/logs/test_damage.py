@@ -16,7 +16,7 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.tables import blocks, table
+from urmpipe_pipeline.logs.formats import blocks, table
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

@@ -20,7 +20,7 @@ from urmpipe_models.math3d import (
 )
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.logs.units.interpolated import interpolated_rows
+from urmpipe_pipeline.logs.rotation import interpolated_rows
 
 Read = Callable[..., JointLog]
 

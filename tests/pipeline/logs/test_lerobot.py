@@ -14,7 +14,7 @@ import urmpipe
 from asserting import refusal
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.options import read_options
+from urmpipe_pipeline.logs.log_map import read_options
 
 T = np.arange(60) * 0.02
 Q = (0.5 * np.sin(2 * np.pi * 0.7 * T[:, None] + np.arange(6))).astype(np.float32)

@@ -19,7 +19,7 @@ from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import read_log
-from urmpipe_pipeline.logs.tables.limits import LONGEST_LINE, MOST_COLUMNS
+from urmpipe_pipeline.logs.formats.text import LONGEST_LINE, MOST_COLUMNS
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

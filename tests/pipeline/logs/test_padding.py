@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.tables.padding import end_rows
+from urmpipe_pipeline.logs.formats.padding import end_rows
 
 Read = Callable[..., JointLog]
 

@@ -14,10 +14,10 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import rotation_angle
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.logs.columns.columns import Column
-from urmpipe_pipeline.logs.units.proofs import SAMPLES
-from urmpipe_pipeline.logs.units.rotation import settle_rotation
-from urmpipe_pipeline.logs.units.units import StatedUnit
+from urmpipe_pipeline.logs.columns import Column
+from urmpipe_pipeline.logs.proofs import SAMPLES
+from urmpipe_pipeline.logs.rotation import settle_rotation
+from urmpipe_pipeline.logs.units import StatedUnit
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 Read = Callable[..., JointLog]

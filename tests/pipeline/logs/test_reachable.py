@@ -11,8 +11,8 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.logs import read_log
-from urmpipe_pipeline.logs.tables import reachable
-from urmpipe_pipeline.logs.tables.reachable import unchanged
+from urmpipe_pipeline.logs.formats import reachable
+from urmpipe_pipeline.logs.formats.reachable import unchanged
 
 LOG = b"t,q1\n" + b"".join(b"%.2f,%.4f\n" % (0.01 * k, 0.001 * k) for k in range(30))
 KEPT = "allowed: a file, which can be read more than once"

@@ -10,7 +10,7 @@ import pytest
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.logs.cells.cell import grouped_number
+from urmpipe_pipeline.logs.formats.cells import grouped_number
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

@@ -14,12 +14,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.tables.block_parser import clock_scales, parse_block
-from urmpipe_pipeline.logs.tables.blocks import byte_encoding, row_blocks, squeeze
-from urmpipe_pipeline.logs.tables.numbers import ClockColumn
-from urmpipe_pipeline.logs.tables.row_reader import RowReader
-from urmpipe_pipeline.logs.tables.sniff import sniff
-from urmpipe_pipeline.logs.tables.text import open_text
+from urmpipe_pipeline.logs.formats.numbers import ClockColumn
+from urmpipe_pipeline.logs.formats.rows import (
+    RowReader,
+    byte_encoding,
+    clock_scales,
+    parse_block,
+    row_blocks,
+    squeeze,
+)
+from urmpipe_pipeline.logs.formats.sniff import sniff
+from urmpipe_pipeline.logs.formats.text import open_text
 
 Floats = NDArray[np.float64]
 

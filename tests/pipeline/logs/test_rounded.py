@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_pipeline.logs.clocks.rounded import behind_repeated, behind_rounded
+from urmpipe_pipeline.logs.row_checks import behind_repeated, behind_rounded
 
 MS = 1_000_000
 SECOND = 1_000_000_000

@@ -9,7 +9,7 @@ import pytest
 
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.logs import LogMap
-from urmpipe_pipeline.logs.series import read_series
+from urmpipe_pipeline.logs.read import read_series
 
 TABLE = "t [ms],u (V),phi [deg],w,speed (mm/s)\n5,1,180,1,1000\n15,2,90,2,0\n25,-0.5,45,nan,1\n"
 

@@ -15,13 +15,11 @@ from hypothesis import strategies as st
 from asserting import INCREASE, OTHER_TIME
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import read_log
-from urmpipe_pipeline.logs.clocks.text_times import known_forms, timed
-from urmpipe_pipeline.logs.tables.block_parser import clock_scales, parse_block
-from urmpipe_pipeline.logs.tables.blocks import row_blocks
-from urmpipe_pipeline.logs.tables.numbers import ClockColumn
-from urmpipe_pipeline.logs.tables.row_reader import RowReader
-from urmpipe_pipeline.logs.tables.sniff import sniff
-from urmpipe_pipeline.logs.tables.text import open_text
+from urmpipe_pipeline.logs.clock_text import known_forms, timed
+from urmpipe_pipeline.logs.formats.numbers import ClockColumn
+from urmpipe_pipeline.logs.formats.rows import RowReader, clock_scales, parse_block, row_blocks
+from urmpipe_pipeline.logs.formats.sniff import sniff
+from urmpipe_pipeline.logs.formats.text import open_text
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

@@ -15,8 +15,8 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, format_map, map_of, read_log, read_map
-from urmpipe_pipeline.logs.tables.held import MemoryTable
-from urmpipe_pipeline.logs.tables.smoothness import flat_ways, goes_along_rows
+from urmpipe_pipeline.logs.formats.memory import MemoryTable
+from urmpipe_pipeline.logs.formats.padding import flat_ways, goes_along_rows
 
 Read = Callable[..., JointLog]
 Write = Callable[..., Path]

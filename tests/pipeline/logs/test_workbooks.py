@@ -20,7 +20,7 @@ from urmpipe.main import run
 from urmpipe_models.errors import Hint, LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.options import read_options
+from urmpipe_pipeline.logs.log_map import read_options
 
 K = np.arange(60)
 Q = np.round(0.5 * np.sin(0.04 * K[:, None] + np.arange(6)), 6)  # openpyxl writes 16 digits: 6 are exact

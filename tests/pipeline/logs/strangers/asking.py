@@ -17,7 +17,7 @@ from urmpipe_models.errors import Hint, Message, UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.options import read_options
+from urmpipe_pipeline.logs.log_map import read_options
 
 LONGEST = 3
 """So many questions in a row are answered."""

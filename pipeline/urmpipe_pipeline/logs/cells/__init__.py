@@ -1,1 +1,0 @@
-"""The cells of a text: numbers, texts, and clocks written as text."""

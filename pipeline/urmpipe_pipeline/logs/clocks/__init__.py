@@ -1,1 +1,0 @@
-"""Which columns are the time, in which unit, and the times they hold."""

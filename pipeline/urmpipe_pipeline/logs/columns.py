@@ -1,0 +1,595 @@
+"""The columns of a log: those of all its tables in a row, with names, units and places.
+
+Part of a table by names of columns: a side (commanded, measured, one of several arms) or a topic.
+
+What is asked where columns do not tell what they are: first of all which are the joints.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from itertools import combinations
+
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing
+from urmpipe_pipeline.logs.formats.numbers import capped
+from urmpipe_pipeline.logs.formats.sniff import Layout
+from urmpipe_pipeline.logs.formats.text import refuse_wide
+from urmpipe_pipeline.logs.log_map import LogMap
+from urmpipe_pipeline.logs.vocabulary import (
+    MarkedName,
+    Patterns,
+    Quantity,
+    Unit,
+    key,
+    mark_name,
+    split_unit,
+    vocabulary,
+)
+
+_UNIT_WORDS = re.compile(
+    r"_(rad(ian)?s?|deg(ree)?s?|grad)(_(per_)?s(ec)?2?)?(?=_|$)|_(mm|cm|m|met(er|re)s?|millimet(er|re)s?)$"
+)
+_RANGE = re.compile(r"(?P<first>\d{1,5})-(?P<last>\d{1,5})")
+_NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
+SHOWN_TWINS = 12
+"""Columns of one name that are told by their numbers."""
+
+_NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
+
+
+class Kind(IntEnum):
+    """What the name of a column says about its values, in the order of preference for reading."""
+
+    MEASURED, PLAIN, COMMANDED = range(3)
+
+
+def kind_of(measured: frozenset[str], commanded: frozenset[str]) -> Kind:
+    """Return what the words for measured and commanded in a name say; of both, the latter counts."""
+    return Kind.COMMANDED if commanded else Kind.MEASURED if measured else Kind.PLAIN
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a log.
+
+    Attributes:
+        number: Its number over all tables of the log, from 1.
+        table: Index of its table.
+        index: Its index in that table.
+        header: Its name as the file has it.
+        name: The same without the unit in brackets, told apart from those of other tables.
+        key: The name for comparison with the vocabulary.
+        unit_text: Its unit as the file has it, None if it has none.
+        text: Whether it holds text instead of numbers.
+        matched: Its name without the words of the side that the user chose, where it has them.
+        side: These words, where `side` chose them.
+    """
+
+    number: int
+    table: int
+    index: int
+    header: str
+    name: str
+    key: str
+    unit_text: str | None
+    text: bool
+    matched: str = ""
+    side: frozenset[str] = frozenset()
+
+    @property
+    def unit(self) -> Unit | None:
+        """Its unit, None if the file has none or one that is not known."""
+        return None if self.unit_text is None else vocabulary().unit(self.unit_text)
+
+    @property
+    def counts_rows(self) -> bool:
+        """Whether its name says that it only counts rows or frames."""
+        return any(pattern.search(self.key) for pattern in vocabulary().index)
+
+    @property
+    def is_time(self) -> bool:
+        """Whether it is called like a time, also one of a side: time_cmd."""
+        names = (self.key,) if self.kind == Kind.PLAIN else (self.key, self.bare)
+        return any(pattern.search(name) for pattern in vocabulary().time for name in names)
+
+    @property
+    def marked(self) -> MarkedName:
+        """Its key, and what it says of its values: measured or commanded."""
+        label = self.name if key(self.name) == self.key else split_unit(self.header)[0]
+        return mark_name(self.matched or label)
+
+    @property
+    def words(self) -> frozenset[str]:
+        """The words of its name."""
+        marked = self.marked
+        return marked.measured | marked.commanded | frozenset(marked.key.split("_"))
+
+    @property
+    def words_of_side(self) -> frozenset[str]:
+        """The words of its name that are of a side: measured, commanded, or one of several arms."""
+        marked = self.marked
+        arms = frozenset(word for word in marked.key.split("_") if vocabulary().arms.fullmatch(word))
+        return marked.measured | marked.commanded | arms
+
+    @property
+    def kind(self) -> Kind:
+        """Whether its values were measured or commanded, as far as its name says so."""
+        return kind_of(self.marked.measured, self.marked.commanded)
+
+    @property
+    def plain(self) -> str:
+        """Its key without the words of a unit, qdes as q_des: joint_rad_1 is joint_1."""
+        return _UNIT_WORDS.sub("", self.marked.key)
+
+    @property
+    def bare(self) -> str:
+        """The same without words for measured and commanded: q_des_1 is q_1."""
+        return _UNIT_WORDS.sub("", self.marked.bare)
+
+    @property
+    def quantity(self) -> str:
+        """The letters and digits of it, which columns share that differ by such words alone."""
+        return self.bare.replace("_", "")
+
+    @property
+    def called(self) -> str:
+        """What a reading option calls it: its number where it has no name."""
+        return self.name if self.header and not self.header.isdigit() else str(self.number)
+
+
+def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column, ...]:
+    """Return the columns of some tables.
+
+    Args:
+        layouts: The tables.
+        titles: A title for each, told before the name where two tables have columns of one name,
+            other than a time.
+    """
+    result: list[Column] = []
+    for table, layout in enumerate(layouts):
+        refuse_wide(len(layout.names), layout.file, layout.header_line)
+        earlier = {column.name for column in result}
+        for index, header in enumerate(layout.names):
+            label, unit = split_unit(header) if layout.header else (header, None)
+            if layout.units and index < len(layout.units):
+                unit = layout.units[index].strip("[]() ") or unit
+            time = any(pattern.search(key(label)) for pattern in vocabulary().time)
+            name = f"{titles[table]}/{label}" if label in earlier and not time else label
+            text = _holds_text(layout.cells(index), layout.decimal)
+            number = len(result) + 1
+            name = name or f"column {number}"
+            result.append(Column(number, table, index, header, name, key(label), unit, text))
+    return _named_in_cells(result, layouts)
+
+
+def _named_in_cells(columns: Sequence[Column], layouts: Sequence[Layout]) -> tuple[Column, ...]:
+    """Return the columns, those named in the cells beside them by these names.
+
+    rostopic echo -p writes name0, name1, ... with a joint's name in each row, and position0, position1, ...:
+    position0 becomes position.NAME, whatever the order in which the joints were published.
+    """
+    names: dict[tuple[int, str, str], str] = {}
+    for column in columns:
+        match = _NAME_COLUMN.match(column.key)
+        cells = set(layouts[column.table].cells(column.index)) if match and column.text else set()
+        if match and len(cells) == 1:
+            names[column.table, match["before"], match["n"]] = cells.pop()
+    result = []
+    for column in columns:
+        match = _NUMBERED.match(column.key)
+        name = names.get((column.table, match["before"], match["n"])) if match and not column.text else None
+        if match and name:
+            label = f"{column.name.rstrip('0123456789')}.{name}"
+            column = replace(column, name=label, key=key(label))  # noqa: PLW2901
+        result.append(column)
+    return tuple(result)
+
+
+def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
+    """Return the column that the user means.
+
+    Args:
+        columns: The log's columns.
+        text: Its name, with or without unit, or its number from 1.
+        place: Fields of the finding that says where the name is from, such as its parameter.
+
+    Raises:
+        LogError: If no column or more than one is meant.
+    """
+    matches = columns_called(columns, text)
+    if len(matches) == 1:
+        return matches[0]
+    none, allowed = f"no column {format_value(text)}", listed(columns)
+    if matches:
+        numbers = ", ".join(str(column.number) for column in matches)
+        none, allowed = f"{format_value(text)} as columns {numbers}", "one; give its number"
+    raise LogError(Finding(found=none, allowed=allowed, **place))  # type: ignore[arg-type]
+
+
+def columns_called(columns: Sequence[Column], text: str) -> list[Column]:
+    """Return the columns that a text may mean: by their names, with or without unit, else by number."""
+    exact = [column for column in columns if text in (column.header, column.name)]
+    matches = exact or [column for column in columns if key(text) == column.key != ""]
+    return matches or [column for column in columns if text == str(column.number)]
+
+
+def lacks_columns(columns: Sequence[Column], texts: Sequence[str]) -> bool:
+    """Return whether no column has one of some names, or one of some numbers is beyond the columns."""
+    called = {text: columns_called(columns, text) for name in texts for text in _each(columns, name)}
+    numbers = [text for text in called if text.isdigit()]
+    return not any(called.values()) or (len(numbers) == len(called) and not all(called.values()))
+
+
+def chosen_columns(columns: Sequence[Column], texts: Sequence[str], **place: str) -> tuple[Column, ...]:
+    """Return the columns that the user means by names or numbers, of which 2-7 are six.
+
+    Raises:
+        LogError: If no column or more than one is meant.
+    """
+    return tuple(find_column(columns, one, **place) for text in texts for one in _each(columns, text))
+
+
+def _each(columns: Sequence[Column], text: str) -> Sequence[str]:
+    """Return the numbers that a range means; anything else as it is."""
+    ends = _RANGE.fullmatch(text)
+    if ends is None or columns_called(columns, text):
+        return (text,)
+    first, last = int(ends["first"]), int(ends["last"])
+    return [str(number) for number in range(first, min(last, columns[-1].number + 1) + 1)] or (text,)
+
+
+def columns_named(
+    columns: Sequence[Column], layouts: Sequence[Layout], patterns: Mapping[str, Patterns]
+) -> dict[str, Column]:
+    """Return the columns whose names match patterns, by what the patterns are of.
+
+    Raises:
+        LogError: If several match the same, each of them named.
+    """
+    found = {
+        what: [column for column in columns if any(pattern.search(column.key) for pattern in alike)]
+        for what, alike in patterns.items()
+    }
+    several = [
+        Finding(f"found {listed(some)}, allowed: one of them", layouts[some[0].table].file)
+        for some in found.values()
+        if len(some) > 1
+    ]
+    if several:
+        raise LogError(*several)
+    return {what: some[0] for what, some in found.items() if some}
+
+
+def given_units(columns: Sequence[Column], options: LogMap) -> dict[int, Unit]:
+    """Return the units that the user gave, by the column's number; by 0 that of every angle.
+
+    Raises:
+        OptionError: If a text is no unit, or that of every angle is none of one.
+        LogError: If there is no such column.
+    """
+    given = {}
+    for text, unit_text in options.unit.items():
+        unit = vocabulary().unit(unit_text)
+        quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
+        if unit is None or unit.quantity not in quantities:
+            allowed = ", ".join(name for quantity in quantities for name in vocabulary().spelled(quantity))
+            raise OptionError(Finding(parameter="unit", found=format_value(unit_text), allowed=allowed))
+        if text and options.shared and not columns_called(columns, text):
+            continue
+        given[find_column(columns, text, parameter="unit").number if text else 0] = unit
+    return given
+
+
+def listed(columns: Sequence[Column], most: int = 24) -> str:
+    """Return the names of columns in a row, as the user may give them; the middle of many is left out."""
+    names = [column.header or f"column {column.number}" for column in columns]
+    if len(names) > most:
+        names = [*names[: most - 2], f"... {len(names) - most + 1} more ...", names[-1]]
+    return ", ".join(names)
+
+
+def refuse_twins(
+    used: Sequence[Column], columns: Sequence[Column], layouts: Sequence[Layout], remedy: Hint
+) -> None:
+    """Raise if a column that is to be used shares its name with another one.
+
+    A rate of the same name is no duplicate, nor is an angle "t (rad)" one of the time "t (s)": the unit
+    states what it is.
+
+    Raises:
+        LogError: With a finding for each such column.
+    """
+    named: dict[str, list[Column]] = {}
+    for column in columns:
+        if column.key and not column.text:
+            named.setdefault(column.key, []).append(column)
+    findings = []
+    for column in used:
+        duplicates = [
+            other
+            for other in named.get(column.key, ())
+            if other is not column and _may_be_equal(other, column)
+        ]
+        if duplicates:
+            numbers = sorted(c.number for c in (column, *duplicates))
+            more = f" and {len(numbers) - SHOWN_TWINS} more" if len(numbers) > SHOWN_TWINS else ""
+            message = f"found as columns {', '.join(map(str, numbers[:SHOWN_TWINS]))}{more}, allowed: once"
+            layout = layouts[column.table]
+            place = (layout.file, layout.header_line, None, column.header)
+            findings.append(Finding(message, *place, hints=(remedy,)))
+    if findings:
+        raise LogError(*capped(findings, layouts[used[0].table].file))
+
+
+def _may_be_equal(first: Column, other: Column) -> bool:
+    """Return whether two columns may hold the same quantity, by their units or without them."""
+    if first.unit and other.unit and first.unit.quantity != other.unit.quantity:
+        return False
+    return (first.unit.order if first.unit else 0) == (other.unit.order if other.unit else 0)
+
+
+def _holds_text(cells: Sequence[str], decimal: str) -> bool:
+    """Return whether less than half of the cells with content are numbers."""
+    cells = [cell for cell in cells if not is_missing(cell)]
+    return 2 * count_numbers(cells, decimal) < len(cells)
+
+
+REST = "rest"  # all columns without the other side's word
+
+MAX_LISTED = 8  # words in a message, those of most columns
+
+
+def columns_of_side(columns: Sequence[Column], options: LogMap, file: str) -> list[Column]:
+    """Return the columns of the side that the user chose; all columns without one.
+
+    Args:
+        columns: The columns, without the clock.
+        options: What the user says: `side`, and in a comparison of two sides `pair`.
+        file: The file, for errors.
+
+    Raises:
+        LogError: If no column has the words of the side.
+    """
+    chosen = list(columns)
+    if options.side is not None:
+        chosen = select_side(columns, options.side)
+        if not chosen and not options.shared:
+            raise _no_column(columns, f"with {_quoted(options.side)}", "side", file)
+    if options.pair is not None:
+        side, other = map(_words, options.pair)
+        every = side == {REST}
+        chosen = [
+            column for column in chosen if not other <= column.words and (every or side <= column.words)
+        ]
+        if not chosen:
+            own = "" if every else f"with {_quoted(options.pair[0])} and "
+            raise _no_column(columns, f"{own}without {options.pair[1]}", "sides", file)
+        if not every:
+            chosen = [_without_words(column, side) for column in chosen]
+    return chosen or list(columns)
+
+
+def without_other_side(columns: Sequence[Column], options: LogMap) -> tuple[Column, ...]:
+    """Return the columns without those of another side, unless no time is left."""
+    other = _words(options.pair[1]) if options.pair else frozenset((REST,))
+    own = {column.number for column in select_side(columns, options.side or "")}
+    kept = tuple(
+        column
+        for column in columns
+        if column.number in own and (other == {REST} or not other <= column.words)
+    )
+    return kept if any(column.is_time for column in kept) else tuple(columns)
+
+
+def select_side(columns: Sequence[Column], side: str) -> list[Column]:
+    """Return the columns with all words of a side, and those without a word of another side; else none.
+
+    A column whose name differs from that of a column of the side only by these words is another side's.
+    """
+    if not (words := _words(side)):
+        return list(columns)
+    own = {
+        column: replace(_without_words(column, words), side=words)
+        for column in columns
+        if words <= column.words
+    }
+    quantities = {(column.quantity, column.unit_text) for column in own.values()}
+    names = [column.marked.key.split("_") for column in own]
+    places = {tuple(k for k, word in enumerate(name) if word in words) for name in names} - {()}
+    forms = {_masked(name, place) for name in names for place in places}
+
+    def is_shared(column: Column) -> bool:
+        name = column.marked.key.split("_")
+        return bool(own) and not (
+            column.words_of_side - words
+            or (column.quantity, column.unit_text) in quantities
+            or any(_masked(name, place) in forms for place in places)
+        )
+
+    return [own.get(column, column) for column in columns if column in own or is_shared(column)]
+
+
+def side_of(group: Sequence[Column], groups: Sequence[Sequence[Column]]) -> str | None:
+    """Return the fewest words that select one of several groups of columns, behind those that the user chose.
+
+    None if there are no such words.
+    """
+    first, *rest = (list(dict.fromkeys(re.split(r"[\W_]+", column.marked.key))) for column in group)
+    common = [word for word in first if word in group[0].words and all(word in other for other in rest)]
+    common = [word for word in common if not word.isdigit() and vocabulary().unit(word) is None]
+    everything = [column for some in groups for column in some]
+    for count in (1, 2, 3):
+        for words in combinations(common, count):
+            numbers = [column.number for column in select_side(everything, "_".join(words))]
+            if numbers == [column.number for column in everything if column in group]:
+                return "_".join((*sorted(group[0].side), *words))
+    return None
+
+
+def _masked(name: Sequence[str], places: Sequence[int]) -> tuple[str, ...]:
+    """Return the words of a name with those at some places left blank."""
+    return tuple("" if k in places else word for k, word in enumerate(name))
+
+
+def _words(side: str) -> frozenset[str]:
+    return frozenset(re.findall(r"[^\W_]+", side.lower()))
+
+
+def _quoted(side: str) -> str:
+    return f"the word {side}" if len(_words(side)) == 1 else f"the words {', '.join(sorted(_words(side)))}"
+
+
+def _without_words(column: Column, words: frozenset[str]) -> Column:
+    """Return a column that is matched without some words of its name, of which some remain."""
+    words = words - vocabulary().stems
+    label = column.matched or split_unit(column.header)[0]
+    parts = re.findall(r"[^\W_]+|[\W_]+", label)
+    matched = "".join(part for part in parts if part.lower() not in words).strip(" _-./")
+    return replace(column, matched=matched) if re.search(r"[^\W_]", matched) else column
+
+
+def _no_column(columns: Sequence[Column], wanted: str, parameter: str, file: str) -> LogError:
+    count = Counter(word for column in columns for word in column.words if word.isalpha())
+    shared = [word for word, columns_with in count.most_common(MAX_LISTED) if columns_with > 1]
+    allowed = (
+        f"words in the names of columns, such as {', '.join(shared)}"
+        if shared
+        else "a table with names of columns"
+    )
+    return LogError(
+        Finding(f"found no column {wanted} in its name, allowed: {allowed}", file, parameter=parameter)
+    )
+
+
+def columns_of_topic(columns: Sequence[Column], options: LogMap, file: str) -> list[Column]:
+    """Return the columns whose names begin with the topic that the user chose.
+
+    Args:
+        columns: All columns of a table.
+        options: `topic`, with or without a slash before, and whether it may be that of another log.
+        file: The file, for errors.
+
+    Raises:
+        OptionError: If no name does: with the first part of each name.
+    """
+    topic = options.topic or ""
+    start = topic.strip("/")
+    is_whole = re.compile(rf"/?{re.escape(start)}(?!\w)")
+    chosen = [column for column in columns if is_whole.match(column.header)]
+    chosen = chosen or [column for column in columns if column.header.lstrip("/").startswith(start)]
+    if not chosen and not options.shared:
+        parts = (re.match(r"(/?\w+)[/.]", column.header) for column in columns)
+        known = ", ".join(dict.fromkeys(part[1] for part in parts if part)) or "the beginning of a name"
+        raise OptionError(Finding("", file, parameter="topic", found=format_value(topic), allowed=known))
+    return chosen
+
+
+RECORD = Hint("", effect="record the missing one")
+OTHER_ROBOT = Hint("robot", None, "gives another arm")
+NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
+
+TIMES_OF_ANOTHER = Hint("", effect="times of another log: read that one with --time FILE:COLUMN")
+
+_SIDES = (frozenset(("left", "l")), frozenset(("right", "r")))
+
+OTHER_UNIT = {"rad": "deg", "deg": "rad", "m": "mm", "mm": "m", "cm": "m"}
+"""The unit that a wrong one would most likely be."""
+
+UNKNOWN = "columns that are known to be joints"
+"""What is allowed where nothing tells which columns they are."""
+
+MOST_ANSWERS = 9
+"""Groups of columns that a question offers."""
+
+
+def take(columns: Sequence[Column], does: str = "takes these", *, parameter: str = "joints") -> Hint:
+    """Return the hint that takes columns as the joints, or as the position: by number if a name repeats."""
+    numbers = [column.number for column in columns]
+    if all(column.called == str(column.number) for column in columns) and len(columns) > 1:
+        row = numbers == list(range(numbers[0], numbers[-1] + 1))
+        return Hint(parameter, [f"{numbers[0]}-{numbers[-1]}"] if row else [*map(str, numbers)], does)
+    names = [column.called for column in columns]
+    alone = all("," not in name and names.count(name) == 1 for name in names)
+    return Hint(parameter, names if alone else [*map(str, numbers)], does)
+
+
+def by_arm(columns: Sequence[Column]) -> list[list[Column]]:
+    """Return the columns of several arms apart, whose names differ by a side or by their first word.
+
+    All together if there are no such two.
+    """
+    sides = [[column for column in columns if column.words & words] for words in _SIDES]
+    first: dict[str, list[Column]] = {}
+    for column in columns:
+        first.setdefault(column.key.split("_")[0], []).append(column)
+    for arms in (sides, list(first.values())):
+        names = [frozenset(map(_without_arm, arm)) for arm in arms]
+        if len(arms) > 1 and len(set(names)) == 1 and names[0] and "" not in names[0]:
+            return arms
+    return [list(columns)]
+
+
+def _without_arm(column: Column) -> str:
+    """Return the name of a column without the word that says whose it is: a side, else the first one."""
+    words = column.key.split("_")
+    sides = frozenset().union(*_SIDES)
+    return "_".join([w for w in words if w not in sides] if column.words & sides else words[1:])
+
+
+def which_joints(
+    file: str,
+    found: str,
+    groups: Sequence[Sequence[Column]],
+    allowed: str = UNKNOWN,
+    *hints: Hint,
+    by_side: bool = False,
+) -> LogError:
+    """Return the question which columns are the joints, with the groups that they may be.
+
+    Args:
+        file: The file.
+        found: What was found, and why it does not tell.
+        groups: Columns that may be all joints; the likeliest first.
+        allowed: What is allowed.
+        hints: What else helps.
+        by_side: Whether the words of a side select a group, where there are such words.
+    """
+    different = list(dict.fromkeys(tuple(group) for group in groups if group))
+    sides = {group: side_of(group, different) for group in different} if by_side else {}
+    answers = [
+        Hint("side", side, "takes these") if (side := sides.get(group)) else take(group)
+        for group in different[:MOST_ANSWERS]
+    ]
+    return LogError(
+        Finding(f"found {found}, allowed: {allowed}", file, hints=(*hints, *answers, NAME_JOINTS))
+    )
+
+
+def unit_hints(columns: Sequence[Column], unit: str, does: str = "overrides this") -> tuple[Hint, ...]:
+    """Return the hint that gives all of some columns a unit."""
+    return (Hint("unit", {column.called: unit for column in columns}, does),)
+
+
+def which_unit(columns: Sequence[Column], unit: str, *, every: bool) -> tuple[Hint, ...]:
+    """Return the hints that give some columns the other unit or confirm theirs, as every angle's or each."""
+    given = [
+        {"": one} if every else {column.called: one for column in columns} for one in (OTHER_UNIT[unit], unit)
+    ]
+    return tuple(Hint("unit", one, "specifies it") for one in given)
+
+
+def unit_inference(columns: Sequence[Column], unit: str, evidence: str, *, every: bool) -> Inference:
+    """Return what is said of the unit of some columns, and why; with the other unit that it may be.
+
+    What is given for every angle reaches some columns, and others are given one by one, as the first is.
+    """
+    names, other = tuple(column.name for column in columns), OTHER_UNIT.get(unit)
+    every = every and len(columns) > 1 and unit in ("rad", "deg")
+    hints = (Hint("unit", {"" if every else columns[0].called: other}),) if other else ()
+    return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints)

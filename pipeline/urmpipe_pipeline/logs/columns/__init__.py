@@ -1,1 +1,0 @@
-"""What each column is: joints, rates, tool centre point."""

@@ -1,0 +1,292 @@
+"""Tables in memory: an Arrow table in the place of text, its columns read as those of a CSV file would be."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
+from urmpipe_models.errors import Finding, LogError, format_value
+from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
+from urmpipe_pipeline.logs.formats.cells import (
+    LONGEST_NS,
+    TextCells,
+    is_text,
+    only_count,
+    to_float,
+    to_nanoseconds,
+)
+from urmpipe_pipeline.logs.formats.numbers import (
+    NO_TIME,
+    SHOWN_FINDINGS,
+    UNIT,
+    UNREADABLE,
+    ClockColumn,
+    Numbers,
+    RowFault,
+    arrow_column,
+    is_number,
+)
+from urmpipe_pipeline.logs.formats.rows import MAY_BE_MISSING
+from urmpipe_pipeline.logs.formats.sniff import SAMPLED_LINES, Layout
+from urmpipe_pipeline.logs.formats.text import Segment
+from urmpipe_pipeline.logs.vocabulary import vocabulary
+
+_DIGITS = 38
+"""Digits that a decimal of 128 bits holds."""
+
+_DECIMALS = _DIGITS // 2
+"""Those of them that stand behind the point."""
+
+_SMALL = 0.01
+"""Doubles of this size or more have no more decimals than that: 17 digits are theirs."""
+
+
+_HALF, _ULPS = 0.5, 4
+"""A product of two doubles is less than so many units of its last place off that of the decimals."""
+
+Number = TypeVar("Number", np.float64, np.int64, np.uint64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MemoryTable:
+    """A table in memory.
+
+    Attributes:
+        name: What the log is called, in the place of a file's stem.
+        columns: The columns, an Arrow table; units and roles may stand in the metadata of its fields.
+        named: Whether its columns have names; without them they are known by number, from 1.
+        path: The file that it was read from; None of an object in memory.
+        inferences: What was found out about it.
+        applied: The reading options that its file was read by, such as "episode": they are done with.
+        source: Name of the source that its schema states, which tells units.
+        warnings: Warnings about its file.
+    """
+
+    name: str
+    columns: pa.Table
+    named: bool = True
+    path: Path | None = None
+    inferences: tuple[Inference, ...] = ()
+    applied: tuple[str, ...] = ()
+    source: str = ""
+    warnings: tuple[LogWarning, ...] = ()
+
+    @property
+    def place(self) -> Path:
+        """What messages name: its file, or its name."""
+        return self.path or Path(self.name)
+
+
+def layout_of(held: MemoryTable) -> Layout:
+    """Return a table in memory as one that is written somewhere: its first rows as a CSV file has them.
+
+    Raises:
+        LogError: If it has no row, or no column of numbers.
+    """
+    from urmpipe_pipeline.logs.formats.arrow_columns import plain_table  # its imports take long
+
+    table = plain_table(held.columns, str(held.place))
+    _refuse_empty(held, table)
+    named = held.named and not only_count(table.column_names)
+    names = tuple(table.column_names) if named else tuple(str(k + 1) for k in range(table.num_columns))
+    units = tuple((field.metadata or {}).get(UNIT, b"").decode(errors="replace") for field in table.schema)
+    known = tuple(unit if vocabulary().unit(unit) else "" for unit in units)
+    return Layout(
+        segment=Segment(held.place, "", 0, 0, 1, ""),
+        delimiter=",",
+        decimal=".",
+        names=names,
+        units=known if any(known) else (),
+        header=1 if named else None,
+        first_line=2 if named else 1,
+        offset=0,
+        sample=sampled_cells(table),
+        inferences=held.inferences,
+        held=table,
+        applied=held.applied,
+    )
+
+
+def sampled_cells(table: pa.Table) -> tuple[tuple[str, ...], ...]:
+    """Return the cells of the first rows of a table in memory, as a CSV file has them."""
+    columns = [_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns]
+    return tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
+
+
+def _refuse_empty(held: MemoryTable, table: pa.Table) -> None:
+    """Raise a `LogError` if a table has no row, or none of its columns holds a number."""
+    file = str(held.place)
+    if not held.columns.num_rows or not held.columns.num_columns:
+        raise LogError(Finding("found a table without rows, allowed: one row per sample", file))
+    first = (_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns)
+    if all(is_text(cell, ".") for cells in first for cell in cells if cell):
+        names = ", ".join(map(str, held.columns.column_names[:8]))
+        raise LogError(Finding(f"found no number in {names}, allowed: one column per joint", file))
+
+
+def fingerprint_of(held: MemoryTable) -> SourceFile:
+    """Return the name of a table in memory, and hash and length of its columns as Arrow streams them."""
+    sink = _Hashing()
+    table = held.columns.combine_chunks()
+    with pa.ipc.new_stream(pa.PythonFile(sink, "w"), table.schema.remove_metadata()) as stream:
+        stream.write_table(table.replace_schema_metadata(None))
+    return SourceFile(held.name, sink.digest.hexdigest(), sink.size)
+
+
+class _Hashing:
+    """A file of which only hash and length are kept."""
+
+    closed = False
+
+    def __init__(self) -> None:
+        self.digest, self.size = hashlib.sha256(), 0
+
+    def write(self, data: bytes) -> int:
+        """Take some bytes."""
+        self.digest.update(data)
+        self.size += len(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Keep nothing back."""
+
+
+def read_held(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers:
+    """Return the numbers of some columns of a table in memory; arguments as those of `read_table`."""
+    table = layout.held
+    values = np.empty((table.num_rows, len(columns)))
+    faults: dict[int, list[RowFault]] = {}
+    for j, column in enumerate(columns):
+        values[:, j], wrong = numbers_of(table.column(column))
+        for row, text in wrong.items():
+            said = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
+            faults.setdefault(row, []).append(RowFault(said, (layout.names[column],)))
+    findings = tuple(
+        Finding(fault.said, layout.file, row=layout.file_row(row + 1), column=fault.columns[0])
+        for row in sorted(faults)[:SHOWN_FINDINGS]
+        for fault in faults[row]
+    )
+    rows = None if layout.rows is None else layout.rows + 1
+    found = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
+    if not clock:
+        return Numbers(values, None, *found)
+    texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)
+    times = np.zeros(table.num_rows, dtype=np.int64)
+    for part in () if texts else clock:
+        own = _nanoseconds(table.column(part.column), part.exponent)
+        times = np.where((own <= UNREADABLE) | (times <= UNREADABLE), np.minimum(own, times), times + own)
+    return Numbers(values, times, *found, texts=texts)
+
+
+def numbers_of(column: pa.ChunkedArray) -> tuple[FloatArray, dict[int, str]]:
+    """Return a column in its own unit, shape (n,), NaN where a text is no number, and these texts by row."""
+    if is_number(column.type):
+        double = pa.types.is_float64(column.type)
+        numbers, missing = _values(column if double else column.cast(pa.float64(), safe=False), np.float64)
+        numbers[missing] = np.nan
+        return numbers, {}
+    texts = column.to_pylist()
+    found = [np.nan if text is None else to_float(text, ".") for text in texts]
+    wrong = {row: texts[row] for row, value in enumerate(found) if value is None}
+    return np.array([np.nan if value is None else value for value in found], dtype=np.float64), wrong
+
+
+def _values(column: pa.ChunkedArray, kind: type[Number]) -> tuple[NDArray[Number], BoolArray]:
+    """Return the values of a column of this type, shape (n,), and which of them are missing.
+
+    Its buffers are read as they are: pyarrow's own way imports pandas.
+    """
+    values, missing = np.zeros(len(column), dtype=kind), np.zeros(len(column), dtype=np.bool_)
+    end = 0
+    for chunk in filter(len, column.chunks):
+        start, end = end, end + len(chunk)
+        inside = slice(chunk.offset, chunk.offset + len(chunk))
+        there, numbers = chunk.buffers()
+        values[start:end] = np.frombuffer(numbers, dtype=kind)[inside]
+        if chunk.null_count:
+            bits = np.unpackbits(np.frombuffer(there, dtype=np.uint8), bitorder="little")
+            missing[start:end] = bits[inside] == 0
+    return values, missing
+
+
+def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Return a column as a CSV file has it: of numbers the shortest digits that are theirs."""
+    from urmpipe_pipeline.logs.formats.arrow_columns import number_texts
+
+    return number_texts(column) if is_number(column.type) else column
+
+
+def _text_cells(column: pa.ChunkedArray) -> TextCells:
+    """Return a column of text as cells; empty ones where there is no value."""
+    texts = _texts(column).cast(pa.large_string()).fill_null("").combine_chunks()
+    _, offsets, data = texts.buffers()
+    starts = np.frombuffer(offsets, dtype=np.int64)[texts.offset : texts.offset + len(texts) + 1]
+    signs = np.frombuffer(data, dtype=np.uint8) if data else np.empty(0, dtype=np.uint8)
+    return TextCells(signs, starts)
+
+
+def _nanoseconds(column: pa.ChunkedArray, exponent: int) -> IntArray:
+    """Return a column of a clock in integer [ns], shape (n,), rounded once from the shortest digits.
+
+    NO_TIME where there is no value, UNREADABLE where it is no time that 64 bits hold.
+    """
+    if pa.types.is_integer(column.type):
+        unsigned = pa.types.is_uint64(column.type)
+        whole, missing = (
+            _values(column, np.uint64) if unsigned else _values(column.cast(pa.int64()), np.int64)
+        )
+        far = np.abs(whole.astype(np.float64)) * 10.0**exponent >= LONGEST_NS
+        times = np.where(far | missing, 0, whole).astype(np.int64) * 10**exponent
+        return np.where(missing, NO_TIME, np.where(far, UNREADABLE, times))
+    values, wrong = numbers_of(column)
+    missing = np.isnan(values)
+    missing[list(wrong)] = False
+    readable = np.abs(values) * 10.0**exponent < LONGEST_NS
+    times = np.where(missing, NO_TIME, UNREADABLE)
+    times[readable] = _rounded(_at(column, readable), values[readable], exponent)
+    return times
+
+
+def _rounded(column: pa.ChunkedArray, values: FloatArray, exponent: int) -> IntArray:
+    """Return finite numbers times ten to a power, rounded once, half to even, from their shortest digits.
+
+    A product of doubles is rounded, too: where it may be on the other side of a half, the digits decide.
+    """
+    product = values * 10.0**exponent
+    near = np.rint(product)
+    sure = np.abs(product - near) + _ULPS * np.spacing(np.abs(product)) < _HALF
+    sure &= pa.types.is_float64(column.type)
+    result = near.astype(np.int64)
+    if not sure.all():
+        result[~sure] = _by_digits(_at(column, ~sure), values[~sure], exponent)
+    return result
+
+
+def _by_digits(column: pa.ChunkedArray, values: FloatArray, exponent: int) -> IntArray:
+    """Return numbers times ten to a power, rounded once, half to even, from their shortest digits."""
+    import pyarrow.compute as pc
+
+    small = (np.abs(values) < _SMALL) | (not is_number(column.type))  # any decimals, or spelled in any way
+    result = np.empty(len(values), dtype=np.int64)
+    texts = column.cast(pa.string())
+    few = _at(texts, small).to_pylist()
+    result[small] = [to_nanoseconds(text, ".", exponent) or 0 for text in few]
+    exact = _at(texts, ~small).cast(pa.decimal128(_DIGITS, _DECIMALS))
+    rounded = pc.round(exact, ndigits=exponent, round_mode="half_to_even")
+    fixed = rounded.cast(pa.decimal128(_DIGITS, exponent)).combine_chunks()
+    words = np.frombuffer(fixed.buffers()[1], dtype="<i8").reshape(-1, 2)
+    result[~small] = words[fixed.offset : fixed.offset + len(fixed), 0]  # the low word of two: they fit
+    return result
+
+
+def _at(column: pa.ChunkedArray, rows: BoolArray) -> pa.ChunkedArray:
+    """Return some rows of a column."""
+    return column if rows.all() else column.take(arrow_column(np.flatnonzero(rows)))

@@ -1,1 +1,0 @@
-"""Tables of targets: their header, rows that are wrong, orientations."""

@@ -1,1 +1,0 @@
-"""Units of the columns and forms of orientations: said, or told by the data."""
