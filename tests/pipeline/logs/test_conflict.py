@@ -12,7 +12,7 @@ import pytest
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.formats import conflict
+from urmpipe_pipeline.logs.formats import labels
 from urmpipe_pipeline.solved_targets.target_file import read_targets
 
 Read = Callable[..., JointLog]
@@ -80,7 +80,7 @@ def test_a_marker_that_is_left_alone_is_named(wrong: Wrong, table: str, place: i
 def test_markers_are_found_in_any_encoding_and_across_blocks(
     wrong: Wrong, monkeypatch: pytest.MonkeyPatch, encoding: str, end: str, size: int
 ) -> None:
-    monkeypatch.setattr(conflict, "_READ_BYTES", size)
+    monkeypatch.setattr(labels, "_READ_BYTES", size)
     lines = ["t,q1 [°]", BEGIN, "0,1", MIDDLE, "0,2", END, *(f"{k},{k}" for k in range(1, 30))]
     assert wrong(end.join(lines), encoding=encoding) == said((2, BEGIN), (4, MIDDLE), (6, END))
 
