@@ -88,6 +88,11 @@ class Column:
         return None if self.unit_text is None else vocabulary().unit(self.unit_text)
 
     @property
+    def moves_nothing(self) -> bool:
+        """Whether its unit says that it is neither a joint nor a rate: Nm, N, A, V."""
+        return self.unit is not None and self.unit.quantity == "other"
+
+    @property
     def counts_rows(self) -> bool:
         """Whether its name says that it only counts rows or frames."""
         return any(pattern.search(self.key) for pattern in vocabulary().index)

@@ -84,7 +84,7 @@ def find_families(columns: Iterable[Column], patterns: Patterns, order: int) -> 
     found: dict[tuple[object, ...], Family] = {}
     for column in columns:
         matched = _match(column, patterns, order)
-        if matched is None or (column.unit is not None and column.unit.order != order):
+        if matched is None or column.moves_nothing or (column.unit and column.unit.order != order):
             continue
         number, identity = matched
         shape = tuple(tuple(vocabulary().marked.findall(word)) for word in column.plain.split("_"))
@@ -429,7 +429,7 @@ def _words_around(column: Column, name: str) -> frozenset[str] | None:
 def _role_beside(column: Column, name: str) -> str | None:
     """Return what a column says about a joint: by the words beside the joint's name in its own."""
     around, words = _words_around(column, name), vocabulary().joint_words
-    if around is None or around & vocabulary().other:
+    if around is None or around & vocabulary().other or column.moves_nothing:
         return None
     order = column.unit.order if column.unit else 0
     for role, its_order in (("acceleration", 2), ("rate", 1)):

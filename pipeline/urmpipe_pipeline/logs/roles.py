@@ -111,7 +111,9 @@ def coverage_warnings(
         slides = _SLIDES.fullmatch(column.key)
         if slides and numbers and int(slides["n"]) == max(numbers) + 1:
             return True
-        if column.kind == Kind.COMMANDED or column.words & apart or _DERIVATIVE.match(column.bare):
+        if column.kind == Kind.COMMANDED or column.words & apart or column.moves_nothing:
+            return False
+        if _DERIVATIVE.match(column.bare):
             return False
         return bool(
             ("joint" in shared and "joint" in words_of_name)
@@ -317,7 +319,7 @@ def assign(
             *pose.rotation,
             *(column for group in pose.alternatives for column in group),
         }
-        free = [column for column in numeric if column not in about_tool]
+        free = [column for column in numeric if column not in about_tool and not column.moves_nothing]
         half, placed = bool(pose.position and not pose.rotation), bool(pose.position)
         by_name = partial(find_joints, free, file, robot, half_pose=half, path=placed)
         found = NamedJoints(()) if path else _stated(stated, file, robot) if stated else by_name()
@@ -513,7 +515,7 @@ def _may_be(
     The only one that increases from row to row may be a time, in a table without a clock.
     """
     other_words = vocabulary().other | vocabulary().outside
-    candidates = [column for column in numeric if not column.words & other_words]
+    candidates = [c for c in numeric if not (c.words & other_words or c.moves_nothing)]
     steps = [np.diff(layouts[column.table].numbers(column.index)) for column in candidates]
     clocked = {
         t for t, layout in enumerate(layouts) if len(layout.names) > sum(c.table == t for c in columns)

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 
 from urmpipe_models.math3d import RotationForm
 
-Quantity = Literal["angle", "length", "time", "date", "ratio"]
+Quantity = Literal["angle", "length", "time", "date", "ratio", "other"]  # other: torque, force, current, ...
 Patterns = tuple[re.Pattern[str], ...]
 
 SURELY_SECONDS = 0.05
@@ -235,8 +235,9 @@ def split_unit(name: str) -> tuple[str, str | None]:
             "rate"
         ] else inside["unit"]
     word = re.split(r"[\s_./]+", name.strip())[-1]
-    known = word.lower() in vocabulary().units and word != name.strip()
-    return name.strip(), word if known else None
+    unit = vocabulary().units.get(word.lower()) if word != name.strip() else None
+    is_unit = unit is not None and (unit.quantity != "other" or len(word) > 1)  # J1_A, J1_v
+    return name.strip(), word if is_unit else None
 
 
 @lru_cache(maxsize=1 << 14)

@@ -136,7 +136,7 @@ def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
     said += " --unit J1=deg keeps the values unchanged"
     assert wrong(text) == [f"log.csv, column J1: {said}"]
     assert read(text, unit={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
-    powers = read("t,J1,tau1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
+    powers = read("t,J1,J1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
     assert (powers.joints, powers.units) == (("J1",), {"t": "s", "J1": "rad"})
     numbered = read("a,b,c\n[t0],[q1],[q2]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), unit={"": "deg"})
     assert numbered.joints == ("[q1]", "[q2]")
