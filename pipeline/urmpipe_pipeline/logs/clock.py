@@ -54,10 +54,10 @@ from urmpipe_pipeline.logs.formats.clock_forms import (
     UNPADDED_NS,
     Form,
 )
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import UNREADABLE, ClockColumn, Numbers
 from urmpipe_pipeline.logs.formats.opening import Tables, open_tables
-from urmpipe_pipeline.logs.formats.sniff import Layout, across
-from urmpipe_pipeline.logs.formats.table import Whole, count_rows, with_rows
+from urmpipe_pipeline.logs.formats.sniff import across
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.proofs import peak
 from urmpipe_pipeline.logs.vocabulary import KnownSource, Unit, key, vocabulary
@@ -97,7 +97,7 @@ Found = tuple[str, str, tuple[LogWarning, ...]]
 
 def unit_of(
     time: Column,
-    layout: Layout,
+    layout: LogTable,
     source: KnownSource | None,
     units: Mapping[int, Unit],
     *,
@@ -134,7 +134,7 @@ def unit_of(
     return _by_values(time, layout, lasts=lasts)
 
 
-def _by_values(time: Column, layout: Layout, *, lasts: bool) -> Found:
+def _by_values(time: Column, layout: LogTable, *, lasts: bool) -> Found:
     """Tell the unit by the year that the times give, or else by their steps; durations are steps."""
     times = layout.numbers(time.index)
     start = 0.0 if lasts or not times else times[0]
@@ -160,7 +160,7 @@ def _by_values(time: Column, layout: Layout, *, lasts: bool) -> Found:
 
 
 def unit_by_speed(
-    time: Column, layout: Layout, speed: Callable[[], float | None], *, lasts: bool
+    time: Column, layout: LogTable, speed: Callable[[], float | None], *, lasts: bool
 ) -> Found | None:
     """Return s or ms by how fast the joints would turn; None if the steps show it.
 
@@ -218,7 +218,7 @@ def in_si(
     return values * [unit.factor for unit in each], np.where(slides, 0.0, FULL_TURN)
 
 
-def _refuse_other_epochs(time: Column, layout: Layout, start: float, step: float) -> None:
+def _refuse_other_epochs(time: Column, layout: LogTable, start: float, step: float) -> None:
     """Raise if times of our years count days, or ticks of 100 ns, from another year than 1970."""
     in_days = 0.0 < step * _SECONDS_A_DAY <= 20 * LONGEST
     in_ticks = SHORTEST < step * 1e-7 <= 20 * LONGEST
@@ -239,7 +239,7 @@ def _since_1970(start: float, step: float) -> str | None:
     return None
 
 
-def _short(time: Column, layout: Layout, step: float) -> Found:
+def _short(time: Column, layout: LogTable, step: float) -> Found:
     """Return s for short steps, or for none; raise where they are too short for a log."""
     if 0 < step < _IMPOSSIBLE:
         said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
@@ -254,7 +254,7 @@ def _assumed(time: Column, step: float, unit: str = "s", why: str = "") -> LogWa
     return LogWarning("assumed-unit", said, hints=hints, assumption=taken, role="time")
 
 
-def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:
+def _question(time: Column, layout: LogTable, found: str, units: list[str]) -> LogError:
     """Ask which of some units is meant."""
     hints = (*(Hint("unit", {time.called: unit}, "specifies it") for unit in units), *OTHER_TIME)
     return layout.error(f"found {found}, which may be {' or '.join(units)}", time.header, *hints)
@@ -347,7 +347,7 @@ def find_clocks(
     clocks = []
     for table, layout in enumerate(tables.layouts):
         own = [column for column in columns if column.table == table]
-        chosen = time_columns(own, layout, options, joints, tables.whole[table])
+        chosen = time_columns(own, layout, options, joints)
         clock = clock_of(chosen, layout, tables.known, units, label=options.poses)
         if chosen.passed_over:
             names = ", ".join(column.name for column in chosen.passed_over)
@@ -360,7 +360,7 @@ def find_clocks(
 
 def clock_of(
     chosen: Chosen,
-    layout: Layout,
+    layout: LogTable,
     source: KnownSource | None,
     units: Mapping[int, Unit],
     *,
@@ -425,8 +425,8 @@ def by_joints(clock: Clock, tables: Tables, joints: Sequence[Column], units: Map
         if not joints:
             return None
         main = [joint for joint in joints if joint.table == joints[0].table]
-        times = tables.whole[time.table].values([time.index])[:, 0]
-        q = tables.whole[main[0].table].values([joint.index for joint in main])
+        times = tables.layouts[time.table].values([time.index])[:, 0]
+        q = tables.layouts[main[0].table].values([joint.index for joint in main])
         if len(q) != len(times) or len(q) < 2:
             return None
         q, turns = in_si(q, main, units, tables.known)
@@ -440,7 +440,7 @@ def by_joints(clock: Clock, tables: Tables, joints: Sequence[Column], units: Map
 
 
 def _forms_of_numbers(
-    column: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]
+    column: Column, layout: LogTable, source: KnownSource | None, units: Mapping[int, Unit]
 ) -> tuple[Form, ...]:
     """Return the form of numbers whose unit nobody tells and that are dates, or seconds with nanoseconds.
 
@@ -452,13 +452,13 @@ def _forms_of_numbers(
     if all_are(DENSE_DATE, column, layout):
         return (DENSE_DATE,)
     backwards = min(steps_of(layout.numbers(column.index)), default=0.0) < 0
-    if layout.held is not None or not backwards or not all_are(UNPADDED_NS, column, layout):
+    if layout.arrow is not None or not backwards or not all_are(UNPADDED_NS, column, layout):
         return ()
     times = read_cells(TextCells.of(layout.cells(column.index)), UNPADDED_NS)
     return (UNPADDED_NS,) if (np.diff(times) > 0).all() else ()
 
 
-def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
+def _text_part(column: Column, layout: LogTable, units: Mapping[int, Unit]) -> ClockColumn:
     """Return a column of text for the reader: the forms that it may have."""
     cells, given = layout.cells(column.index), units.get(column.number)
     forms = known_forms(cells)
@@ -475,7 +475,7 @@ def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> Clo
     return ClockColumn(column.index, forms=asked or forms)
 
 
-def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
+def _refuse_ages(time: Column, layout: LogTable, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
     for value in layout.numbers(time.index)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
@@ -590,10 +590,10 @@ def with_time_file(tables: Tables, options: LogMap) -> tuple[Tables, int | None]
     except LogError:
         apart = open_tables([named[0]], LogMap())  # it may be written in another way than the log
     layout, rows = across(apart.layouts[0]), tables.layouts[0].rows
-    if rows is not None and rows[-1] < count_rows(layout):
-        layout = with_rows(layout, rows)
+    if rows is not None and rows[-1] < layout.count_rows():
+        layout = layout.take(rows)
     layouts, titles = (*tables.layouts, layout), (*tables.titles, apart.titles[0])
-    return replace(tables, layouts=layouts, titles=titles, whole=(*tables.whole, Whole(layout))), 1
+    return replace(tables, layouts=layouts, titles=titles), 1
 
 
 def clocks_apart(
@@ -611,19 +611,17 @@ def clocks_apart(
         found = clock_of_file(tables, columns, index, units, label=options.poses)
         return tuple(found if table == index else Clock() for table in (0, 1))
     own = [[column for column in columns if column.table == table] for table in (0, 1)]
-    layout, whole = tables.layouts[index], tables.whole[index]
+    layout = tables.layouts[index]
     numbered = [replace(column, number=column.index + 1) for column in own[index]]
     column = own[index][find_column(numbered, named[1], parameter="time").index]
-    chosen = given_time(column, own[index], layout, whole)
+    chosen = given_time(column, own[index], layout)
     found = clock_of(chosen, layout, None, units, label=options.poses)
     first, *others = found.inferences
     title = f"{named[0].name}:{named[1]}"
     said = replace(first, value=title, kind=TIME_FILE)
     main = 1 - index
     try:
-        beside = time_columns(
-            own[main], tables.layouts[main], replace(options, time=None), None, tables.whole[main]
-        )
+        beside = time_columns(own[main], tables.layouts[main], replace(options, time=None), None)
     except LogError:  # it may have a time or not: the one that is named is used
         beside = Chosen((), "")
     return Clock(beside.columns), replace(found, inferences=(said, *others))
@@ -654,7 +652,7 @@ def clock_of_file(
     Raises:
         LogError: If the other table has a time as well, or the unit of the times cannot be told.
     """
-    layout, title = tables.layouts[index], tables.layouts[index].segment.path.name
+    layout, title = tables.layouts[index], tables.layouts[index].path.name
     for column in columns:
         if column.table != index and _is_time(column.key):
             other = tables.layouts[column.table]

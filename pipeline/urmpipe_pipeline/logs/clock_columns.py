@@ -43,11 +43,9 @@ from urmpipe_pipeline.logs.formats.clock_forms import (
     Form,
     in_digits,
 )
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import UNREADABLE, Numbers
 from urmpipe_pipeline.logs.formats.opening import PATH
-from urmpipe_pipeline.logs.formats.rows import lines_of_rows
-from urmpipe_pipeline.logs.formats.sniff import Layout
-from urmpipe_pipeline.logs.formats.table import Whole
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import have_length_1, trailing_matrix, trailing_quaternion
 from urmpipe_pipeline.logs.unnamed import clock_before_pose
@@ -138,7 +136,7 @@ _HOURS = 10_000
 """Times of day without the zeros before them show their hours from here on: 0:59:59 is 5959."""
 
 
-def dates_in_digits(columns: Sequence[Column], layout: Layout) -> Chosen | None:
+def dates_in_digits(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return the only column of dates with times, or a day and the only time of day that is beside it."""
     numeric = [column for column in columns if not column.text]
     dates = [column for column in numeric if all_are(DENSE_DATE, column, layout)]
@@ -152,7 +150,7 @@ def dates_in_digits(columns: Sequence[Column], layout: Layout) -> Chosen | None:
     return None
 
 
-def all_are(form: Form, column: Column, layout: Layout) -> bool:
+def all_are(form: Form, column: Column, layout: LogTable) -> bool:
     """Return whether all sampled cells of a column, and one at least, are times of a form."""
     if form in IN_DIGITS and not column.text:
         written = (in_digits(cell) for cell in layout.number_texts(column.index))
@@ -164,7 +162,7 @@ def all_are(form: Form, column: Column, layout: Layout) -> bool:
     return bool((read_cells(TextCells.of([first, *written]), form) > UNREADABLE).all())
 
 
-def _tells_hours(column: Column, layout: Layout) -> bool:
+def _tells_hours(column: Column, layout: LogTable) -> bool:
     """Return whether a column holds times of day with their hours, and not only seconds."""
     if not all_are(DENSE_TIME, column, layout):
         return False
@@ -186,7 +184,7 @@ SEAM = 10.0
 """Where the seconds step, the time goes on by less than this many steps within a second."""
 
 
-def named_halves(columns: Sequence[Column], layout: Layout, whole: Whole) -> Iterator[Chosen]:
+def named_halves(columns: Sequence[Column], layout: LogTable) -> Iterator[Chosen]:
     """Yield columns of whole seconds, each with that of what goes on from them, by their names."""
     words, numeric = vocabulary(), [column for column in columns if not column.text]
     for first in (column for column in numeric if words.time_seconds.search(column.key)):
@@ -194,12 +192,12 @@ def named_halves(columns: Sequence[Column], layout: Layout, whole: Whole) -> Ite
         for unit, pattern in words.time_rests.items():
             for second in numeric:
                 same = pattern.search(second.key) and pattern.sub("", second.key) == stem
-                if same and second is not first and _are_halves(first, second, layout, whole, unit):
+                if same and second is not first and _are_halves(first, second, layout, unit):
                     said = "seconds and decimals of them" if unit == "s" else f"seconds and {unit}"
                     yield Chosen((first, second), f"their names: {said} apart", EXPONENTS[unit])
 
 
-def halves_beside(first: Column, columns: Sequence[Column], layout: Layout, whole: Whole) -> Chosen | None:
+def halves_beside(first: Column, columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return a column of whole seconds with what goes on from them beside it, by their numbers; or None.
 
     Where a whole log lies within a second only a Unix time is taken for seconds, and only whole numbers for
@@ -212,7 +210,7 @@ def halves_beside(first: Column, columns: Sequence[Column], layout: Layout, whol
         if not numbers or min(numbers) < 0 or max(numbers) >= SECOND or min(numbers) == max(numbers):
             continue
         named = any(pattern.search(second.key) for pattern in vocabulary().time_rests.values())
-        rest = rest_of(whole.values([first.index, second.index]), short=layout.header is None or named)
+        rest = rest_of(layout.values([first.index, second.index]), short=layout.header is None or named)
         if rest is not None:
             return Chosen((first, second), "whole seconds, and what goes on from them beside it", rest)
     return None
@@ -256,7 +254,7 @@ def _goes_on(seconds: FloatArray, turns: FloatArray, steps: FloatArray, *, short
     return bool((over >= 0).all()) and float(np.mean(over <= longest)) > 0.5
 
 
-def _are_halves(first: Column, second: Column, layout: Layout, whole: Whole, unit: str) -> bool:
+def _are_halves(first: Column, second: Column, layout: LogTable, unit: str) -> bool:
     """Return whether columns with the names of halves hold them: the second stays below a second."""
     seconds, rest = layout.numbers(first.index), layout.numbers(second.index)
     below = SECOND / 10 ** EXPONENTS[unit]
@@ -264,7 +262,7 @@ def _are_halves(first: Column, second: Column, layout: Layout, whole: Whole, uni
         return False
     if not seconds or seconds[0] != seconds[-1]:
         return True
-    return bool(np.nanmax(whole.values([second.index]), initial=0.0) < below)
+    return bool(np.nanmax(layout.values([second.index]), initial=0.0) < below)
 
 
 def _repeats_whole(numbers: Sequence[float]) -> bool:
@@ -278,7 +276,7 @@ SUMMED = "clock-summed"
 """The kind of the warning about a clock that is the sum of durations."""
 
 
-def durations(columns: Sequence[Column], layout: Layout) -> Chosen | None:
+def durations(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return the first column that is named like a duration and holds one a row; None without one."""
     for column in columns:
         if not column.text and is_duration(column, layout):
@@ -286,7 +284,7 @@ def durations(columns: Sequence[Column], layout: Layout) -> Chosen | None:
     return None
 
 
-def is_duration(column: Column, layout: Layout) -> bool:
+def is_duration(column: Column, layout: LogTable) -> bool:
     """Return whether a column is named like a duration, and its numbers neither increase nor fall below 0."""
     numbers = layout.numbers(column.index)
     named = any(pattern.search(column.key) for pattern in vocabulary().durations)
@@ -336,7 +334,7 @@ PAUSE = 20.0
 
 
 def without_header(
-    columns: Sequence[Column], layout: Layout, options: LogMap, joints: int | None, whole: Whole
+    columns: Sequence[Column], layout: LogTable, options: LogMap, joints: int | None
 ) -> Chosen | None:
     """Return the clock of a table without a header; None if it has none.
 
@@ -349,7 +347,6 @@ def without_header(
         layout: How it is written.
         options: What the user says: the columns named as joints are no time.
         joints: How many joints the robot has, if there is one.
-        whole: All its numbers.
 
     Raises:
         LogError: If a column that increases may be the time, a counter or a joint.
@@ -360,24 +357,24 @@ def without_header(
     ]  # others are an index, or behind a trailing sign
     if path and (first := _before_pose(columns, layout, options)) is not None:
         return first
-    if not options.joints and (poses := clock_before_pose(columns, whole)) is not None:
+    if not options.joints and (poses := clock_before_pose(columns, layout)) is not None:
         return Chosen(*poses)
     if len(columns) in (1, joints):
         return None
     named = set(chosen_columns(columns, options.joints, parameter="joints"))
-    free = [one for one in columns if one not in named and one.index in whole.columns]
-    found = dates_in_digits(free, layout) or _epoch(free, layout, whole)
+    free = [one for one in columns if one not in named and one.index in layout.numeric_columns]
+    found = dates_in_digits(free, layout) or _epoch(free, layout)
     if found is not None:
         return found
     pose = _trailing_pose(free, layout)
     free = [one for one in free if one not in pose]
     for column in free:
-        if (both := halves_beside(column, free, layout, whole)) is not None:
+        if (both := halves_beside(column, free, layout)) is not None:
             return both
-    return _increasing(free, layout, joints, whole, path=path, sure=bool(named))
+    return _increasing(free, layout, joints, path=path, sure=bool(named))
 
 
-def _before_pose(columns: Sequence[Column], layout: Layout, options: LogMap) -> Chosen | None:
+def _before_pose(columns: Sequence[Column], layout: LogTable, options: LogMap) -> Chosen | None:
     """Return what stands before x, y, z and the orientation told, if the number of columns says so."""
     pose = 3 + (column_count(options.rotation) if options.rotation else 0)
     if len(columns) == pose:
@@ -389,7 +386,7 @@ def _before_pose(columns: Sequence[Column], layout: Layout, options: LogMap) -> 
     return None
 
 
-def _trailing_pose(columns: Sequence[Column], layout: Layout) -> tuple[Column, ...]:
+def _trailing_pose(columns: Sequence[Column], layout: LogTable) -> tuple[Column, ...]:
     """Return the columns at the end that are a transform, or x, y, z and a quaternion, in many rows."""
     layouts = [layout] * (max((column.table for column in columns), default=0) + 1)
     found = trailing_matrix(columns, layouts, some=True)
@@ -401,12 +398,12 @@ def _trailing_pose(columns: Sequence[Column], layout: Layout) -> tuple[Column, .
     return (*found.position, *found.rotation) if found else ()
 
 
-def _epoch(columns: Sequence[Column], layout: Layout, whole: Whole) -> Chosen | None:
+def _epoch(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return the first column of Unix times of our years, with its nanoseconds if these stand beside it."""
     for column in columns:
         numbers = layout.numbers(column.index)
         if len(numbers) == len(layout.cells(column.index)) and _is_epoch(numbers):
-            both = halves_beside(column, columns, layout, whole)
+            both = halves_beside(column, columns, layout)
             return both or Chosen((column,), "as Unix times its numbers are of our years")
     return None
 
@@ -460,7 +457,7 @@ class _Increasing:
 
 
 def _increasing(
-    columns: Sequence[Column], layout: Layout, joints: int | None, whole: Whole, *, path: bool, sure: bool
+    columns: Sequence[Column], layout: LogTable, joints: int | None, *, path: bool, sure: bool
 ) -> Chosen | None:
     """Return the column that alone increases through the whole file; None if none does.
 
@@ -468,33 +465,32 @@ def _increasing(
         columns: Those that may be the time.
         layout: How the table is written.
         joints: How many joints the robot has, if there is one.
-        whole: All its numbers.
         path: The table is a path, which has no joints.
         sure: The joints are named, so that no other column is taken for one.
     """
     sampled = [layout.numbers(column.index) for column in columns]
     may_be = [column for column, numbers in zip(columns, sampled, strict=True) if increases(numbers)]
-    indices = [whole.columns[place] for place in np.flatnonzero(whole.increasing)] if may_be else []
-    rising = [_Increasing(column, _values(whole, column)) for column in may_be if column.index in indices]
+    indices = [layout.numeric_columns[place] for place in np.flatnonzero(layout.increasing)] if may_be else []
+    rising = [_Increasing(column, _values(layout, column)) for column in may_be if column.index in indices]
     one_more = joints is not None and len(layout.names) == joints + 1
     if rising and len(rising[0].values) < FEW_ROWS:
         rising = [one for one in rising if one.first]
         return _of_few_rows(rising, columns, layout, one_more=one_more, path=path, sure=sure)
     clocks = rising if one_more else [one for one in rising if one.may_be_clock]
     if not clocks:
-        _refuse_halting(columns, layout, whole, path=path, sure=sure)
+        _refuse_halting(columns, layout, path=path, sure=sure)
         return None
-    if (found := _alone(clocks, rising, whole)) is not None:
+    if (found := _alone(clocks, rising, layout)) is not None:
         return found
     if not sure:
-        steps = np.diff(whole.values([column.index for column in columns]), axis=0)
+        steps = np.diff(layout.values([column.index for column in columns]), axis=0)
         stairs = [column for column, own in zip(columns, steps.T, strict=True) if _is_stair(own)]
         asked = sorted([*(one.column for one in clocks), *stairs], key=lambda column: column.number)
         raise _question(asked, layout, path=path)
     return None
 
 
-def _alone(clocks: Sequence[_Increasing], rising: Sequence[_Increasing], whole: Whole) -> Chosen | None:
+def _alone(clocks: Sequence[_Increasing], rising: Sequence[_Increasing], layout: LogTable) -> Chosen | None:
     """Return the only column that may be a clock by its steps, if it is one; None if that cannot be told.
 
     It jitters; or it is the first one and runs evenly while others move, and none runs as evenly downwards.
@@ -503,7 +499,7 @@ def _alone(clocks: Sequence[_Increasing], rising: Sequence[_Increasing], whole: 
     Args:
         clocks: Those that may be a clock.
         rising: All that increase.
-        whole: All numbers of the table.
+        layout: The table.
     """
     one = clocks[0]
     if len(clocks) > 1:
@@ -511,7 +507,7 @@ def _alone(clocks: Sequence[_Increasing], rising: Sequence[_Increasing], whole: 
     if one.steps == "rough" and not one.hardly_moves:
         alone = "alone increases" if len(rising) == 1 else "alone increases in steps that jitter"
         return Chosen((one.column,), f"it {alone} through the whole file")
-    if one.first and one.steps == "even" and not one.counts and _others_move(one, whole):
+    if one.first and one.steps == "even" and not one.counts and _others_move(one, layout):
         return Chosen((one.column,), "the first column alone increases in even steps")
     return None
 
@@ -519,7 +515,7 @@ def _alone(clocks: Sequence[_Increasing], rising: Sequence[_Increasing], whole: 
 def _of_few_rows(
     rising: Sequence[_Increasing],
     columns: Sequence[Column],
-    layout: Layout,
+    layout: LogTable,
     *,
     one_more: bool,
     path: bool,
@@ -548,25 +544,25 @@ def _keeps_near_a_line(times: FloatArray) -> bool:
     return bool((np.abs(times - times[0] - np.arange(len(times)) * step) <= step).all())
 
 
-def _others_move(first: _Increasing, whole: Whole) -> bool:
+def _others_move(first: _Increasing, layout: LogTable) -> bool:
     """Return whether another column changes, and none falls evenly.
 
     A column that changes alone, or while others fall evenly, may be a joint.
     """
-    others = [column for column in whole.columns if column != first.column.index]
-    values = whole.values(others)
+    others = [column for column in layout.numeric_columns if column != first.column.index]
+    values = layout.values(others)
     falling = (np.diff(values, axis=0) < 0).all(axis=0)
     if any(kind_of_steps(-values[:, place]) == "even" for place in np.flatnonzero(falling)):
         return False
     return bool((np.diff(values, axis=0) != 0).any())
 
 
-def _values(whole: Whole, column: Column) -> FloatArray:
+def _values(layout: LogTable, column: Column) -> FloatArray:
     """Return all numbers of a column, shape (n,)."""
-    return whole.values([column.index])[:, 0]
+    return layout.values([column.index])[:, 0]
 
 
-def _question(rising: Sequence[Column], layout: Layout, *, path: bool) -> LogError:
+def _question(rising: Sequence[Column], layout: LogTable, *, path: bool) -> LogError:
     """Ask which of the columns that increase is the time."""
     what = "the time or a counter" if path else "the time, a counter or a joint"
     if [column.index for column in rising] == [0]:
@@ -587,9 +583,7 @@ def _which(columns: Sequence[Column], *, path: bool) -> list[Hint]:
     return hints if path else [*hints, Hint("joints", None, "names the joint columns")]
 
 
-def _refuse_halting(
-    columns: Sequence[Column], layout: Layout, whole: Whole, *, path: bool, sure: bool
-) -> None:
+def _refuse_halting(columns: Sequence[Column], layout: LogTable, *, path: bool, sure: bool) -> None:
     """Raise if a column would be a clock but for a few rows, or for the rests between its steps.
 
     Of the former only the first column is looked at, and the first odd row is named.
@@ -604,20 +598,20 @@ def _refuse_halting(
     ]
     if not may_be:
         return
-    steps = np.diff(whole.values([column.index for column in may_be]), axis=0)
+    steps = np.diff(layout.values([column.index for column in may_be]), axis=0)
     odd = ~(steps > 0)
     few = np.count_nonzero(odd, axis=0) <= max(2, DAMAGED * len(steps))
     nearly = [column for column, is_near in zip(may_be, few, strict=True) if is_near and len(steps) > 8]
     if [column.index for column in nearly] == [0]:
-        raise _odd_row(int(np.argmax(odd[:, 0])), nearly[0], layout, whole, path=path)
+        raise _odd_row(int(np.argmax(odd[:, 0])), nearly[0], layout, path=path)
     stairs = [column for column, own in zip(may_be, steps.T, strict=True) if _is_stair(own)]
     if len(stairs) == 1:
         raise _question_of_stairs(stairs[0], layout, path=path)
 
 
-def _odd_row(step: int, column: Column, layout: Layout, whole: Whole, *, path: bool) -> LogError:
+def _odd_row(step: int, column: Column, layout: LogTable, *, path: bool) -> LogError:
     """Name the row that keeps a first column from increasing: it ends the first odd step, or begins it."""
-    values = _values(whole, column)
+    values = _values(layout, column)
     steps = np.diff(values)
     usual = float(np.nanmedian(steps))
     leaps = step > 0 and steps[step - 1] > 2 * usual
@@ -628,7 +622,7 @@ def _odd_row(step: int, column: Column, layout: Layout, whole: Whole, *, path: b
     what = "the time or a counter" if path else "the time, a counter or a joint"
     message = f"found {found} in a first column that otherwise increases, which may be {what}"
     at = layout.file_row(row + 1)
-    line = lines_of_rows(layout, [at]).get(at)
+    line = layout.lines_of([at]).get(at)
     return LogError(Finding(message, layout.file, line, at, hints=tuple(_which([column], path=path))))
 
 
@@ -641,7 +635,7 @@ def _is_stair(steps: FloatArray) -> bool:
     return len(changes) >= STAIR and int(rests.max()) * STAIR <= max(len(steps), 1)
 
 
-def _question_of_stairs(column: Column, layout: Layout, *, path: bool) -> LogError:
+def _question_of_stairs(column: Column, layout: LogTable, *, path: bool) -> LogError:
     what = "the time" if path else "the time or a joint"
     found = f"found column {column.number}, which rests and increases and never falls: it may be {what}"
     return layout.error(found, None, *_which([column], path=path))
@@ -653,10 +647,9 @@ GIVEN = "given as an option"
 
 def time_columns(
     columns: Sequence[Column],
-    layout: Layout,
+    layout: LogTable,
     options: LogMap,
     joints: int | None,
-    whole: Whole,
 ) -> Chosen:
     """Return the columns that hold the time, and why; none if there is no time.
 
@@ -665,7 +658,6 @@ def time_columns(
         layout: How it is written.
         options: What the user says.
         joints: How many joints the robot has, if there is one.
-        whole: All numbers of the table.
 
     Raises:
         LogError: If the column that the user names is not there, or a column of a table without a header
@@ -674,14 +666,14 @@ def time_columns(
     if options.time is not None:
         if options.time.lower() == "none":
             return Chosen((), GIVEN)
-        return given_time(find_column(columns, options.time, parameter="time"), columns, layout, whole)
+        return given_time(find_column(columns, options.time, parameter="time"), columns, layout)
     if layout.header is None:
-        found = _texts(columns, layout) or without_header(columns, layout, options, joints, whole)
+        found = _texts(columns, layout) or without_header(columns, layout, options, joints)
         return found or Chosen((), "there is no header")
     return (
         _day_beside_time(columns, layout)
-        or _by_name(columns, layout, whole)
-        or _by_content(columns, layout, whole)
+        or _by_name(columns, layout)
+        or _by_content(columns, layout)
         or _texts(columns, layout)
         or dates_in_digits(columns, layout)
         or durations(columns, layout)
@@ -689,21 +681,21 @@ def time_columns(
     )
 
 
-def given_time(column: Column, columns: Sequence[Column], layout: Layout, whole: Whole) -> Chosen:
+def given_time(column: Column, columns: Sequence[Column], layout: LogTable) -> Chosen:
     """Return the clock of a column that the user names, with the other half of it if it is one."""
-    numeric = [one for one in columns if one.index in whole.columns]
-    pairs = [*named_halves(columns, layout, whole), dates_in_digits(numeric, layout)]
+    numeric = [one for one in columns if one.index in layout.numeric_columns]
+    pairs = [*named_halves(columns, layout), dates_in_digits(numeric, layout)]
     near = [one for one in numeric if abs(one.index - column.index) <= 1]
-    pairs += [halves_beside(one, near, layout, whole) for one in near]
+    pairs += [halves_beside(one, near, layout) for one in near]
     both = next((one for one in pairs if one and column in one.columns), None)
     if both is not None:
         return both._replace(why=GIVEN)
     return Chosen(_with_other_half(column, columns, layout), GIVEN, lasts=is_duration(column, layout))
 
 
-def _by_name(columns: Sequence[Column], layout: Layout, whole: Whole) -> Chosen | None:
+def _by_name(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return a column of numbers that is named like a time, or whole seconds and what goes on from them."""
-    halves = list(named_halves(columns, layout, whole))
+    halves = list(named_halves(columns, layout))
     numeric = [column for column in columns if not column.text]
     named = ([c for c in numeric if pattern.search(c.key)] for pattern in vocabulary().time)
     sides = ([c for c in numeric if c.kind != Kind.PLAIN and p.search(c.bare)] for p in vocabulary().time)
@@ -715,11 +707,11 @@ def _by_name(columns: Sequence[Column], layout: Layout, whole: Whole) -> Chosen 
     side = min(kinds, default=Kind.MEASURED)
     time = min(times, key=lambda c: (c.kind != side, c.kind != Kind.PLAIN))
     both = next((pair for pair in halves if time in pair.columns), None)
-    both = both or halves_beside(time, numeric, layout, whole) or Chosen((time,), "its name")
+    both = both or halves_beside(time, numeric, layout) or Chosen((time,), "its name")
     return both._replace(passed_over=tuple(c for c in times if c.kind != time.kind and c not in both.columns))
 
 
-def _day_beside_time(columns: Sequence[Column], layout: Layout) -> Chosen | None:
+def _day_beside_time(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return a day and a time of day in digits, of which one is named like a time."""
     found = dates_in_digits(columns, layout)
     words = (*vocabulary().time, *vocabulary().dates)
@@ -727,7 +719,7 @@ def _day_beside_time(columns: Sequence[Column], layout: Layout) -> Chosen | None
     return found if found and named and len(found.columns) == 2 else None
 
 
-def _texts(columns: Sequence[Column], layout: Layout) -> Chosen | None:
+def _texts(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return a clock of text: by its name, or as the only column of its kind; a date with its time of day."""
     texts = [column for column in columns if column.text]
     words = (*vocabulary().time, *vocabulary().dates)
@@ -742,7 +734,7 @@ def _texts(columns: Sequence[Column], layout: Layout) -> Chosen | None:
     return Chosen((named[0],), "its name") if named else None
 
 
-def _with_other_half(column: Column, columns: Sequence[Column], layout: Layout) -> tuple[Column, ...]:
+def _with_other_half(column: Column, columns: Sequence[Column], layout: LogTable) -> tuple[Column, ...]:
     """Return a column; a date beside the only column of times of day, and the reverse, with this one."""
 
     def half(column: Column) -> str | None:
@@ -757,20 +749,20 @@ def _with_other_half(column: Column, columns: Sequence[Column], layout: Layout) 
     return (column, others[0]) if other == TIME_OF_DAY else (others[0], column)
 
 
-def _by_content(columns: Sequence[Column], layout: Layout, whole: Whole) -> Chosen | None:
+def _by_content(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
     """Return a column with a unit of time, or an unnamed first one that runs like a clock."""
     timed = [c for c in columns if not c.text and c.unit and (c.unit.quantity, c.unit.order) == ("time", 0)]
     if len(timed) == 1:
         lasts = is_duration(timed[0], layout)
         alone = Chosen((timed[0],), f"its unit, {timed[0].unit_text}", lasts=lasts)
-        return halves_beside(timed[0], columns, layout, whole) or alone
+        return halves_beside(timed[0], columns, layout) or alone
     first = columns[0]
     if first.key == "" and not first.text and _runs_like_a_clock(first, layout):
         return Chosen((first,), "the first column has no name and always increases")
     return None
 
 
-def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Column]) -> Column | None:
+def like_a_time(columns: Sequence[Column], layout: LogTable, used: Collection[Column]) -> Column | None:
     """Return the first column without a role that runs like a clock, whatever its name; None without one.
 
     It is told, not taken: a way or a counter of pulses increases from row to row as well. One with another
@@ -781,5 +773,5 @@ def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Colu
     return next((one for one in may_be if _runs_like_a_clock(one, layout)), None)
 
 
-def _runs_like_a_clock(column: Column, layout: Layout) -> bool:
+def _runs_like_a_clock(column: Column, layout: LogTable) -> bool:
     return not count_up(layout.cells(column.index)) and increases(layout.numbers(column.index))

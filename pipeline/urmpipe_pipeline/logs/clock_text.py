@@ -28,8 +28,8 @@ from urmpipe_pipeline.logs.formats.clock_forms import (
     Parts,
     in_digits,
 )
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import NO_TIME, REPORTED, UNREADABLE, ClockColumn, Numbers
-from urmpipe_pipeline.logs.formats.sniff import Layout
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Powers of ten from a unit to [ns]."""
@@ -74,7 +74,7 @@ ZONED = "form of the time with a zone"
 """The kind of the inference about dates that say their time zone."""
 
 
-def timed(layout: Layout, parts: Sequence[ClockColumn], numbers: Numbers) -> Numbers:
+def timed(layout: LogTable, parts: Sequence[ClockColumn], numbers: Numbers) -> Numbers:
     """Return the numbers of a table with the times that the texts of its clock mean; others as they are.
 
     Raises:
@@ -226,7 +226,7 @@ def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str
     return tuple(said)
 
 
-def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[Reading]) -> LogError:
+def _question(layout: LogTable, parts: Sequence[ClockColumn], readings: Sequence[Reading]) -> LogError:
     """Ask which of several readings is meant, for the first column in which they differ."""
     choices = list(zip(*(reading.forms for reading in readings), strict=True))
     place = next(k for k, forms in enumerate(choices) if len(set(forms)) > 1)

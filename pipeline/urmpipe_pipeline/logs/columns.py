@@ -17,8 +17,8 @@ from itertools import combinations
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
-from urmpipe_pipeline.logs.formats.sniff import Layout
 from urmpipe_pipeline.logs.formats.text import refuse_wide
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import (
@@ -148,7 +148,7 @@ class Column:
         return self.name if self.header and not self.header.isdigit() else str(self.number)
 
 
-def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column, ...]:
+def columns_of(layouts: Sequence[LogTable], titles: Sequence[str]) -> tuple[Column, ...]:
     """Return the columns of some tables.
 
     Args:
@@ -173,7 +173,7 @@ def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column
     return _named_in_cells(result, layouts)
 
 
-def _named_in_cells(columns: Sequence[Column], layouts: Sequence[Layout]) -> tuple[Column, ...]:
+def _named_in_cells(columns: Sequence[Column], layouts: Sequence[LogTable]) -> tuple[Column, ...]:
     """Return the columns, those named in the cells beside them by these names.
 
     rostopic echo -p writes name0, name1, ... with a joint's name in each row, and position0, position1, ...:
@@ -250,7 +250,7 @@ def _each(columns: Sequence[Column], text: str) -> Sequence[str]:
 
 
 def columns_named(
-    columns: Sequence[Column], layouts: Sequence[Layout], patterns: Mapping[str, Patterns]
+    columns: Sequence[Column], layouts: Sequence[LogTable], patterns: Mapping[str, Patterns]
 ) -> dict[str, Column]:
     """Return the columns whose names match patterns, by what the patterns are of.
 
@@ -300,7 +300,7 @@ def listed(columns: Sequence[Column], most: int = 24) -> str:
 
 
 def refuse_twins(
-    used: Sequence[Column], columns: Sequence[Column], layouts: Sequence[Layout], remedy: Hint
+    used: Sequence[Column], columns: Sequence[Column], layouts: Sequence[LogTable], remedy: Hint
 ) -> None:
     """Raise if a column that is to be used shares its name with another one.
 

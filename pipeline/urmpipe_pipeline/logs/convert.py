@@ -35,7 +35,7 @@ from urmpipe_pipeline.logs.formats.cells import significant_digits
 from urmpipe_pipeline.logs.formats.numbers import Numbers
 from urmpipe_pipeline.logs.formats.opening import PATH, TABLE
 from urmpipe_pipeline.logs.formats.padding import without_padding
-from urmpipe_pipeline.logs.formats.rows import first_left_out, lines_of_rows
+from urmpipe_pipeline.logs.formats.text_table import first_left_out
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.proofs import Recorded, prove_by_kinematics
@@ -119,10 +119,10 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     """Return the numbers of one table; raise what is wrong with them."""
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
-    numbers = plan.tables.whole[table].table(places, clock.parts)
+    numbers = plan.tables.layouts[table].read(places, clock.parts)
     unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
     too_many, warnings, file = None, [], layout.file
-    if numbers.left_out and layout.form is not None:
+    if numbers.left_out:
         line, text = first_left_out(layout)
         verb = "is" if numbers.left_out == 1 else "are"
         said = f"{format_count(numbers.left_out, 'line')} without the labels of the rows {verb} left out"
@@ -136,7 +136,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
         too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
     numbers, inferences = trimmed(timed(layout, clock.parts, numbers))
     numbers = over_midnight(numbers, clock)
-    numbers, padding = without_padding(numbers, lambda: plan.tables.whole[table].read)
+    numbers, padding = without_padding(numbers, lambda: plan.tables.layouts[table].all_rows)
     if clock.lasts:
         numbers = summed(numbers, clock.columns[0].name)
     numbers = rebuilt(as_poses(plan, columns, numbers))
@@ -198,7 +198,7 @@ def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Findi
             times = f"{other.clock[row] / 1e9:.9g} s, allowed: {main.clock[row] / 1e9:.9g} s"
             message = f"found {times}, as in {title}: the tables of one log share their times"
             at = other.file_row(row + 1)
-            line = lines_of_rows(layout, [at]).get(at)
+            line = layout.lines_of([at]).get(at)
             return Finding(message, file, line, at, plan.clocks[table].columns[0].header)
     if len(main.values) != len(other.values):
         message = f"found {len(other.values)} rows, allowed: {len(main.values)}, as in {title}"
@@ -259,7 +259,7 @@ def assemble(
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, options)
     joints, rates, seconds, position, rotation = measured.groups
-    texts = (column for column in roles.joints if plan.tables.layouts[column.table].held is None)
+    texts = (column for column in roles.joints if plan.tables.layouts[column.table].arrow is None)
     written = (plan.tables.layouts[column.table].number_texts(column.index) for column in texts)
     digits, coarse = significant_digits(chain(*written)), "every joint value is written with as many"
     return JointLog(

@@ -23,7 +23,7 @@ from urmpipe_pipeline.logs.columns import (
     listed,
     which_joints,
 )
-from urmpipe_pipeline.logs.formats.table import Whole
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.rates import period_of
 from urmpipe_pipeline.logs.vocabulary import Patterns, key, vocabulary
 
@@ -192,7 +192,7 @@ def numbered_alike(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
     return [tuple(family) for family in alike.values() if len(family) > 1]
 
 
-def proved_by_rates(families: Sequence[tuple[Column, ...]], whole: Sequence[Whole]) -> NamedJoints:
+def proved_by_rates(families: Sequence[tuple[Column, ...]], whole: Sequence[LogTable]) -> NamedJoints:
     """Return the family whose rates are another one, by their numbers; nothing unless there is one."""
     pairs = []
     for joints, rates in permutations(families, 2):

@@ -31,9 +31,9 @@ from urmpipe_pipeline.logs.columns import (
     without_other_side,
 )
 from urmpipe_pipeline.logs.formats.cells import is_missing
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.opening import PATH, Tables
-from urmpipe_pipeline.logs.formats.sniff import Layout
-from urmpipe_pipeline.logs.formats.table import ROWS_READ, Whole, column_texts, read_table, with_rows
+from urmpipe_pipeline.logs.formats.table import ROWS_READ
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.roles import (
     Roles,
@@ -205,7 +205,7 @@ def _roles(
         return signals
     if main.header is None and not several:
         return without_header(
-            columns, tables.layouts, options, robot, tables.whole, path=options.source == PATH
+            columns, tables.layouts, options, robot, tables.layouts, path=options.source == PATH
         )
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
     if plots is not None:
@@ -233,7 +233,7 @@ def _by_names(
     """Return the roles of columns with names, each there once; a log of our own without joints is a path."""
     path = options.source == PATH or own == ()
     layouts, written = tables.layouts, () if path else own or ()
-    roles = assign(columns, layouts, options, robot, tables.whole, path=path, written=written)
+    roles = assign(columns, layouts, options, robot, tables.layouts, path=path, written=written)
     if not options.joints:
         refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "selects them: give their numbers"))
     refuse_twins(
@@ -314,10 +314,9 @@ def plan_topic(tables: Tables, options: LogMap, robot: Chain | None) -> Plan:
         if column_cells.any()
     ]
     why = f"{format_count(int(is_other.sum()), 'row')} of other topics, with {listed(named, 4)}, left out"
-    layout = with_rows(layout, rows, Inference(ROWS_READ, f"{len(rows)} of {len(is_other)}", why))
+    layout = layout.take(rows, Inference(ROWS_READ, f"{len(rows)} of {len(is_other)}", why))
     layouts = (*tables.layouts[:main], layout, *tables.layouts[main + 1 :])
-    readers = (*tables.whole[:main], Whole(layout), *tables.whole[main + 1 :])
-    plan = make_plan(replace(tables, layouts=layouts, whole=readers), options, robot)
+    plan = make_plan(replace(tables, layouts=layouts), options, robot)
     numbers = {
         c.number for c, column_cells in zip(columns, is_filled[rows].T, strict=True) if not column_cells.any()
     }
@@ -328,7 +327,7 @@ def _find_empty_rows(plan: Plan, tables: Tables, needed: Sequence[Column]) -> Bo
     """Return in which rows all cells of some columns are empty, shape (n,)."""
     columns = [column for column in plan.roles.columns if column.table == plan.main]
     places = [column.index for column in columns]
-    numbers = tables.whole[plan.main].table(places, plan.clocks[plan.main].parts)
+    numbers = tables.layouts[plan.main].read(places, plan.clocks[plan.main].parts)
     values = numbers.values
     is_empty = np.isnan(values[:, columns.index(needed[0])])
     if is_empty.any():
@@ -337,15 +336,15 @@ def _find_empty_rows(plan: Plan, tables: Tables, needed: Sequence[Column]) -> Bo
     return is_empty
 
 
-def _find_filled_cells(layout: Layout, columns: Sequence[Column], rows: int) -> BoolArray:
+def _find_filled_cells(layout: LogTable, columns: Sequence[Column], rows: int) -> BoolArray:
     """Return which cells are not empty, shape (rows, columns)."""
     is_filled = np.zeros((rows, len(columns)), dtype=np.bool_)
     numeric = [k for k, column in enumerate(columns) if not column.text]
-    values = read_table(layout, [columns[k].index for k in numeric], ()).values[:rows]
+    values = layout.read([columns[k].index for k in numeric], ()).values[:rows]
     is_filled[: len(values), numeric] = ~np.isnan(values)
     for k, column in enumerate(columns):
         if column.text:
-            texts = column_texts(layout, column.index)[:rows]
+            texts = layout.texts(column.index)[:rows]
             is_filled[: len(texts), k] = [not is_missing(text) for text in texts]
     return is_filled
 

@@ -15,7 +15,8 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.math3d import FORMS, RotationForm, column_count
 from urmpipe_pipeline.logs.columns import Column, find_column, listed
 from urmpipe_pipeline.logs.formats.cells import to_float
-from urmpipe_pipeline.logs.formats.sniff import FEW, Layout
+from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.sniff import FEW
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.names import Family, drop_unknown, find_families, prefer_measured
 from urmpipe_pipeline.logs.vocabulary import vocabulary
@@ -60,7 +61,7 @@ class Pose:
 
 def find_pose(
     numeric: Sequence[Column],
-    layouts: Sequence[Layout],
+    layouts: Sequence[LogTable],
     file: str | None = None,
     *,
     form: RotationForm | None = None,
@@ -111,7 +112,7 @@ def find_pose(
 
 
 def _counted_pose(
-    numeric: Sequence[Column], layouts: Sequence[Layout], form: RotationForm | None
+    numeric: Sequence[Column], layouts: Sequence[LogTable], form: RotationForm | None
 ) -> Pose | None:
     """Return p1, p2, p3 and the only quaternion beside them, which has length 1 in each row."""
     every = prefer_measured(find_families(numeric, vocabulary().tcp_counted, 0))
@@ -193,14 +194,14 @@ def with_form(pose: Pose, form: RotationForm | None) -> Pose:
 
 
 def trailing_matrix(
-    columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False
+    columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool = False
 ) -> Pose | None:
     """Return the pose in columns without names of which the last 16 or 12 are a homogeneous transform."""
     tried = (matrix_pose(columns[-count:], layouts, some=some) for count in (16, 12))
     return next((pose for pose in tried if pose), None)
 
 
-def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False) -> Pose | None:
+def matrix_pose(columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool = False) -> Pose | None:
     """Return the pose that 16 or 12 columns hold as a homogeneous transform, by what their numbers are.
 
     Row by row, or of 16 also column by column: the entries 0, 0, 0, 1 tell which, and R R^T = I that it
@@ -227,7 +228,7 @@ def transform_pose(columns: Sequence[Column], values: FloatArray, *, some: bool 
 
 
 def trailing_quaternion(
-    columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False
+    columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool = False
 ) -> Pose | None:
     """Return the pose in the last seven columns without names, if four of length 1 follow three others."""
     if len(columns) < 7 or not _is_unit(columns[-4:], layouts, some=some):
@@ -236,20 +237,20 @@ def trailing_quaternion(
     return Pose(tuple(columns[-7:-4]), tuple(columns[-4:]), ("quat_xyzw", "quat_wxyz"), evidence)
 
 
-def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool) -> bool:
+def _is_unit(columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool) -> bool:
     """Return whether the numbers of three rows or more, or of some, have length 1, as quaternions have."""
     values, _ = _sampled(columns, layouts)
     return (some or len(values) > 2) and _enough(have_length_1(values), some=some)
 
 
-def turns_as_quaternion(columns: Sequence[Column], layouts: Sequence[Layout]) -> bool:
+def turns_as_quaternion(columns: Sequence[Column], layouts: Sequence[LogTable]) -> bool:
     """Return whether four columns have length 1 in every sampled row, and change."""
     values, _ = _sampled(columns, layouts)
     changes = len(values) > 2 and bool((values != values[0]).any())
     return changes and _is_unit(columns, layouts, some=False)
 
 
-def odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> list[int]:
+def odd_rows(columns: Sequence[Column], layouts: Sequence[LogTable]) -> list[int]:
     """Return the few sampled rows, from 1, that hold no orientation although most do: they hide it.
 
     Of 16 or 12 columns it is a transform, of 9 a matrix, of 4 a quaternion that changes in most rows.
@@ -266,7 +267,7 @@ def odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> list[int]:
     return next(few, [])
 
 
-def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> tuple[FloatArray, IntArray]:
+def _sampled(columns: Sequence[Column], layouts: Sequence[LogTable]) -> tuple[FloatArray, IntArray]:
     """Return the sampled rows in which all of these columns have a number, and which these are, from 1."""
     cells = [layouts[c.table].cells(c.index) for c in columns]
     decimals = [layouts[c.table].decimal for c in columns]
@@ -337,7 +338,7 @@ def _alternatives(family: Family, every: Sequence[Family]) -> tuple[tuple[Column
 
 def _rotation(
     rest: Sequence[Column],
-    layouts: Sequence[Layout],
+    layouts: Sequence[LogTable],
     form: RotationForm | None,
     *,
     some: bool,

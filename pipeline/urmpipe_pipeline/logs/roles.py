@@ -42,10 +42,9 @@ from urmpipe_pipeline.logs.columns import (
     which_joints,
 )
 from urmpipe_pipeline.logs.formats.cells import grouped_number
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.own import GIVEN as GIVEN_KEY
 from urmpipe_pipeline.logs.formats.own import RECORDED, form_of, roles_of, stated_joints
-from urmpipe_pipeline.logs.formats.sniff import Layout
-from urmpipe_pipeline.logs.formats.table import Whole
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.names import (
     NamedJoints,
@@ -195,7 +194,7 @@ def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
     return [LogWarning(TCP_NOT_READ, said, hints=hints)]
 
 
-def about_odd_rows(rest: Sequence[Column], layouts: Sequence[Layout]) -> list[LogWarning]:
+def about_odd_rows(rest: Sequence[Column], layouts: Sequence[LogTable]) -> list[LogWarning]:
     """Return a warning for columns that are called as a matrix, and are one but for a few rows."""
     for family in prefer_measured(find_families(rest, vocabulary().tcp_matrix, 0)):
         columns = family.ordered()
@@ -270,10 +269,10 @@ class Roles:
 
 def assign(
     columns: Sequence[Column],
-    layouts: Sequence[Layout],
+    layouts: Sequence[LogTable],
     options: LogMap,
     robot: Chain | None,
-    whole: Sequence[Whole] = (),
+    whole: Sequence[LogTable] = (),
     *,
     path: bool = False,
     written: tuple[Column, ...] = (),
@@ -444,7 +443,7 @@ def _path(
     columns: Sequence[Column],
     numeric: Sequence[Column],
     pose: Pose,
-    layouts: Sequence[Layout],
+    layouts: Sequence[LogTable],
     robot: Chain | None,
     *,
     path: bool,
@@ -508,7 +507,7 @@ def _may_move(numeric: Sequence[Column], pose: Pose) -> list[Column]:
 
 
 def _may_be(
-    numeric: Sequence[Column], columns: Sequence[Column], layouts: Sequence[Layout], robot: Chain | None
+    numeric: Sequence[Column], columns: Sequence[Column], layouts: Sequence[LogTable], robot: Chain | None
 ) -> list[Sequence[Column]]:
     """Return the columns that may be joints whatever their names, if they are as many as an arm has.
 
@@ -531,7 +530,7 @@ def _may_be(
     return [group for group in groups if len(group) in fits]
 
 
-def _refuse_thousands(layouts: Sequence[Layout], file: str) -> None:
+def _refuse_thousands(layouts: Sequence[LogTable], file: str) -> None:
     """Raise a `LogError` where numbers have signs between their thousands: their columns count as text."""
     cells = (cell for layout in layouts for row in layout.sample for cell in _as_written(row, layout))
     found = next((one for cell in cells if (one := grouped_number(cell))), None)
@@ -541,7 +540,7 @@ def _refuse_thousands(layouts: Sequence[Layout], file: str) -> None:
         raise LogError(Finding(f"found {found!r}, allowed: {allowed}", file=file))
 
 
-def _as_written(row: Sequence[str], layout: Layout) -> Iterator[str]:
+def _as_written(row: Sequence[str], layout: LogTable) -> Iterator[str]:
     """Yield the cells of a row, and those of its line if it was parted at the commas within its numbers."""
     yield from row
     line = layout.delimiter.join(row)
@@ -552,7 +551,7 @@ def _with_rest(
     roles: Roles,
     inferences: list[Inference],
     numeric: Sequence[Column],
-    layouts: Sequence[Layout],
+    layouts: Sequence[LogTable],
     robot: Chain | None,
     *alternatives: Sequence[tuple[Column, ...]],
 ) -> Roles:
@@ -650,7 +649,7 @@ def own_joints(columns: Sequence[Column]) -> tuple[Column, ...]:
     return sized[: -len(TOOL_OWN_LOG)] if planned and tool == TOOL_OWN_LOG else sized
 
 
-def written_roles(columns: Sequence[Column], layout: Layout, robot: Chain | None) -> Roles | None:
+def written_roles(columns: Sequence[Column], layout: LogTable, robot: Chain | None) -> Roles | None:
     """Return the roles of the columns of an export, as urmpipe wrote them; None of any other table.
 
     Args:
@@ -678,7 +677,7 @@ def written_roles(columns: Sequence[Column], layout: Layout, robot: Chain | None
         form for form, own in COLUMN_NAMES.items() if own == names
     ]
     forms = forms or [form for form in FORMS if rotation and column_count(form) == len(rotation)]
-    arrays = layout.held is not None and GIVEN_KEY in (layout.held.schema.metadata or {})
+    arrays = layout.arrow is not None and GIVEN_KEY in (layout.arrow.schema.metadata or {})
     why = "given as an array" if arrays else "urmpipe wrote them"
     said = [joint_inference(joints, why) if joints else path_inference(_listed(position), why)]
     recorded = {"rates": rates, "accelerations": accelerations, "recorded TCP": position if joints else ()}
@@ -699,7 +698,7 @@ MOST_NAMES = 40
 
 
 def refuse_long_form(
-    joints: Sequence[Column], columns: Sequence[Column], clock: Sequence[Column], layout: Layout
+    joints: Sequence[Column], columns: Sequence[Column], clock: Sequence[Column], layout: LogTable
 ) -> None:
     """Raise if a table has a row a joint: a column beside its only joint goes round the same names.
 
@@ -732,13 +731,13 @@ def _goes_round(cells: Sequence[str]) -> bool:
     return whole and all(cell == cells[k % count] for k, cell in enumerate(cells))
 
 
-def _command(joint: Column, name: Column, time: Column, layout: Layout) -> str:
+def _command(joint: Column, name: Column, time: Column, layout: LogTable) -> str:
     """Return the command that writes such a table with a column a joint."""
-    kind = "parquet" if layout.held is not None else "csv"
-    sign = "" if layout.held is not None or layout.delimiter == "," else f", sep={layout.delimiter!r}"
+    kind = "parquet" if layout.arrow is not None else "csv"
+    sign = "" if layout.arrow is not None or layout.delimiter == "," else f", sep={layout.delimiter!r}"
     comma = ", decimal=','" if layout.decimal == "," else ""
     turned = f"index={time.header!r}, columns={name.header!r}, values={joint.header!r}"
-    read = f"pandas.read_{kind}({layout.segment.path.name!r}{sign}{comma})"
+    read = f"pandas.read_{kind}({layout.path.name!r}{sign}{comma})"
     return python_command(f"import pandas; {read}.pivot({turned}).to_csv('table.csv')")
 
 
@@ -751,7 +750,7 @@ _JOINTS = ("q", "phi", "s")
 _CLOCK = "t [s]"
 
 
-def joints_of_blocks(columns: Sequence[Column], layout: Layout, robot: Chain | None) -> Roles | None:
+def joints_of_blocks(columns: Sequence[Column], layout: LogTable, robot: Chain | None) -> Roles | None:
     """Return the roles of the signals of a simulation; None of any other table.
 
     The joints are the only array that is called as joints are. Scalars such as load1.theta, load2.theta may
@@ -791,7 +790,9 @@ def joints_of_blocks(columns: Sequence[Column], layout: Layout, robot: Chain | N
     raise which_joints(layout.file, found, groups, "one of them")
 
 
-def _taken(joints: Sequence[Column], columns: Sequence[Column], layout: Layout, robot: Chain | None) -> Roles:
+def _taken(
+    joints: Sequence[Column], columns: Sequence[Column], layout: LogTable, robot: Chain | None
+) -> Roles:
     """Return the joints of an arm with the rates that stand beside them."""
     check_count(joints, layout.file, robot)
     by_name = {column.header.split(" ")[0]: column for column in columns}

@@ -32,9 +32,8 @@ from urmpipe_pipeline.logs.clock_columns import GIVEN
 from urmpipe_pipeline.logs.clock_text import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.logs.columns import Column, unit_hints
 from urmpipe_pipeline.logs.formats.cells import LONGEST_CELL
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import NO_TIME, SHOWN_FINDINGS, UNREADABLE, Numbers
-from urmpipe_pipeline.logs.formats.rows import lines_of_rows
-from urmpipe_pipeline.logs.formats.sniff import Layout
 from urmpipe_pipeline.logs.formats.table import ROWS_READ
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.rates import period_of
@@ -294,7 +293,7 @@ def _with_clock(numbers: Numbers, times: IntArray, found: Inference, warning: Lo
     return replace(numbers, clock=times, inferences=inferences, warnings=warnings)
 
 
-def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
+def find_errors(layout: LogTable, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
     """Return everything that is wrong with the rows of a table, in the order of its lines.
 
     These are the first findings, and one that counts the others.
@@ -303,7 +302,7 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
     total = numbers.wrong + len(wrong)
     wrong = sorted(wrong, key=lambda one: (one.row or 0, one.column or "", one.message))[:SHOWN_FINDINGS]
     rows_in_file = [numbers.file_row(one.row or 0) for one in wrong]
-    lines = lines_of_rows(layout, rows_in_file)
+    lines = layout.lines_of(rows_in_file)
     file = layout.file
     placed = zip(wrong, rows_in_file, strict=True)
     here = (replace(one, file=file, line=lines.get(row), row=row) for one, row in placed)

@@ -21,11 +21,8 @@ from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.logs.clock import PAPER_PERIOD, Clock
 from urmpipe_pipeline.logs.clock_text import timed
 from urmpipe_pipeline.logs.columns import Column, listed, unit_hints
-from urmpipe_pipeline.logs.formats.cells import split_line
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import UNREADABLE, Numbers, RowFault
-from urmpipe_pipeline.logs.formats.rows import data_lines
-from urmpipe_pipeline.logs.formats.sniff import Layout
-from urmpipe_pipeline.logs.formats.table import read_table
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.pose_columns import ORTHOGONAL
 from urmpipe_pipeline.logs.roles import Roles
@@ -92,7 +89,7 @@ def read_rows(plan: Plan, further: Mapping[str, ExtraColumn]) -> Rows:
     places = [column.index for column in plan.roles.columns]
     allowed = dict.fromkeys(places, ALLOWED)
     allowed |= {column.index: further[name].allowed for name, column in plan.roles.further.items()}
-    read = read_table(layout, places, clock.parts, allowed)
+    read = layout.read(places, clock.parts, allowed)
     if read.lasting:
         raise LogError(*read.lasting)
     numbers = _without_blank_end(layout, timed(layout, clock.parts, read))
@@ -137,18 +134,18 @@ def _not_finite(cells: Iterable[tuple[Column, float]]) -> Iterator[RowFault]:
         yield RowFault(f"found {found}, allowed: {ALLOWED}", tuple(of))
 
 
-def _without_blank_end(layout: Layout, numbers: Numbers) -> Numbers:
+def _without_blank_end(layout: LogTable, numbers: Numbers) -> Numbers:
     """Return the numbers without rows at the end whose cells are all empty, as spreadsheets leave them."""
     if not len(numbers.values) or not np.isnan(numbers.values[-1]).all():
         return numbers
     last = max((row + 1 for row in numbers.unread), default=0)
-    for row, (_, text) in enumerate(data_lines(layout, layout.segment.lines()), start=1):
-        if any(split_line(text, layout.delimiter)):
+    for row, cells in enumerate(layout.iter_cells(), start=1):
+        if any(cells):
             last = max(last, row)
     return numbers.at(slice(last))
 
 
-def _whole_clock(layout: Layout, numbers: Numbers, clock: Clock) -> tuple[IntArray | None, Numbers]:
+def _whole_clock(layout: LogTable, numbers: Numbers, clock: Clock) -> tuple[IntArray | None, Numbers]:
     """Return a time for every row, and what was found out about the known ones, if they are a clock."""
     if numbers.clock is None:
         return None, numbers

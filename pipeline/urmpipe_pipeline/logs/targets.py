@@ -22,11 +22,13 @@ from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.logs.clock import named_file
 from urmpipe_pipeline.logs.columns import Column, columns_of, listed, unit_inference
 from urmpipe_pipeline.logs.formats.cells import DECIMALS, DELIMITERS, count_up, is_number, split_line
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.numbers import RowFault
 from urmpipe_pipeline.logs.formats.opening import PATH, open_tables
 from urmpipe_pipeline.logs.formats.reachable import unchanged
-from urmpipe_pipeline.logs.formats.sniff import SAMPLED_LINES, Layout, sniff
+from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import COMMENTS, HeadLine, Segment, head_lines
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.plan import Plan, make_plan
 from urmpipe_pipeline.logs.rotation import form_inference
@@ -44,7 +46,7 @@ from urmpipe_pipeline.logs.vocabulary import Unit, key, split_unit, vocabulary
 
 def sniff_targets(
     segment: Segment, delimiter: str | None = None, decimal: str | None = None, position: Sequence[str] = ()
-) -> Layout:
+) -> TextTable:
     """Return how a table is written: by its soundest rows, if a header names x, y, z or the columns given.
 
     These are the rows with a cell for each name and the most numbers for x, y, z. All lines below the header
@@ -56,7 +58,7 @@ def sniff_targets(
             fit its rows.
         OptionError: As `sniff`.
     """
-    lines = list(islice(head_lines(segment), SAMPLED_LINES))
+    lines = list(islice(head_lines(segment), MAX_SAMPLED_ROWS))
     for place, line in enumerate(lines):
         below = [other for other in lines[place + 1 :] if not other.is_comment]
         whole = _soundest(below, _headers(line.text, position))
@@ -80,7 +82,7 @@ def _by_header(
     head: Sequence[HeadLine],
     header: _Header,
     below: Sequence[HeadLine],
-) -> Layout:
+) -> TextTable:
     """Return a layout that the header alone tells, of rows that are all wrong."""
     sound = replace(below[0], text=header.delimiter.join(["0"] * header.width))  # as the header asks for
     layout = _from(sniff(segment, None, decimal, [*head, sound]), below)
@@ -88,7 +90,7 @@ def _by_header(
     return replace(layout, sample=tuple(tuple(split_line(line.text, header.delimiter)) for line in rows))
 
 
-def _from(layout: Layout, below: Sequence[HeadLine]) -> Layout:
+def _from(layout: TextTable, below: Sequence[HeadLine]) -> TextTable:
     """Return a layout whose rows begin right below its header, or behind a line of units."""
     cells = split_line(below[0].text, layout.delimiter)
     units = tuple(cells) if len(below) > 1 and _are_units(cells) else ()
@@ -377,7 +379,7 @@ def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> Non
         LogError: With what may be read instead.
     """
     layout, used = plan.tables.layouts[plan.main], [*plan.clock.columns, *plan.roles.columns]
-    file = str(layout.segment.path)
+    file = str(layout.path)
     if len(plan.used) > 1:
         found = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
         raise LogError(Finding(f"{found}, allowed: one table", file))

@@ -35,10 +35,8 @@ from urmpipe_pipeline.logs.columns import (
     take,
     which_joints,
 )
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
-from urmpipe_pipeline.logs.formats.rows import lines_of_rows
-from urmpipe_pipeline.logs.formats.sniff import Layout
-from urmpipe_pipeline.logs.formats.table import Whole
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import (
     Pose,
@@ -81,7 +79,9 @@ Found = tuple[tuple[Column, ...], tuple[Column, ...], str]
 """Joints, their rates, and why."""
 
 
-def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, robot: Chain | None) -> Found:
+def joints_among(
+    free: Sequence[Column], layout: LogTable, whole: LogTable | None, robot: Chain | None
+) -> Found:
     """Return the joints among columns without names, their rates, and why.
 
     They are all columns, if these are as many as the robot has joints; those whose rates stand beside them;
@@ -170,7 +170,7 @@ SPACES = " "
 """Delimiter of TUM's form."""
 
 
-def clock_before_pose(columns: Sequence[Column], whole: Whole) -> tuple[tuple[Column, ...], str] | None:
+def clock_before_pose(columns: Sequence[Column], whole: LogTable) -> tuple[tuple[Column, ...], str] | None:
     """Return the clock of a table of poses, none of poses alone, and why; None of any other table.
 
     Args:
@@ -183,13 +183,13 @@ def clock_before_pose(columns: Sequence[Column], whole: Whole) -> tuple[tuple[Co
     before = tuple(columns[:1]) if columns[0] not in (*pose.position, *pose.rotation) else ()
     if not before:
         return (), f"the {len(columns)} columns are a pose: {pose.evidence}"
-    single = len(whole.numbers.values) < 2
-    rises = single or bool(whole.increasing[whole.columns.index(before[0].index)])
+    single = len(whole.samples.values) < 2
+    rises = single or bool(whole.increasing[whole.numeric_columns.index(before[0].index)])
     return (before, f"it increases, and a pose stands behind it: {pose.evidence}") if rises else None
 
 
 def path_of_poses(
-    columns: Sequence[Column], whole: Sequence[Whole], rotation: RotationForm | None
+    columns: Sequence[Column], whole: Sequence[LogTable], rotation: RotationForm | None
 ) -> Roles | None:
     """Return the roles of the columns of a table of poses, with or without its clock; None of any other.
 
@@ -205,8 +205,8 @@ def path_of_poses(
     if pose is None or table is None:
         return None
     warnings = []
-    timed = len(table.layout.names) == 1 + QUATERNION  # poses alone are no TUM
-    if rotation is None and len(pose.forms) > 1 and timed and table.layout.delimiter == SPACES:
+    timed = len(table.names) == 1 + QUATERNION  # poses alone are no TUM
+    if rotation is None and len(pose.forms) > 1 and timed and table.delimiter == SPACES:
         pose = replace(pose, forms=("quat_xyzw",))
         warnings = [_about_order(pose.rotation)]
     pose = with_form(pose, rotation)
@@ -219,17 +219,19 @@ def path_of_poses(
     )  # fmt: skip
 
 
-def _pose(columns: Sequence[Column], whole: Whole) -> Pose | None:
+def _pose(columns: Sequence[Column], whole: LogTable) -> Pose | None:
     """Return the pose that columns hold in every row, alone or behind one of them."""
     for count in (*TRANSFORMS, QUATERNION):
         held = columns[-count:]
-        if len(columns) - count not in (0, 1) or not {c.index for c in columns}.issubset(whole.columns):
+        if len(columns) - count not in (0, 1) or not {c.index for c in columns}.issubset(
+            whole.numeric_columns
+        ):
             continue
         values = whole.values([column.index for column in held])
         values = values[np.isfinite(values).all(axis=1)]
         if count != QUATERNION:
             pose = transform_pose(held, values)
-        elif len(values) < LEAST_ROWS and len(whole.layout.names) == QUATERNION:
+        elif len(values) < LEAST_ROWS and len(whole.names) == QUATERNION:
             pose = None
         else:
             pose = _with_quaternion(held) if len(values) and have_length_1(values[:, 3:]).all() else None
@@ -261,10 +263,10 @@ ASSUMED_JOINTS = "assumed-joints"  # warning: all columns of a table without nam
 
 def without_header(
     columns: Sequence[Column],
-    layouts: Sequence[Layout],
+    layouts: Sequence[LogTable],
     options: LogMap,
     robot: Chain | None,
-    whole: Sequence[Whole],
+    whole: Sequence[LogTable],
     *,
     path: bool,
 ) -> Roles:
@@ -327,7 +329,7 @@ def _assumed_joints(joints: Sequence[Column]) -> LogWarning:
 
 
 def _path_by_place(
-    columns: Sequence[Column], layouts: Sequence[Layout], file: str, options: LogMap, pose: Pose | None
+    columns: Sequence[Column], layouts: Sequence[LogTable], file: str, options: LogMap, pose: Pose | None
 ) -> Roles:
     """Return x, y, z and the orientation behind them: of the form told, or by what its numbers are."""
     if pose is None and len(columns) < 3:
@@ -344,7 +346,7 @@ def _path_by_place(
 
 
 def _trailing_pose(
-    columns: Sequence[Column], layouts: Sequence[Layout], robot: Chain | None, *, some: bool = False
+    columns: Sequence[Column], layouts: Sequence[LogTable], robot: Chain | None, *, some: bool = False
 ) -> Pose | None:
     """Return the pose that stands behind the joints, or alone in a table, by what (some of) its rows are."""
     found = trailing_matrix(columns, layouts, some=some)
@@ -357,11 +359,11 @@ def _trailing_pose(
     return found
 
 
-def _refuse_odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> None:
+def _refuse_odd_rows(columns: Sequence[Column], layouts: Sequence[LogTable]) -> None:
     """Raise a `LogError` with the few rows without which columns are an orientation, if there are some."""
     layout = layouts[columns[0].table]
     odd = [layout.file_row(row) for row in odd_rows(columns, layouts)]
-    lines, told = lines_of_rows(layout, odd), listed(columns, most=4)
+    lines, told = layout.lines_of(odd), listed(columns, most=4)
     found = f"found no orientation in columns {told}, allowed: one in every row, as in most"
     findings = [Finding(found, layout.file, lines.get(row), row, hints=(NAME_JOINTS,)) for row in odd]
     if findings:

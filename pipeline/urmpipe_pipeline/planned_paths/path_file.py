@@ -14,8 +14,6 @@ from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.logs.clock_columns import time_columns
 from urmpipe_pipeline.logs.columns import Column, listed
 from urmpipe_pipeline.logs.formats.numbers import capped
-from urmpipe_pipeline.logs.formats.rows import lines_of_rows
-from urmpipe_pipeline.logs.formats.table import Whole
 from urmpipe_pipeline.logs.formats.text import fingerprint
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.target_rows import ExtraColumn
@@ -81,7 +79,7 @@ def read_path(file: Path, options: LogMap | None = None) -> GivenPath:
     if findings:
         raise LogError(*capped(findings, str(file)))
     warnings = (*table.warnings, *_not_used(table))
-    lines = lines_of_rows(table.plan.tables.layouts[table.plan.main], range(1, len(rows) + 1))
+    lines = table.plan.tables.layouts[table.plan.main].lines_of(range(1, len(rows) + 1))
     return GivenPath(file.stem, rows, fingerprint(file), warnings, lines, str(file))
 
 
@@ -121,7 +119,7 @@ def _faults(table: PoseTable, of_curve: Iterable[Finding]) -> Iterator[Finding]:
         for fault in faults
     ]
     found += [replace(one, column=columns[one.column].header if one.column else None) for one in of_curve]
-    lines = lines_of_rows(layout, [one.row for one in found if one.row])
+    lines = layout.lines_of([one.row for one in found if one.row])
     for one in sorted(found, key=lambda one: one.row or 0):
         yield replace(one, file=layout.file, line=lines.get(one.row or 0))
 
@@ -145,4 +143,4 @@ def _times(table: PoseTable) -> tuple[Column, ...]:
     layout, unused = table.plan.tables.layouts[table.plan.main], table.unused
     if layout.header is None or not unused:
         return ()
-    return time_columns(unused, layout, LogMap(), None, Whole(layout))[0]
+    return time_columns(unused, layout, LogMap(), None)[0]

@@ -16,8 +16,7 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.formats import rows as row_blocks
-from urmpipe_pipeline.logs.formats import table
+from urmpipe_pipeline.logs.formats import text_table
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -124,8 +123,8 @@ def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: Lo
         path = Path(folder) / "log.csv"
         path.write_bytes(content)
         whole = outcome(path, options)
-        patch.setattr(row_blocks, "BLOCK_BYTES", size)
-        patch.setattr(table, "READ_BY_ROW", 8)
+        patch.setattr(text_table, "BLOCK_BYTES", size)
+        patch.setattr(text_table, "READ_BY_ROW", 8)
         assert outcome(path, options) == whole
 
 

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from urmpipe_pipeline.logs import LogMap, read_log
 from urmpipe_pipeline.logs.formats.numbers import ClockColumn
-from urmpipe_pipeline.logs.formats.rows import (
+from urmpipe_pipeline.logs.formats.sniff import sniff
+from urmpipe_pipeline.logs.formats.text import open_text
+from urmpipe_pipeline.logs.formats.text_table import (
     RowReader,
     byte_encoding,
     clock_scales,
@@ -23,8 +25,6 @@ from urmpipe_pipeline.logs.formats.rows import (
     row_blocks,
     squeeze,
 )
-from urmpipe_pipeline.logs.formats.sniff import sniff
-from urmpipe_pipeline.logs.formats.text import open_text
 
 Floats = NDArray[np.float64]
 

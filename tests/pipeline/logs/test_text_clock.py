@@ -17,9 +17,9 @@ from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import read_log
 from urmpipe_pipeline.logs.clock_text import known_forms, timed
 from urmpipe_pipeline.logs.formats.numbers import ClockColumn
-from urmpipe_pipeline.logs.formats.rows import RowReader, clock_scales, parse_block, row_blocks
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import open_text
+from urmpipe_pipeline.logs.formats.text_table import RowReader, clock_scales, parse_block, row_blocks
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

@@ -26,9 +26,10 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_number, printable
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.sniff import SAMPLED_LINES, Layout
 from urmpipe_pipeline.logs.formats.text import Segment, head_lines, refuse_wide, text_segment
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 
 SEPARATORS = str.maketrans('\t\r\n"', "   '")
 """What replaces signs that would end a cell or a line of text with tabs."""
@@ -44,7 +45,7 @@ _ALLOWED = "an array of objects, or arrays of one length"
 Record = dict[str, str]
 
 
-def sniff_json_lines(segment: Segment) -> Layout | None:
+def sniff_json_lines(segment: Segment) -> TextTable | None:
     """Return how JSON lines are written, as rows of plain cells; None if the text is something else.
 
     Raises:
@@ -70,8 +71,8 @@ def sniff_json_lines(segment: Segment) -> Layout | None:
             row = "\t".join([record.get(name, "").translate(SEPARATORS) for name in names])
         rows.append((row, len(names)))
     text = "\n".join(row + "\t" * (len(names) - width) if width else row for row, width in rows)
-    sample = (row.split("\t") for row in text.split("\n", SAMPLED_LINES)[:SAMPLED_LINES])
-    return Layout(
+    sample = (row.split("\t") for row in text.split("\n", MAX_SAMPLED_ROWS)[:MAX_SAMPLED_ROWS])
+    return TextTable(
         segment=text_segment(segment.path, f"{text}\n", "\t", ()),
         delimiter="\t",
         decimal=".",
@@ -120,7 +121,7 @@ def read_json(segment: Segment) -> MemoryTable | None:
 
 def _is_json_lines(segment: Segment) -> bool:
     """Return whether each sampled line begins as an object, and at least half of the lines are objects."""
-    lines = [line.text for line in islice(head_lines(segment), SAMPLED_LINES)]
+    lines = [line.text for line in islice(head_lines(segment), MAX_SAMPLED_ROWS)]
     objects = [line.lstrip().startswith("{") for line in lines]
     return len(lines) > 1 and all(objects) and 2 * sum(map(bool, map(_read_record, lines))) >= len(lines)
 

@@ -30,10 +30,10 @@ from urmpipe_models.errors import Finding, LogError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_number, is_text, printable
 from urmpipe_pipeline.logs.formats.form import Form, spread_names, usual_length, words_around
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.numbers import capped
-from urmpipe_pipeline.logs.formats.rows import lines_of_rows
-from urmpipe_pipeline.logs.formats.sniff import SAMPLED_LINES, Layout
 from urmpipe_pipeline.logs.formats.text import HeadLine, Segment, head_lines
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 
 _ARRAY = r"\[[^\[\]]*\]|\([^()]*\)"
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][-+]?\d+)?(?![\w.:]|\s*[:=])"
@@ -53,9 +53,9 @@ FEWEST_LABELS = 2
 """A line with one label may be anything."""
 
 
-def sniff_labels(segment: Segment) -> Layout | None:
+def sniff_labels(segment: Segment) -> TextTable | None:
     """Return how a log with labels in its rows is written, as rows of plain cells; None if it has none."""
-    lines = list(islice(head_lines(segment), SAMPLED_LINES))
+    lines = list(islice(head_lines(segment), MAX_SAMPLED_ROWS))
     alike: dict[tuple[tuple[str, ...], str], list[HeadLine]] = {}
     for line in lines:
         if (found := _labels(line.text)) is not None:
@@ -83,7 +83,7 @@ def _labels(text: str) -> tuple[tuple[str, ...], str] | None:
 
 def _layout(
     segment: Segment, lines: Sequence[HeadLine], rows: Sequence[HeadLine], labels: tuple[str, ...], tail: str
-) -> Layout | None:
+) -> TextTable | None:
     """Return how rows with labels are written; a torn row may be the first, with some of the labels."""
     opening = next((sign for sign in "[(" if all(sign in row.text for row in rows)), "")
     names = tuple(_BARE.sub(" ", label).strip() for label in labels)
@@ -102,7 +102,7 @@ def _layout(
     torn = (line for line in lines if not line.is_comment and form.labels_in(line.text) >= FEWEST_LABELS)
     first = next(torn, rows[0])
     shown = " ".join(label.strip(",;{ ") for label in labels)
-    return Layout(
+    return TextTable(
         segment=segment,
         delimiter=form.delimiter,
         decimal=decimal,
@@ -176,7 +176,7 @@ def refuse_conflict(segment: Segment) -> list[Marker]:
     raise _error(segment, markers[first:end])
 
 
-def refuse_among_rows(layout: Layout, markers: Sequence[Marker]) -> None:
+def refuse_among_rows(layout: TextTable, markers: Sequence[Marker]) -> None:
     """Raise a `LogError` if lines that may be markers stand below the first row of a table."""
     among = [marker for marker in markers if marker.line >= layout.first_line]
     if among:
@@ -220,7 +220,7 @@ def _may_hold_markers(segment: Segment) -> bool:
 _FIRST_NAME = 3
 
 
-def with_names(layout: Layout) -> Layout:
+def with_names(layout: TextTable) -> TextTable:
     """Return the layout with names for its columns if most rows are those of such a table, else as it is.
 
     Raises:
@@ -260,12 +260,12 @@ def _names(row: Sequence[str], decimal: str) -> tuple[str, ...]:
 
 
 def _refuse_other_publishers(
-    layout: Layout, found: Sequence[tuple[str, ...]], usual: tuple[str, ...]
+    layout: TextTable, found: Sequence[tuple[str, ...]], usual: tuple[str, ...]
 ) -> None:
     """Raise at the first row with other names than the usual ones; a text where a number belongs is none."""
     for row, names in enumerate(found, start=1):
         if names and names[: len(usual)] != usual:
             listed, wanted = (", ".join(map(printable, group)) for group in (names, usual))
             message = f"found a row with the joints {listed} among rows with {wanted}, allowed: one publisher"
-            line = lines_of_rows(layout, [row]).get(row)
+            line = layout.lines_of([row]).get(row)
             raise LogError(Finding(f"{message}; keep the rows of one of them", layout.file, line, row))

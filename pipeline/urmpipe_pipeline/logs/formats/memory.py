@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -23,6 +23,7 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_float,
     to_nanoseconds,
 )
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import (
     NO_TIME,
     SHOWN_FINDINGS,
@@ -34,9 +35,7 @@ from urmpipe_pipeline.logs.formats.numbers import (
     arrow_column,
     is_number,
 )
-from urmpipe_pipeline.logs.formats.rows import MAY_BE_MISSING
-from urmpipe_pipeline.logs.formats.sniff import SAMPLED_LINES, Layout
-from urmpipe_pipeline.logs.formats.text import Segment
+from urmpipe_pipeline.logs.formats.text_table import MAY_BE_MISSING
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 _DIGITS = 38
@@ -85,7 +84,73 @@ class MemoryTable:
         return self.path or Path(self.name)
 
 
-def layout_of(held: MemoryTable) -> Layout:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ArrowTable(LogTable):
+    """A table in memory, as a log.
+
+    Attributes:
+        place: Its file, or its name.
+    """
+
+    place: Path
+
+    @property
+    def path(self) -> Path:
+        """The file that it was read from, or its name."""
+        return self.place
+
+    def _read(
+        self, columns: Sequence[int], clock: Sequence[ClockColumn], allowed: Mapping[int, str]
+    ) -> Numbers:
+        table = self.arrow
+        values = np.empty((table.num_rows, len(columns)))
+        faults: dict[int, list[RowFault]] = {}
+        for j, column in enumerate(columns):
+            values[:, j], wrong = numbers_of(table.column(column))
+            for row, text in wrong.items():
+                said = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
+                faults.setdefault(row, []).append(RowFault(said, (self.names[column],)))
+        findings = tuple(
+            Finding(fault.said, self.file, row=self.file_row(row + 1), column=fault.columns[0])
+            for row in sorted(faults)[:SHOWN_FINDINGS]
+            for fault in faults[row]
+        )
+        rows = None if self.rows is None else self.rows + 1
+        found = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
+        if not clock:
+            return Numbers(values, None, *found)
+        texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)
+        times = np.zeros(table.num_rows, dtype=np.int64)
+        for part in () if texts else clock:
+            own = _nanoseconds(table.column(part.column), part.exponent)
+            times = np.where((own <= UNREADABLE) | (times <= UNREADABLE), np.minimum(own, times), times + own)
+        return Numbers(values, times, *found, texts=texts)
+
+    def count_rows(self) -> int:
+        """Return the number of rows."""
+        return int(self.arrow.num_rows)
+
+    def iter_cells(self) -> Iterator[list[str]]:
+        """Yield the cells of each row as text."""
+        columns = (column.cast(pa.string()).to_pylist() for column in self.arrow.columns)
+        yield from ([cell or "" for cell in row] for row in zip(*columns, strict=True))
+
+    def take(self, rows: IntArray, *inferences: Inference) -> Self:
+        """Return the table of some of its rows, by index from 0, ascending, shape (k,)."""
+        return replace(
+            self,
+            rows=rows if self.rows is None else self.rows[rows],
+            arrow=(arrow := self.arrow.take(arrow_column(rows))),
+            sample=sampled_cells(arrow),
+            inferences=(*self.inferences, *inferences),
+        )
+
+    def lines_of(self, rows: Sequence[int]) -> dict[int, int]:
+        """Return nothing: a table in memory has no lines."""
+        return {}
+
+
+def to_log_table(memory: MemoryTable) -> ArrowTable:
     """Return a table in memory as one that is written somewhere: its first rows as a CSV file has them.
 
     Raises:
@@ -93,31 +158,28 @@ def layout_of(held: MemoryTable) -> Layout:
     """
     from urmpipe_pipeline.logs.formats.arrow_columns import plain_table  # its imports take long
 
-    table = plain_table(held.columns, str(held.place))
-    _refuse_empty(held, table)
-    named = held.named and not only_count(table.column_names)
+    table = plain_table(memory.columns, str(memory.place))
+    _refuse_empty(memory, table)
+    named = memory.named and not only_count(table.column_names)
     names = tuple(table.column_names) if named else tuple(str(k + 1) for k in range(table.num_columns))
     units = tuple((field.metadata or {}).get(UNIT, b"").decode(errors="replace") for field in table.schema)
     known = tuple(unit if vocabulary().unit(unit) else "" for unit in units)
-    return Layout(
-        segment=Segment(held.place, "", 0, 0, 1, ""),
-        delimiter=",",
-        decimal=".",
+    return ArrowTable(
+        place=memory.place,
         names=names,
         units=known if any(known) else (),
         header=1 if named else None,
         first_line=2 if named else 1,
-        offset=0,
         sample=sampled_cells(table),
-        inferences=held.inferences,
-        held=table,
-        applied=held.applied,
+        inferences=memory.inferences,
+        arrow=table,
+        applied=memory.applied,
     )
 
 
 def sampled_cells(table: pa.Table) -> tuple[tuple[str, ...], ...]:
     """Return the cells of the first rows of a table in memory, as a CSV file has them."""
-    columns = [_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns]
+    columns = [_texts(column.slice(0, MAX_SAMPLED_ROWS)).to_pylist() for column in table.columns]
     return tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
 
 
@@ -126,7 +188,7 @@ def _refuse_empty(held: MemoryTable, table: pa.Table) -> None:
     file = str(held.place)
     if not held.columns.num_rows or not held.columns.num_columns:
         raise LogError(Finding("found a table without rows, allowed: one row per sample", file))
-    first = (_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns)
+    first = (_texts(column.slice(0, MAX_SAMPLED_ROWS)).to_pylist() for column in table.columns)
     if all(is_text(cell, ".") for cells in first for cell in cells if cell):
         names = ", ".join(map(str, held.columns.column_names[:8]))
         raise LogError(Finding(f"found no number in {names}, allowed: one column per joint", file))
@@ -157,33 +219,6 @@ class _Hashing:
 
     def flush(self) -> None:
         """Keep nothing back."""
-
-
-def read_held(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers:
-    """Return the numbers of some columns of a table in memory; arguments as those of `read_table`."""
-    table = layout.held
-    values = np.empty((table.num_rows, len(columns)))
-    faults: dict[int, list[RowFault]] = {}
-    for j, column in enumerate(columns):
-        values[:, j], wrong = numbers_of(table.column(column))
-        for row, text in wrong.items():
-            said = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
-            faults.setdefault(row, []).append(RowFault(said, (layout.names[column],)))
-    findings = tuple(
-        Finding(fault.said, layout.file, row=layout.file_row(row + 1), column=fault.columns[0])
-        for row in sorted(faults)[:SHOWN_FINDINGS]
-        for fault in faults[row]
-    )
-    rows = None if layout.rows is None else layout.rows + 1
-    found = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
-    if not clock:
-        return Numbers(values, None, *found)
-    texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)
-    times = np.zeros(table.num_rows, dtype=np.int64)
-    for part in () if texts else clock:
-        own = _nanoseconds(table.column(part.column), part.exponent)
-        times = np.where((own <= UNREADABLE) | (times <= UNREADABLE), np.minimum(own, times), times + own)
-    return Numbers(values, times, *found, texts=texts)
 
 
 def numbers_of(column: pa.ChunkedArray) -> tuple[FloatArray, dict[int, str]]:

@@ -15,14 +15,15 @@ from urmpipe_pipeline.logs.formats.cells import is_number
 from urmpipe_pipeline.logs.formats.json import read_json, sniff_json_lines
 from urmpipe_pipeline.logs.formats.labels import refuse_among_rows, refuse_conflict, sniff_labels, with_names
 from urmpipe_pipeline.logs.formats.libraries import read_typed
-from urmpipe_pipeline.logs.formats.memory import MemoryTable, layout_of
+from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
 from urmpipe_pipeline.logs.formats.own import in_si
-from urmpipe_pipeline.logs.formats.padding import without_end_rows
 from urmpipe_pipeline.logs.formats.programs.program_text import read_program
 from urmpipe_pipeline.logs.formats.shape import sniff_arrays, turned
-from urmpipe_pipeline.logs.formats.sniff import Layout, across, sniff
-from urmpipe_pipeline.logs.formats.table import Whole, choose_rows
+from urmpipe_pipeline.logs.formats.sniff import across, sniff
+from urmpipe_pipeline.logs.formats.table import choose_rows
 from urmpipe_pipeline.logs.formats.text import Segment, open_text, refuse_long_lines
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.formats.workbook import read_workbook
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import KnownSource, vocabulary
@@ -46,26 +47,24 @@ class Tables:
         titles: Title of each table: the file's stem, or the graph's path.
         inferences: What was found out.
         foreign: Whether its source was given, and has columns or graphs of its own, which are not there.
-        whole: All numbers of each table, for what the first rows do not prove.
         warnings: Warnings about its files.
     """
 
     source: str
     known: KnownSource | None
-    layouts: tuple[Layout, ...]
+    layouts: tuple[LogTable, ...]
     titles: tuple[str, ...]
     inferences: tuple[Inference, ...]
     foreign: bool = False
-    whole: tuple[Whole, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
 
     @property
     def paths(self) -> list[Path]:
         """The file of each table."""
-        return [layout.segment.path for layout in self.layouts]
+        return [layout.path for layout in self.layouts]
 
 
-Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
+Sniff: TypeAlias = Callable[[Segment, str | None, str | None], TextTable]
 """What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
 
 
@@ -101,7 +100,7 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
     layouts = map_collecting_errors(lambda item: _layout(item[1], options, sniff_plain), titled)
     map_collecting_errors(
         lambda table: refuse_among_rows(*table),
-        zip([layout for layout in layouts if layout.held is None], markers, strict=False),
+        zip([layout for layout in layouts if isinstance(layout, TextTable)], markers, strict=False),
     )
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
@@ -118,9 +117,9 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
     foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
     foreign = foreign and options.source != stated
     foreign = not graphs if options.source == COPPELIASIM else foreign
-    said_of_all, whole = (*_encoding(texts[:1]), said), tuple(map(Whole, layouts))
+    said_of_all = (*_encoding(texts[:1]), said)
     warnings = tuple(warning for table in tables for warning in table.warnings)
-    return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, whole, warnings)
+    return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, warnings)
 
 
 def _opened(one: Path | MemoryTable, options: LogMap) -> Segment | MemoryTable:
@@ -138,11 +137,11 @@ def _opened(one: Path | MemoryTable, options: LogMap) -> Segment | MemoryTable:
     return table or text
 
 
-def _shaped(layouts: Sequence[Layout], options: LogMap) -> list[Layout]:
+def _shaped(layouts: Sequence[LogTable], options: LogMap) -> list[LogTable]:
     """Return tables with a row a sample: the rows that are read, without end marks in what is sampled."""
     alone = len(layouts) == 1
     shaped = map_collecting_errors(lambda one: turned(one, options.layout, alone=alone), layouts)
-    return [without_end_rows(one) for one in choose_rows(shaped, options)]
+    return [one.without_sampled_ends() for one in choose_rows(shaped, options)]
 
 
 def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
@@ -156,10 +155,10 @@ def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
         yield Inference("encoding", text.encoding, mark, hints=utf_8)
 
 
-def _layout(one: Segment | MemoryTable, options: LogMap, sniff_plain: Sniff) -> Layout:
+def _layout(one: Segment | MemoryTable, options: LogMap, sniff_plain: Sniff) -> LogTable:
     """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
     if isinstance(one, MemoryTable):
-        return layout_of(one)
+        return to_log_table(one)
     given = one.delimiter or options.delimiter, options.decimal
     found = None if one.delimiter else sniff_json_lines(one)
     found = found or (None if given[0] else sniff_labels(one))
@@ -180,7 +179,7 @@ def _known(
     return known, "the names of its columns" if known else "no source is known by these columns"
 
 
-def _names(layouts: Sequence[Layout]) -> list[str]:
+def _names(layouts: Sequence[LogTable]) -> list[str]:
     """Return the names of all columns and the labels of rows."""
-    labels = (layout.form.labels if layout.form else () for layout in layouts)
+    labels = (table.form.labels if isinstance(table, TextTable) and table.form else () for table in layouts)
     return [name for layout, more in zip(layouts, labels, strict=True) for name in (*layout.names, *more)]

@@ -11,8 +11,8 @@ import pyarrow as pa
 
 from urmpipe_models.math3d import COLUMN_NAMES
 from urmpipe_pipeline.joint_log import Role
+from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import JOINT, ROLE, UNIT
-from urmpipe_pipeline.logs.formats.sniff import Layout
 from urmpipe_pipeline.logs.vocabulary import split_unit
 
 MARK = "urmpipe"
@@ -44,38 +44,42 @@ Head = Sequence[tuple[str, str]]
 """Name and unit of each column."""
 
 
-def head_of(layout: Layout) -> Head:
+def head_of(layout: LogTable) -> Head:
     """Return name and unit of each column of a table; an empty unit where none is told."""
     split = [split_unit(name) for name in layout.names]
     units = layout.units or [""] * len(split)
     return [(label, unit or own or "") for (label, own), unit in zip(split, units, strict=False)]
 
 
-def roles_of(layout: Layout) -> dict[int, Role]:
+def roles_of(layout: LogTable) -> dict[int, Role]:
     """Return what the columns of a table of ours hold, by their index, in the order of their role.
 
     Of other tables it is nothing.
     """
-    if layout.held is not None:
+    if layout.arrow is not None:
         texts = (
-            (field.metadata or {}).get(ROLE, b"").decode(errors="replace") for field in layout.held.schema
+            (field.metadata or {}).get(ROLE, b"").decode(errors="replace") for field in layout.arrow.schema
         )
         found = ((index, _TOLD_ROLE.fullmatch(text)) for index, text in enumerate(texts))
         told = [(int(match["place"]), index, cast("Role", match["role"])) for index, match in found if match]
         if told:
             return {index: role for _, index, role in sorted(told)}
-    return grid_roles(head_of(layout)) if layout.header is not None and layout.form is None else {}
+    return (
+        grid_roles(head_of(layout))
+        if layout.header is not None and getattr(layout, "form", None) is None
+        else {}
+    )
 
 
-def stated_joints(layout: Layout) -> frozenset[int]:
+def stated_joints(layout: LogTable) -> frozenset[int]:
     """Return the indices of the columns that a schema calls positions of joints, in no order."""
-    schema = getattr(layout.held, "schema", ())
+    schema = getattr(layout.arrow, "schema", ())
     return frozenset(k for k, field in enumerate(schema) if (field.metadata or {}).get(ROLE) == JOINT)
 
 
-def form_of(layout: Layout) -> str:
+def form_of(layout: LogTable) -> str:
     """Return the form of the orientation in a table of ours; empty where it does not tell one."""
-    metadata = {} if layout.held is None else layout.held.schema.metadata or {}
+    metadata = {} if layout.arrow is None else layout.arrow.schema.metadata or {}
     told = metadata.get(FORM, b"").decode(errors="replace")
     return told if told in COLUMN_NAMES else ""
 
@@ -117,9 +121,9 @@ def _joints(head: Head, *, timed: bool) -> int:
     return count if ours else 0
 
 
-def in_si(layout: Layout) -> bool:
+def in_si(layout: LogTable) -> bool:
     """Return whether urmpipe made the numbers of a table, in SI: what it says of their units is no doubt."""
-    if layout.held is not None and MARK.encode() in (layout.held.schema.metadata or {}):
+    if layout.arrow is not None and MARK.encode() in (layout.arrow.schema.metadata or {}):
         return True
     return layout.header is not None and bool(grid_roles(head_of(layout)))
 

@@ -21,16 +21,13 @@ by steps of its own.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.logs.formats.cells import to_float
 from urmpipe_pipeline.logs.formats.numbers import Numbers
-from urmpipe_pipeline.logs.formats.sniff import Layout
 
 ROUGH = 0.1
 """What goes on as a motion has at most this share of the squared differences of what does not: swings with 14
@@ -222,19 +219,6 @@ def start_rows(values: FloatArray) -> int:
         values: All columns of numbers in the file's own units, shape (n, columns).
     """
     return end_rows(values[::-1])
-
-
-def without_end_rows(layout: Layout) -> Layout:
-    """Return a table with a sample of its rows that does not end with such rows: they tell of no column."""
-    if len(layout.sample) <= LEAST_ROWS_PADDING:
-        return layout
-    width = min(map(len, layout.sample))
-    if sum(to_float(cell, layout.decimal) in MARKS for cell in layout.sample[-1][:width]) < FEWEST_MARKS:
-        return layout
-    cells = [[to_float(cell, layout.decimal) for cell in row[:width]] for row in layout.sample]
-    columns = [column for column in zip(*cells, strict=True) if None not in column]
-    count = end_rows(np.array(columns, dtype=np.float64).T) if columns else 0
-    return replace(layout, sample=layout.sample[:-count]) if count else layout
 
 
 def without_padding(numbers: Numbers, whole: Callable[[], Numbers]) -> tuple[Numbers, list[LogWarning]]:

@@ -9,7 +9,7 @@ Tables whose cells hold arrays, as str of a NumPy array or a list writes them, a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain, islice, pairwise
 
@@ -19,7 +19,7 @@ import pyarrow as pa
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.logs.formats.cells import is_missing, is_number, is_text, plain, split_line, to_float
+from urmpipe_pipeline.logs.formats.cells import is_missing, is_number, is_text, plain, to_float
 from urmpipe_pipeline.logs.formats.form import (
     CLOSING,
     Form,
@@ -28,12 +28,12 @@ from urmpipe_pipeline.logs.formats.form import (
     usual_length,
     words_around,
 )
-from urmpipe_pipeline.logs.formats.memory import MemoryTable, layout_of
+from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
 from urmpipe_pipeline.logs.formats.padding import MOST_JOINTS, flat_ways, goes_along_rows
-from urmpipe_pipeline.logs.formats.rows import data_lines
-from urmpipe_pipeline.logs.formats.sniff import Layout, across, sniff
-from urmpipe_pipeline.logs.formats.table import Whole
+from urmpipe_pipeline.logs.formats.sniff import across, sniff
 from urmpipe_pipeline.logs.formats.text import HeadLine, Segment, head_lines
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 
 AS_TABLE, TRANSPOSED = "table", "transposed"
 
@@ -47,7 +47,7 @@ _TABLE = Hint("layout", AS_TABLE, "takes each row as a sample")
 _Rows = Sequence[Sequence[str]]
 
 
-def turned(layout: Layout, given: str | None, *, alone: bool = True) -> Layout:
+def turned(layout: LogTable, given: str | None, *, alone: bool = True) -> LogTable:
     """Return a table as one with a row a sample.
 
     Rows that begin with a name each, and go on smoothly, are joints. Others are asked about.
@@ -62,35 +62,35 @@ def turned(layout: Layout, given: str | None, *, alone: bool = True) -> Layout:
     """
     if given is not None:
         return _as_given(layout, given)
-    if not alone or layout.form is not None:
+    if not alone or getattr(layout, "form", None) is not None:
         return layout
-    column = across(layout) if layout.held is None else layout
-    if len(column.names) == 1 or (layout.held is not None and layout.held.num_rows == 1):
+    column = across(layout) if layout.arrow is None else layout
+    if len(column.names) == 1 or (layout.arrow is not None and layout.arrow.num_rows == 1):
         return _one_by_one(layout, column)
     if len(layout.sample) > MOST_JOINTS or not _unnamed(layout):
         return layout
-    rows = list(islice(_rows(layout), MOST_JOINTS + 1))
+    rows = list(islice(layout.iter_cells(), MOST_JOINTS + 1))
     return _joints_as_rows(layout, rows) if len({len(row) for row in rows}) == 1 else layout
 
 
-def _as_given(layout: Layout, given: str) -> Layout:
+def _as_given(layout: LogTable, given: str) -> LogTable:
     """Return a table as the user says."""
     if given == AS_TABLE:
         return replace(layout, inferences=(*layout.inferences, _said(AS_TABLE, GIVEN)))
     if given == TRANSPOSED:
-        return _transposed(layout, list(_rows(layout)), GIVEN)
+        return _transposed(layout, list(layout.iter_cells()), GIVEN)
     return _unflattened(layout, given)
 
 
-def _unnamed(layout: Layout) -> bool:
+def _unnamed(layout: LogTable) -> bool:
     """Return whether columns have no names, or the numbers that pandas gives them."""
     names = [name for name in layout.names if name]
     return layout.header is None or all(is_number(name, ".") for name in names)
 
 
-def _one_by_one(layout: Layout, column: Layout) -> Layout:
+def _one_by_one(layout: LogTable, column: LogTable) -> LogTable:
     """Return a single column or row as it is, if it may be one joint over time or one sample; else ask."""
-    numbers = Whole(column).read
+    numbers = column.all_rows
     if numbers.findings:
         return layout
     x = numbers.values.ravel()
@@ -117,7 +117,7 @@ def _does(way: str) -> str:
     return f"takes {count} numbers a sample" if order == "flat" else f"takes {count} joints one by one"
 
 
-def _joints_as_rows(layout: Layout, rows: _Rows) -> Layout:
+def _joints_as_rows(layout: LogTable, rows: _Rows) -> LogTable:
     """Return rows that are joints by their names and numbers turned; by numbers alone they are asked."""
     if len(rows) < 2 or len(rows) > MOST_JOINTS:
         return layout
@@ -131,7 +131,7 @@ def _joints_as_rows(layout: Layout, rows: _Rows) -> Layout:
     return _transposed(layout, rows, why, _TABLE)
 
 
-def _ask(layout: Layout, rows: int, columns: int) -> None:
+def _ask(layout: LogTable, rows: int, columns: int) -> None:
     """Raise the question whether rows are joints."""
     row = "1 row" if rows == 1 else f"{rows} rows"
     verb = "goes on smoothly along it, which may be a joint as a row"
@@ -141,7 +141,7 @@ def _ask(layout: Layout, rows: int, columns: int) -> None:
     raise LogError(Finding(found, layout.file, hints=(so, _TABLE)))
 
 
-def _transposed(layout: Layout, rows: _Rows, why: str, *otherwise: Hint) -> Layout:
+def _transposed(layout: LogTable, rows: _Rows, why: str, *otherwise: Hint) -> LogTable:
     """Return a table whose rows are columns; a text at the beginning of a row is its name."""
     width = max(map(len, rows))
     odd = next((k for k, row in enumerate(rows) if len(row) != width), None)
@@ -153,10 +153,10 @@ def _transposed(layout: Layout, rows: _Rows, why: str, *otherwise: Hint) -> Layo
     return _in_memory(layout, columns, names, _said(TRANSPOSED, why, *otherwise))
 
 
-def _unflattened(layout: Layout, way: str) -> Layout:
+def _unflattened(layout: LogTable, way: str) -> LogTable:
     """Return numbers that follow each other, row by row, as a table of N columns."""
     order, _, text = way.partition(":")
-    numbers, count = Whole(across(layout) if layout.held is None else layout).read, int(text)
+    numbers, count = (across(layout) if isinstance(layout, TextTable) else layout).all_rows, int(text)
     if numbers.findings:
         raise LogError(*numbers.findings)
     x = numbers.values.ravel()
@@ -167,28 +167,19 @@ def _unflattened(layout: Layout, way: str) -> Layout:
     return _in_memory(layout, [pa.array(column) for column in table], (), _said(way, GIVEN))
 
 
-def _in_memory(layout: Layout, columns: Sequence[pa.Array], names: Sequence[str], said: Inference) -> Layout:
+def _in_memory(
+    layout: LogTable, columns: Sequence[pa.Array], names: Sequence[str], said: Inference
+) -> LogTable:
     """Return a table in memory in the place of one that is written otherwise."""
     table = pa.Table.from_arrays(list(columns), names=list(names or map(str, range(1, len(columns) + 1))))
-    path = layout.segment.path
+    path = layout.path
     kept = (one for one in layout.inferences if one.what != "header")
     held = MemoryTable(path.stem, table, named=bool(names), path=path)
-    return replace(layout_of(held), inferences=(*kept, said))
+    return replace(to_log_table(held), inferences=(*kept, said))
 
 
 def _said(value: str, evidence: str, *hints: Hint) -> Inference:
     return Inference("layout", value, evidence, hints=hints)
-
-
-def _rows(layout: Layout) -> Iterator[list[str]]:
-    """Yield the cells of each row as text, without an empty one behind a trailing delimiter."""
-    if layout.held is not None:
-        columns = (column.cast(pa.string()).to_pylist() for column in layout.held.columns)
-        yield from ([cell or "" for cell in row] for row in zip(*columns, strict=True))
-        return
-    for _, line in data_lines(layout, layout.segment.lines()):
-        cells = split_line(line.strip("\r\n "), layout.delimiter)
-        yield cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
 def _named(rows: _Rows, decimal: str) -> tuple[tuple[str, ...], list[Sequence[str]]]:
@@ -229,7 +220,9 @@ _COMMAS = re.compile(r"\d,\d")
 _OTHERS = re.compile(r"\d(?:\s+|\s*;\s*)[-+.\d]")
 
 
-def sniff_arrays(segment: Segment, delimiter: str | None = None, decimal: str | None = None) -> Layout | None:
+def sniff_arrays(
+    segment: Segment, delimiter: str | None = None, decimal: str | None = None
+) -> TextTable | None:
     """Return how a table with arrays in its cells is written, as rows of plain cells; None if it has none.
 
     A column NAME of arrays becomes NAME_1, NAME_2, ...
@@ -307,7 +300,7 @@ def _refuse_commas(segment: Segment, form: Form, rows: Sequence[HeadLine]) -> No
                 raise LogError(Finding(message, str(segment.path), row.number))
 
 
-def _spread(outer: Layout, form: Form, values: Sequence[list[Value]]) -> Layout:
+def _spread(outer: TextTable, form: Form, values: Sequence[list[Value]]) -> TextTable:
     """Return the layout of the plain cells."""
     names = tuple(spread_names(outer.names, form.lengths))
     if outer.header is None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Any
 
 from urmpipe_models.display import format_count
-from urmpipe_models.elementwise import IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import (
@@ -26,14 +23,13 @@ from urmpipe_pipeline.logs.formats.cells import (
     is_text,
     numbered,
     only_count,
-    plain,
     split_line,
-    to_float,
 )
 from urmpipe_pipeline.logs.formats.clock_forms import looks_like_a_clock
-from urmpipe_pipeline.logs.formats.form import Form
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.text import FEWEST_LINES, HeadLine, Segment, head_lines
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.text import strip_apostrophe
 
 LEAST_FIT = 0.2
@@ -45,9 +41,6 @@ FEW = 0.25
 SCORED_LINES = 60
 """Lines that decide on the delimiter."""
 
-SAMPLED_LINES = 250
-"""Lines that decide on everything else."""
-
 COUNTED = 9
 """So many digits a number of a row may have: no table has a billion rows."""
 
@@ -57,79 +50,6 @@ _SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": 
 _TOLD = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)
 
 Row = list[str]
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """How one table is written.
-
-    Attributes:
-        segment: Where it stands.
-        delimiter: Sign between cells; a space stands for any run of spaces and tabs.
-        decimal: Decimal sign.
-        names: Names of the columns as the header has them; 1, 2, ... without a header. One a cell of a
-            row: empty for an unnamed index and for what follows a trailing delimiter.
-        units: Texts of a second header line with units, or empty.
-        header: Line of the header, None without one.
-        first_line: Line of the file that holds row 1.
-        offset: Offset of that line in bytes.
-        sample: Cells of the first rows.
-        inferences: What was found out.
-        form: How its rows become rows of plain cells, if they hold arrays or labels.
-        across: Whether the rows of its only column stand side by side in one line.
-        held: The Arrow table that it is, where it is no text: then it has no lines.
-        rows: Data rows of the file that are read, from 0 and ascending, shape (n,); None for all of them.
-        applied: Options of reading that its format applied already, such as "topic" or "episode".
-    """
-
-    segment: Segment
-    delimiter: str
-    decimal: str
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    header: int | None
-    first_line: int
-    offset: int
-    sample: tuple[tuple[str, ...], ...]
-    inferences: tuple[Inference, ...]
-    form: Form | None = None
-    across: bool = False
-    held: Any = None
-    rows: IntArray | None = None
-    applied: tuple[str, ...] = ()
-
-    @property
-    def header_line(self) -> int | None:
-        """Line of the header for messages; None without one, and of a table in memory."""
-        return self.header if self.held is None else None
-
-    @property
-    def file(self) -> str:
-        """The path of the file that it stands in."""
-        return str(self.segment.path)
-
-    def error(self, message: str, column: str | None, *hints: Hint) -> LogError:
-        """Return an error about its first row, or a column there."""
-        line = self.first_line if self.held is None and self.rows is None else None
-        return LogError(Finding(message, self.file, line, self.file_row(1), column, hints=hints))
-
-    def file_row(self, row: int) -> int:
-        """Return the data row of the file of a row that is read, both from 1."""
-        return row if self.rows is None else int(self.rows[row - 1]) + 1
-
-    def cells(self, column: int) -> list[str]:
-        """Return the sampled cells of a column."""
-        return [row[column] for row in self.sample if column < len(row)]
-
-    def number_texts(self, column: int) -> Iterator[str]:
-        """Yield the sampled numbers of a column, as Python spells them."""
-        cells = (row[column] for row in self.sample if column < len(row))
-        return (plain(cell, self.decimal) for cell in cells if is_number(cell, self.decimal))
-
-    def numbers(self, column: int) -> list[float]:
-        """Return the sampled numbers of a column, without those that are infinite."""
-        values = (to_float(cell, self.decimal) for cell in self.cells(column))
-        return [value for value in values if value is not None and math.isfinite(value)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +67,7 @@ def sniff(
     delimiter: str | None = None,
     decimal: str | None = None,
     lines: Sequence[HeadLine] | None = None,
-) -> Layout:
+) -> TextTable:
     """Return how a table is written.
 
     Args:
@@ -164,7 +84,7 @@ def sniff(
     told, lines = _told_delimiter(lines)
     delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
     decimals = _choices("decimal", decimal, DECIMALS)
-    body = [line for line in lines if not line.is_comment][:SAMPLED_LINES]
+    body = [line for line in lines if not line.is_comment][:MAX_SAMPLED_ROWS]
     style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
     rows = [split_line(line.text, style.delimiter) for line in body]
     width = _common_width(rows, style.decimal)
@@ -185,7 +105,7 @@ def sniff(
     if header and only_count(names):
         said = Inference("header", f"line {header[0]}", "its names only count: columns by number")
         header, names = None, _by_number(names)
-    return Layout(
+    return TextTable(
         segment=segment,
         delimiter=style.delimiter,
         decimal=style.decimal,
@@ -211,15 +131,17 @@ def _told_delimiter(lines: Sequence[HeadLine]) -> tuple[str | None, Sequence[Hea
     return (told[1], lines[1:]) if told else (None, lines)
 
 
-def across(layout: Layout) -> Layout:
+def across(layout: LogTable) -> LogTable:
     """Return a table of a single line of numbers as one column; any other as it is."""
-    if layout.header is not None or len(layout.sample) != 1 or len(layout.names) < 3:
+    if not isinstance(layout, TextTable) or layout.header is not None:
+        return layout
+    if len(layout.sample) != 1 or len(layout.names) < 3:
         return layout
     lines = layout.segment.lines()
     if any(line.strip() for number, line in lines if number > layout.first_line):
         return layout
     longer = layout.segment.has_more  # then the last value is cut
-    cells = layout.sample[0][: -1 if longer else None][:SAMPLED_LINES]
+    cells = layout.sample[0][: -1 if longer else None][:MAX_SAMPLED_ROWS]
     column = tuple((cell,) for cell in cells)
     return replace(layout, names=("1",), sample=column, across=True)
 

@@ -14,7 +14,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
-from typing import Any, TypeAlias
+from pathlib import Path
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 import pyarrow as pa
@@ -24,6 +25,7 @@ from pyarrow import csv
 from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint
+from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import (
     SPACE,
     Bytes,
@@ -35,7 +37,8 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_float,
     to_nanoseconds,
 )
-from urmpipe_pipeline.logs.formats.form import RowError, UnfitError, Value
+from urmpipe_pipeline.logs.formats.form import Form, RowError, UnfitError, Value
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import (
     NO_TIME,
     REPORTED,
@@ -44,9 +47,83 @@ from urmpipe_pipeline.logs.formats.numbers import (
     Numbers,
     RowFault,
 )
-from urmpipe_pipeline.logs.formats.sniff import Layout
-from urmpipe_pipeline.logs.formats.text import COMMENTS, MOST_HEAD
+from urmpipe_pipeline.logs.formats.text import COMMENTS, MOST_HEAD, Segment
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TextTable(LogTable):
+    """A table that is text.
+
+    Attributes:
+        segment: Where it stands.
+        offset: Offset of its first row in bytes.
+        form: How its rows become rows of plain cells, if they hold arrays or labels.
+    """
+
+    segment: Segment
+    offset: int
+    form: Form | None = None
+
+    @property
+    def path(self) -> Path:
+        """The file that it stands in."""
+        return self.segment.path
+
+    def _read(
+        self, columns: Sequence[int], clock: Sequence[ClockColumn], allowed: Mapping[int, str]
+    ) -> Numbers:
+        """Return what `read` does.
+
+        Read row by row is also what the parser refuses though it is sound: blanks as missing samples, 1.5d0,
+        comments.
+        """
+        reader = RowReader(self, columns, clock, allowed)
+        scales = clock_scales(self, clock)
+        parts = [part for block in row_blocks(self) for part in _parts(reader, block, scales)]
+        reader.refuse_cut_row()
+        values = [part.values for part in parts] or [np.empty((0, len(columns)))]
+        times = [_times(part) for part in parts] or [np.empty(0, dtype=np.int64)]
+        texts = zip(*(part.texts for part in parts), strict=True)
+        numbers = replace(
+            reader.verdict(),
+            values=np.concatenate(values),
+            clock=np.concatenate(times) if clock else None,
+            texts=tuple(TextCells.joined(cells) for cells in texts),
+            left_out=sum(part.left_out for part in parts),
+        )
+        if self.rows is None:
+            return numbers
+        return numbers.at(self.rows[self.rows < len(numbers.values)])  # fewer if another header ends them
+
+    def count_rows(self) -> int:
+        """Return the number of data rows."""
+        return sum(1 for _ in data_lines(self))
+
+    def iter_cells(self) -> Iterator[list[str]]:
+        """Yield the cells of each row as text, without an empty one behind a trailing delimiter."""
+        for _, line in data_lines(self):
+            cells = split_line(line.strip("\r\n "), self.delimiter)
+            yield cells[:-1] if len(cells) > 1 and not cells[-1] else cells
+
+    def take(self, rows: IntArray, *inferences: Inference) -> Self:
+        """Return the table of some of its rows, by index from 0, ascending, shape (k,)."""
+        in_file = rows if self.rows is None else self.rows[rows]
+        sampled, texts = in_file[:MAX_SAMPLED_ROWS], list[str]()
+        chosen, last = frozenset(sampled.tolist()), int(sampled[-1])
+        for row, (_, text) in enumerate(islice(data_lines(self), last + 1)):
+            texts += [text] if row in chosen else []
+        if self.form is not None:
+            sample = self.form.sampled(self.form.readable(texts))
+        else:
+            sample = tuple(tuple(split_line(text, self.delimiter)) for text in texts)
+        return replace(self, rows=in_file, sample=sample, inferences=(*self.inferences, *inferences))
+
+    def lines_of(self, rows: Sequence[int]) -> dict[int, int]:
+        """Return the line of the file of some data rows, both from 1."""
+        numbered = islice(enumerate(data_lines(self), start=1), max(rows, default=0))
+        return {row: line for row, (line, _) in numbered if row in {*rows}}
+
 
 BLOCK_BYTES = 1 << 22
 """What is read at once: enough rows for several threads to parse, few enough to keep memory low."""
@@ -57,12 +134,12 @@ _TO_POINTS = bytes.maketrans(b",.", b".~")
 _FROM_POINTS = np.frombuffer(bytes.maketrans(b".~", b",."), dtype=np.uint8)
 
 
-def as_written(layout: Layout, cells: Bytes) -> Bytes:
+def as_written(layout: TextTable, cells: Bytes) -> Bytes:
     """Return cells of `converted` rows, shape (bytes,), with the signs that the file has."""
     return _FROM_POINTS[cells] if layout.decimal == "," != layout.delimiter else cells
 
 
-def row_blocks(layout: Layout) -> Iterator[bytes]:
+def row_blocks(layout: TextTable) -> Iterator[bytes]:
     """Yield the rows of a table as they stand in the file, some thousand at a time, in `byte_encoding`."""
     segment = layout.segment
     left = segment.end - layout.offset
@@ -82,12 +159,12 @@ def row_blocks(layout: Layout) -> Iterator[bytes]:
                 yield block[:end]
 
 
-def byte_encoding(layout: Layout) -> str:
+def byte_encoding(layout: TextTable) -> str:
     """Return the encoding of the blocks: UTF-8, or Latin-1, whose numbers are the same bytes in UTF-8."""
     return "latin-1" if layout.segment.encoding == "latin-1" else "utf-8"
 
 
-def converted(layout: Layout, block: bytes) -> tuple[bytes, int]:
+def converted(layout: TextTable, block: bytes) -> tuple[bytes, int]:
     """Return whole rows as the parser wants them, in UTF-8 and with one space for a run of them.
 
     Lines among labelled rows that are none are left out; how many they are is the second value.
@@ -107,7 +184,7 @@ def converted(layout: Layout, block: bytes) -> tuple[bytes, int]:
     return (block.replace(layout.delimiter.encode(), b"\n") if layout.across else block), left_out
 
 
-def end_of_rows(block: bytes, layout: Layout) -> int:
+def end_of_rows(block: bytes, layout: TextTable) -> int:
     """Return where the last whole row of a block ends."""
     end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1
     while layout.form is not None and layout.form.continued and end and block[end : end + 1] in _GOES_ON:
@@ -140,7 +217,7 @@ Scales: TypeAlias = tuple[tuple[int, ...], ...]
 """How many decimals of each column of numbers of a clock are read: as few as may do, then all."""
 
 
-def clock_scales(layout: Layout, clock: Sequence[ClockColumn]) -> Scales:
+def clock_scales(layout: TextTable, clock: Sequence[ClockColumn]) -> Scales:
     """Return how many decimals of a clock are read, the same for all blocks of a table."""
     numeric = [part for part in clock if not part.forms]
     both = (tuple(_scale(layout, part, exact) for part in numeric) for exact in (False, True))
@@ -148,7 +225,7 @@ def clock_scales(layout: Layout, clock: Sequence[ClockColumn]) -> Scales:
 
 
 def parse_block(
-    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], block: bytes, scales: Scales
+    layout: TextTable, columns: Sequence[int], clock: Sequence[ClockColumn], block: bytes, scales: Scales
 ) -> Numbers | None:
     """Return the numbers of some columns, or None if the parser stumbles over a row or a cell.
 
@@ -199,7 +276,7 @@ def _numbers(
 
 
 def _parse(
-    layout: Layout,
+    layout: TextTable,
     columns: Sequence[int],
     clock: Sequence[ClockColumn],
     scales: Sequence[int],
@@ -227,7 +304,7 @@ def _parse(
     )
 
 
-def _text_cells(table: pa.Table, layout: Layout, part: ClockColumn) -> TextCells:
+def _text_cells(table: pa.Table, layout: TextTable, part: ClockColumn) -> TextCells:
     """Return the cells of a parsed column of bytes: offsets of 32 bits, and the bytes between them."""
     cells = table.column(str(part.column)).combine_chunks(pa.system_memory_pool())
     _, offsets, content = cells.buffers()
@@ -277,7 +354,7 @@ def _missing(chunk: pa.Array) -> NDArray[np.bool_]:
     return missing
 
 
-def _scale(layout: Layout, part: ClockColumn, exact: bool) -> int:
+def _scale(layout: TextTable, part: ClockColumn, exact: bool) -> int:
     """Return how many decimals of the clock are read.
 
     As many as reach [ns] if the sampled cells have no more: then the parsed integers are [ns]. Else as
@@ -303,17 +380,11 @@ MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is miss
 """What a cell of a log may hold."""
 
 
-def lines_of_rows(layout: Layout, rows: Sequence[int]) -> dict[int, int]:
-    """Return the line of the file of some data rows, both counted from 1; none of a table in memory."""
-    if layout.held is not None:
-        return {}
-    numbered = enumerate(data_lines(layout, layout.segment.lines()), start=1)
-    wanted = set(rows)
-    return {row: line for row, (line, _) in islice(numbered, max(rows, default=0)) if row in wanted}
-
-
-def data_lines(layout: Layout, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+def data_lines(
+    layout: TextTable, lines: Iterable[tuple[int, str]] | None = None
+) -> Iterator[tuple[int, str]]:
     """Yield number and text of each line with a data row, not of blank lines and comments."""
+    lines = layout.segment.lines() if lines is None else lines
     lines = (line for line in lines if line[0] >= layout.first_line)
     for number, line in lines if layout.form is None else layout.form.rows(lines):
         text = line.strip()
@@ -323,15 +394,16 @@ def data_lines(layout: Layout, lines: Iterable[tuple[int, str]]) -> Iterator[tup
             yield number, row
 
 
-def first_left_out(layout: Layout) -> tuple[int, str]:
+def first_left_out(layout: LogTable) -> tuple[int, str]:
     """Return number and beginning of the first line among labelled rows that is none."""
+    assert isinstance(layout, TextTable)
     form, lines = layout.form, layout.segment.lines()
     others = ((n, text) for n, text in lines if n >= layout.first_line and text.strip())
     number, text = next((n, text) for n, text in others if form is not None and not form.is_row(text))
     return number, _shown(text)
 
 
-def cut_cell(layout: Layout) -> str | None:
+def cut_cell(layout: TextTable) -> str | None:
     """Return the last cell of a file if it is cut: no line end is behind it, and it lacks decimals."""
     segment, usual = layout.segment, layout.cells(len(layout.names) - 1)
     if layout.form is not None or layout.across or len(usual) < _FIXED_ROWS:
@@ -378,7 +450,7 @@ class RowReader:
 
     def __init__(
         self,
-        layout: Layout,
+        layout: TextTable,
         columns: Sequence[int],
         clock: Sequence[ClockColumn],
         allowed: Mapping[int, str] | None = None,
@@ -522,7 +594,7 @@ class RowReader:
         layout = self.layout
         cut = cut_cell(layout) if len(layout.names) - 1 in self._wanted else None
         if cut is not None and not self.ended and self._is_read():
-            self._line = lines_of_rows(layout, [self._row])[self._row]
+            self._line = layout.lines_of([self._row])[self._row]
             self._report(f"found {cut!r} where the file ends, allowed: as many decimals as in the other rows")
 
     def _time(self, cells: Sequence[str]) -> int:
@@ -567,3 +639,29 @@ class RowReader:
 def _shown(text: str) -> str:
     text = text.strip()
     return repr(text if len(text) <= _SHOWN_TEXT else text[: _SHOWN_TEXT - 3] + "...")
+
+
+READ_BY_ROW = 1 << 16
+"""Bytes that are read row by row together if there is something wrong in them."""
+
+
+def _times(part: Numbers) -> IntArray:
+    """Return the times of a part; none yet where they are text, which is read of all parts at once."""
+    return np.zeros(len(part.values), dtype=np.int64) if part.clock is None else part.clock
+
+
+def _parts(reader: RowReader, block: bytes, scales: Scales) -> Iterator[Numbers]:
+    """Yield the numbers of some whole rows: of all at once, or of either half."""
+    layout = reader.layout
+    newline = layout.segment.newline
+    numbers = None if reader.ended else parse_block(layout, reader.columns, reader.clock, block, scales)
+    if numbers is not None:
+        signs = np.frombuffer(block, dtype=np.uint8)
+        reader.pass_over(len(numbers.values), int(np.count_nonzero(signs == ord(newline))))
+        yield numbers
+    elif len(block) > READ_BY_ROW and (end := end_of_rows(block[: len(block) // 2], layout)):
+        for half in (block[:end], block[end:]):
+            yield from _parts(reader, half, scales)
+    else:
+        text = block.decode(byte_encoding(layout), errors="surrogateescape")
+        yield reader.read(text.removesuffix(newline).split(newline))
