@@ -204,9 +204,7 @@ def _roles(
     if not given and (signals := joints_of_blocks(columns, main, robot)) is not None:
         return signals
     if main.header is None and not several:
-        return without_header(
-            columns, tables.layouts, options, robot, tables.layouts, path=options.source == PATH
-        )
+        return without_header(columns, tables.layouts, options, robot, path=options.source == PATH)
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
     if plots is not None:
         return _plots(*plots, tables)

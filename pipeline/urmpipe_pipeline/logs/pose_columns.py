@@ -233,6 +233,11 @@ def trailing_quaternion(
     """Return the pose in the last seven columns without names, if four of length 1 follow three others."""
     if len(columns) < 7 or not _is_unit(columns[-4:], layouts, some=some):
         return None
+    return quaternion_pose(columns)
+
+
+def quaternion_pose(columns: Sequence[Column]) -> Pose:
+    """Return the last seven columns as a position and a quaternion, whose order nothing tells."""
     evidence = "the last four of seven numbers have length 1"
     return Pose(tuple(columns[-7:-4]), tuple(columns[-4:]), ("quat_xyzw", "quat_wxyz"), evidence)
 
