@@ -49,7 +49,7 @@ from urmpipe_pipeline.logs.pose_columns import (
     transform_pose,
     with_form,
 )
-from urmpipe_pipeline.logs.rates import SURE, proved_blocks
+from urmpipe_pipeline.logs.rates import MOST_JOINTS, SURE, proved_blocks
 from urmpipe_pipeline.logs.roles import (
     GIVEN,
     Roles,
@@ -333,7 +333,7 @@ def _groups(free: Sequence[Column], unlike: BoolArray, count: int | None) -> lis
         if not is_unlike
     ]
     near = sorted(
-        (run for run in runs if 2 < len(run) < len(free) or len(run) == count), key=len, reverse=True
+        (run for run in runs if 2 < len(run) <= MOST_JOINTS or len(run) == count), key=len, reverse=True
     )
     if count:
         alike = [column for column, is_unlike in zip(free, unlike, strict=True) if not is_unlike]
