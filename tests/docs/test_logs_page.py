@@ -10,38 +10,30 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe.defaults import defaults_for
+from pages import snippets
+from urmpipe.main import run
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.logs import read_map
 from urmpipe_pipeline.runs.ingest import ingest_log
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
 
 
-def table() -> dict[str, tuple[str, str, str]]:
-    """Return what each kind means, error or warning, and what to do."""
-    lines = PAGE.split("\n## What is checked\n")[1].splitlines()
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
-    assert rows[0] == ["kind", "what it means", "", "what to do"]
-    found: dict[str, tuple[str, str, str]] = {}
-    for names, meaning, severity, remedy in rows[2:]:
-        for name in names.split(", "):
-            assert name.strip("`") not in found
-            found[name.strip("`")] = meaning, severity, remedy
-            assert (severity == "warning") == name.startswith("`")
-    return found
+def table(severity: str) -> dict[str, tuple[str, str]]:
+    """Return what each kind of error or warning means, and what to do."""
+    block = PAGE.split(f"| {severity} | meaning | what to do |\n")[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines()[1:]]
+    kinds = [(name.strip("`"), row[1:]) for row in rows for name in row[0].split(", ")]
+    assert len(dict(kinds)) == len(kinds)
+    return {kind: (meaning, remedy) for kind, (meaning, remedy) in kinds}
 
 
-ROWS = table()
-WARNINGS = {kind for kind, (_, severity, _) in ROWS.items() if severity == "warning"}
-ERRORS = {kind for kind, (_, severity, _) in ROWS.items() if severity == "error"}
+ERRORS, WARNINGS = table("error"), table("warning")
 
 
-def test_each_row_is_an_error_or_a_warning_and_says_what_to_do() -> None:
-    assert ROWS.keys() == WARNINGS | ERRORS
-    assert all(meaning and remedy for meaning, _, remedy in ROWS.values())
+def test_each_row_says_what_it_means_and_what_to_do() -> None:
+    assert all(meaning and remedy for meaning, remedy in (ERRORS | WARNINGS).values())
 
 
 def kinds(path: Path) -> Iterator[str]:
@@ -103,17 +95,16 @@ def test_each_row_of_a_warning_has_its_code(made: set[str]) -> None:
     assert [row for row in sorted(WARNINGS) if not any(fnmatch(row, kind) for kind in made)] == []
 
 
-def test_the_map_and_the_defaults_of_the_page_are_sound(tmp_path: Path) -> None:
-    lab, defaults = (block.split("```")[0] for block in PAGE.split("```toml\n")[1:])
-    (tmp_path / "lab.toml").write_text(lab, encoding="utf-8")
-    said = read_map(tmp_path / "lab.toml")
-    assert (said.robot, said.names, said.rotation) == ("ur5e", ("shoulder",), "zyx")
-    (tmp_path / "urmpipe.toml").write_text(defaults, encoding="utf-8")
-    names = ("ingest", "compare")
-    commands = {name: getattr(import_module(f"urmpipe.commands.{name}"), name) for name in names}
-    ingest, compare = (defaults_for(commands[name], tmp_path / "urmpipe.toml", commands) for name in names)
-    assert ingest == {"robot": "ur5e", "map": str(tmp_path / "maps/lab.toml")}
-    assert compare == {"robot": "ur5e", "tolerance": ["0.002"]}
+def test_the_map_and_the_question_of_the_page_are_what_explain_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    languages = {"cell.csv": "toml", "arms.csv": "text"}
+    for (name, language), log in zip(languages.items(), snippets("docs/logs.md", "csv"), strict=True):
+        Path(name).write_text(log, encoding="utf-8")
+        assert run(["ingest", name, "--explain"]) == (2 if language == "text" else 0)
+        (block,) = snippets("docs/logs.md", language)
+        assert capsys.readouterr().out.strip().endswith(block)
 
 
 SPECIMENS = {
@@ -136,7 +127,7 @@ SPECIMENS = {
 
 
 def test_each_error_of_the_table_has_a_specimen() -> None:
-    assert SPECIMENS.keys() == ERRORS
+    assert SPECIMENS.keys() == ERRORS.keys()
 
 
 @pytest.mark.parametrize("kind", SPECIMENS)

@@ -4,7 +4,7 @@
 - `map_of`: the map by which a log reads as it was read, with the evidence of each entry.
 - `format_map`: a map as TOML with the evidence as comments; a unit that is only assumed is a comment.
 
-docs/logs.md has an example: "Maps and defaults".
+docs/logs.md has an example: "The map".
 """
 
 from __future__ import annotations
