@@ -1,8 +1,8 @@
 """Which arrays of a file are one table: those of an episode, and of one length.
 
-A file of arrays (HDF5, MAT) has groups, or structs, of arrays. Arrays with as many rows as there are samples
-are the columns of one table. It imports nothing else, so that a separate process that reads a file starts
-quickly.
+A file of arrays (HDF5, MAT, NumPy, JSON) has groups, or structs, of arrays. Arrays with as many rows as there
+are samples are the columns of one table. This module imports nothing else, so that a separate process that
+reads a file starts quickly.
 
 1. Episodes are groups whose names differ by a number and that contain the same arrays: `data/demo_0`,
    `data/demo_1`. If their arrays have one length, they are episodes only if they are named so: else
@@ -14,18 +14,17 @@ quickly.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-Name = tuple[str, ...]
-"""The groups that contain an array, from the outermost, and its own name."""
-
+Name = tuple[str, ...]  # the groups that contain an array, from the outermost, and its name
 Shapes = Mapping[Name, tuple[int, ...]]
 
 OPAQUE = "opaque"  # first entry of the pair in the place of an object, with the name of its class
 EPISODES = re.compile("demo|demonstration|ep|episode|rollout|run|seq|sequence|take|traj|trajectory|trial")
 SHORT = 16  # rows of parameters: limits, gains, a matrix of a tool
 WIDE = 3  # a matrix of a MAT file this many times wider than high has one column per sample
+MAX_NAMES = 4  # arrays that a choice lists
 
 
 class Choice(NamedTuple):
@@ -73,30 +72,30 @@ def choose_arrays(
         chosen = pick_episode(groups, episode)
         chosen = next(iter(groups)) if episode is None and len(groups) == 1 else chosen
         if chosen is None:
-            inside: dict[Name, dict[Name, tuple[int, ...]]] = {name: {} for name in groups.values()}
+            inside: dict[Name, dict[Name, tuple[int, ...]]] = {path: {} for path in groups.values()}
             depth = len(next(iter(inside)))
             for name, shape in shapes.items():
                 inside.get(name[:depth], {})[name] = shape
-            arrays = {name: length_of(inside[path], path, by_rows) for name, path in groups.items()}
-            rows_of = ((name, max(lengths.values(), default=0)) for name, lengths in arrays.items())
-            return Question("episode", episode, tuple((name, f"its {rows} rows") for name, rows in rows_of))
+            rows_of = ((name, _row_counts(inside[path], by_rows)) for name, path in groups.items())
+            choices = ((name, f"its {max(rows.values(), default=0)} rows") for name, rows in rows_of)
+            return Question("episode", episode, tuple(choices))
         group, applied = groups[chosen], ("episode",) if episode else ()
         inner = {name: shape for name, shape in shapes.items() if name[: len(group)] == group}
-    lengths = length_of(inner, group, by_rows)
-    long = {name: rows for name, rows in lengths.items() if rows > SHORT} or lengths
+    counts = _row_counts(inner, by_rows)
+    long = {name: rows for name, rows in counts.items() if rows > SHORT} or counts
     if len(set(long.values())) > 1:
         rows = {
-            length
-            for name, length in long.items()
+            count
+            for name, count in long.items()
             if topic is not None and f"{separator.join(name)}{separator}".startswith(topic + separator)
         }
         if len(rows) != 1:
-            return Question("topic", topic, tuple(_iter_topics(long, separator)))
+            lengths = sorted(set(long.values()), reverse=True)
+            return Question("topic", topic, tuple(_describe_topic(long, n, separator) for n in lengths))
         long, applied = {name: n for name, n in long.items() if n in rows}, (*applied, "topic")
     count = next(iter(long.values()), 0)
-    names = tuple(name for name, length in lengths.items() if length == count)
-    left_out = tuple(name for name in inner if name not in names)
-    return Choice(group, count, names, applied, left_out)
+    names = tuple(name for name, rows in counts.items() if rows == count)
+    return Choice(group, count, names, applied, tuple(name for name in inner if name not in names))
 
 
 def find_episodes(shapes: Shapes) -> dict[str, Name]:
@@ -113,9 +112,8 @@ def find_episodes(shapes: Shapes) -> dict[str, Name]:
         shared = set.intersection(*(set(arrays) for arrays in members.values()))
         lengths = {tuple(arrays[name] for name in sorted(shared)) for arrays in members.values()}
         if shared and (named or len(lengths) > 1):
-            return {
-                name: (*outer, name) for name in sorted(members, key=lambda name: (int(_number(name)), name))
-            }
+            in_order = sorted(members, key=lambda name: (int(_number(name)), name))
+            return {name: (*outer, name) for name in in_order}
     return {}
 
 
@@ -130,38 +128,37 @@ def _number(name: str) -> str:
     return re.findall(r"\d+", name)[-1].lstrip("0") or "0"
 
 
-def length_of(shapes: Shapes, group: Name, by_rows: bool) -> dict[Name, int]:
-    """Return the number of rows of each vector and matrix of a group that has more than one."""
-    inside = {name: shape for name, shape in shapes.items() if name[: len(group)] == group}
-    vectors = {max(shape) for shape in inside.values() if is_vector(shape)}
-    chosen = {}
-    for name, shape in inside.items():
-        if is_vector(shape):
+def _row_counts(shapes: Shapes, by_rows: bool) -> dict[Name, int]:
+    """Return the number of rows of each vector and matrix that has more than one.
+
+    A matrix has as many rows as a vector that is as long as one of its sides, but for a short one that may
+    be a parameter.
+    """
+    vectors = {max(shape) for shape in shapes.values() if _is_vector(shape)}
+    counts = {}
+    for name, shape in shapes.items():
+        if _is_vector(shape):
             rows = max(shape)
         elif len(shape) == 2:
             high, wide = shape
-            sides = [side for side in shape if side in vectors and side > SHORT] or [
-                wide if not by_rows and wide >= WIDE * high else high
-            ]
-            rows = sides[0]
+            sides = [side for side in shape if side in vectors and (side > SHORT or side == max(shape))]
+            rows = (sides or [wide if not by_rows and wide >= WIDE * high else high])[0]
         else:
             continue
         if rows > 1:
-            chosen[name] = rows
-    return chosen
+            counts[name] = rows
+    return counts
 
 
-def is_vector(shape: tuple[int, ...]) -> bool:
+def _is_vector(shape: tuple[int, ...]) -> bool:
     """Return whether an array has one column: (n,), (n, 1) or (1, n)."""
     return len(shape) == 1 or (len(shape) == 2 and 1 in shape)
 
 
-def _iter_topics(lengths: Mapping[Name, int], separator: str) -> Iterator[tuple[str, str]]:
-    """Yield for each length the name of a group, else of an array, that only it has, and what it reads."""
-    for count in sorted(set(lengths.values()), reverse=True):
-        names = [name for name, rows in lengths.items() if rows == count]
-        groups = [names[0][:depth] for depth in range(1, len(names[0]))]
-        unique = [g for g in groups if all(n == count for name, n in lengths.items() if name[: len(g)] == g)]
-        value = separator.join((unique or names)[0])
-        shown = ", ".join(separator.join(name) for name in names[:4]) + ", ..." * (len(names) > 4)
-        yield value, f"{count} rows: {shown}"
+def _describe_topic(counts: Mapping[Name, int], count: int, separator: str) -> tuple[str, str]:
+    """Return a group, else an array, that only arrays of this length have, and what it reads."""
+    names = [name for name, rows in counts.items() if rows == count]
+    groups = [names[0][:depth] for depth in range(1, len(names[0]))]
+    unique = [g for g in groups if all(n == count for name, n in counts.items() if name[: len(g)] == g)]
+    shown = ", ".join(separator.join(name) for name in names[:MAX_NAMES]) + ", ..." * (len(names) > MAX_NAMES)
+    return separator.join((unique or names)[0]), f"{count} rows: {shown}"

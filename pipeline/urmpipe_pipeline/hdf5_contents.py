@@ -1,4 +1,4 @@
-"""The contents of an HDF5 file, for `subprocess_reader`: variables of MATLAB or Octave, or datasets.
+"""The contents of an HDF5 file, for `file_contents`: variables of MATLAB or Octave, or datasets.
 
 - MATLAB (MAT 7.3): a variable is a dataset or a group with the attribute `MATLAB_class`. Arrays are stored by
   columns, so their axes are reversed; cells, and fields of arrays of structs, are references.
@@ -53,25 +53,22 @@ class Contents(NamedTuple):
     size: int = 0
 
 
-def read_through(path: str, most: str, episode: str, topic: str) -> tuple[Contents, str]:
-    """Return the contents of a file, or why there are none.
+def read_contents(path: str, most: int, episode: str | None, topic: str | None) -> Contents:
+    """Return the contents of a file.
 
     Args:
         path: The file.
         most: The bytes that its arrays may unpack to.
-        episode: The episode to read; empty: the only one.
-        topic: The array or group to read; empty: the only length.
+        episode: The episode to read; None: the only one.
+        topic: The array or group to read; None: the only length.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            members = [file[name] for name in file if isinstance(file.get(name, getlink=True), h5py.HardLink)]
-            if any("MATLAB_class" in item.attrs for item in members):
-                return _read_variables(file, int(most), _of_matlab), ""
-            if members and all("OCTAVE_NEW_FORMAT" in item.attrs for item in members):
-                return _read_variables(file, int(most), _of_octave), ""
-            return _read_datasets(file, int(most), episode or None, topic or None), ""
-    except Exception as error:  # of damaged bytes h5py raises many kinds
-        return Contents(), str(error).partition("\n")[0].strip(" .") or type(error).__name__
+    with h5py.File(path, "r") as file:
+        members = [file[name] for name in file if isinstance(file.get(name, getlink=True), h5py.HardLink)]
+        if any("MATLAB_class" in item.attrs for item in members):
+            return _read_variables(file, most, _of_matlab)
+        if members and all("OCTAVE_NEW_FORMAT" in item.attrs for item in members):
+            return _read_variables(file, most, _of_octave)
+        return _read_datasets(file, most, episode, topic)
 
 
 def _walk(group: Any) -> Iterator[tuple[Name, Any]]:

@@ -23,11 +23,11 @@ from urmpipe_pipeline.joint_log import JointLog, LogWarning, SourceFile
 from urmpipe_pipeline.logs.clock import even_clock, find_clocks, named_file
 from urmpipe_pipeline.logs.columns import Column, columns_of, find_column, given_units, lacks_columns
 from urmpipe_pipeline.logs.convert import Content, assemble, read_content, recorded
+from urmpipe_pipeline.logs.formats.files import unchanged
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, fingerprint_of
 from urmpipe_pipeline.logs.formats.opening import Tables, open_tables
 from urmpipe_pipeline.logs.formats.own import roles_of
 from urmpipe_pipeline.logs.formats.parquet import episode_file, is_data_set
-from urmpipe_pipeline.logs.formats.reachable import unchanged
 from urmpipe_pipeline.logs.formats.text import fingerprint
 from urmpipe_pipeline.logs.log_map import READING, LogMap
 from urmpipe_pipeline.logs.map_file import shown_entries

@@ -22,10 +22,10 @@ from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.logs.clock import named_file
 from urmpipe_pipeline.logs.columns import Column, columns_of, listed, unit_inference
 from urmpipe_pipeline.logs.formats.cells import DECIMALS, DELIMITERS, count_up, is_number, split_line
+from urmpipe_pipeline.logs.formats.files import unchanged
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.numbers import RowFault
 from urmpipe_pipeline.logs.formats.opening import PATH, open_tables
-from urmpipe_pipeline.logs.formats.reachable import unchanged
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import COMMENTS, HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable

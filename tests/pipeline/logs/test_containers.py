@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import re
-import shlex
 import struct
 import subprocess
 import sys
@@ -19,8 +18,9 @@ import pandas as pd
 import pytest
 
 from asserting import refusal
-from urmpipe_models.errors import LogError, python_command
+from urmpipe_models.errors import LogError
 from urmpipe_pipeline.logs import LogMap, read_log
+from urmpipe_pipeline.logs.log_map import read_options
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 Write = Callable[[Path], object]
@@ -135,21 +135,16 @@ def test_numpy_files_are_read(tmp_path: Path) -> None:
         assert (log.period, log.rows) == (0.01, ROWS)
 
 
-def test_arrays_of_different_lengths(tmp_path: Path) -> None:
-    """Demonstrations in one archive: the command keeps the first of them."""
-    path = tmp_path / "it's $HOME.npz"
-    parts = {"demo_0/q": Q, "demo_0/t": T, "demo_1/q": Q[:9], "demo_1/t": T[:9]}
-    np.savez(path, **parts)
-    command = python_command(
-        f"import numpy; f = numpy.load({str(path)!r}); numpy.savez('log.npz',"
-        " **{k: f[k] for k in f if k.startswith('demo_0/')})"
-    )
-    assert refusal(LogError, read_log, [path]) == (
-        f"{path}: found demo_0/q (60, 6), demo_0/t (60,), demo_1/q (9, 6), demo_1/t (9,), allowed: arrays"
-        f" of one length; to keep those of one length: {command}"
-    )
-    subprocess.run([sys.executable, *shlex.split(command)[1:]], cwd=tmp_path, check=True)
-    np.testing.assert_array_equal(read_log([tmp_path / "log.npz"]).q, Q)
+def test_numpy_arrays_of_several_episodes_and_lengths_are_questions(tmp_path: Path) -> None:
+    demos = {"demo_0/q": Q, "demo_0/t": T, "demo_1/q": Q[:40], "demo_1/t": T[:40]}
+    for arrays in (demos, {"q": Q, "t": T, "force": Q[:40, :3], "limits": Q[:6]}):
+        np.savez(tmp_path / "log.npz", **arrays)
+        with pytest.raises(LogError) as caught:
+            read_log([tmp_path / "log.npz"])
+        hint = caught.value.findings[0].hints[0]
+        assert str(hint) == ("--episode demo_0" if arrays is demos else "--topic q")
+        log = read_log([tmp_path / "log.npz"], read_options({hint.parameter: hint.value}))
+        np.testing.assert_array_equal(log.q, Q)
 
 
 @pytest.mark.parametrize("name", ["a.npy", "a.npz"])

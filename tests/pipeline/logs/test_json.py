@@ -92,7 +92,7 @@ def test_a_damaged_line_is_a_row(write: Write) -> None:
         ('{"robot": "ur5e"}', ": found JSON without an array of numbers, allowed: an array of objects, or"),
         (
             json.dumps({"a": {"t": T.tolist()}, "b": {"t": T[:40].tolist()}}),
-            ": found arrays such as b/t (40), a/t (60), allowed: ",
+            ": found arrays of 2 lengths: a, b, allowed: one; --topic a reads 60 rows: a/t; --topic b ",
         ),
     ],
 )

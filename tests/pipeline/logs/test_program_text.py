@@ -14,7 +14,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.formats.programs.program_text import read_program
+from urmpipe_pipeline.logs.formats.programs import read_program
 from urmpipe_pipeline.logs.formats.text import open_text
 from urmpipe_pipeline.logs.targets import read_pose_table
 

@@ -11,8 +11,8 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.logs import read_log
-from urmpipe_pipeline.logs.formats import reachable
-from urmpipe_pipeline.logs.formats.reachable import unchanged
+from urmpipe_pipeline.logs.formats import files
+from urmpipe_pipeline.logs.formats.files import unchanged
 
 LOG = b"t,q1\n" + b"".join(b"%.2f,%.4f\n" % (0.01 * k, 0.001 * k) for k in range(30))
 KEPT = "allowed: a file, which can be read more than once"
@@ -37,7 +37,7 @@ def test_a_pipe_of_a_shell_is_read() -> None:
 def test_a_pipe_that_brings_nothing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(reachable, "WAITS_S", (0.02, 0.02))
+    monkeypatch.setattr(files, "PIPE_TIMEOUTS", (0.02, 0.02))
     read, write = os.pipe()
     try:
         said = refusal(LogError, read_log, [Path(f"/dev/fd/{read}")])
@@ -49,7 +49,7 @@ def test_a_pipe_that_brings_nothing(
 
 
 def test_a_pipe_that_brings_too_much(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reachable, "MOST_PIPED", 100)
+    monkeypatch.setattr(files, "MAX_PIPED", 100)
     read, write = os.pipe()
     try:
         os.write(write, LOG)

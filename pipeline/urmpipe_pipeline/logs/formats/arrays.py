@@ -1,10 +1,9 @@
-"""Arrays of NumPy as columns of an Arrow table.
+"""Arrays as tables: those of a file by name, of a NumPy file, and those that Python code gives.
 
-NumPy files: a table of two dimensions, or arrays of one length by name.
-
-Arrays of a file as a table in memory: names of columns, a clock of even times, what the user chooses.
-
-Arrays in Python as a table in memory: times, joint values and a recorded tool centre point.
+1. `make_array_table`: the arrays of one length of a file (`array_choice` tells which) as columns.
+   `read_numpy` loads them from .npy and .npz; `matlab` has those of MAT and HDF5 files.
+2. `find_even_times`: the clock of a single number that is named like the time between samples.
+3. `arrays_to_table`: times, joint values and a recorded tool centre point of Python code.
 """
 
 from __future__ import annotations
@@ -13,8 +12,7 @@ import math
 import re
 import struct
 import zlib
-from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
 from tokenize import TokenError
@@ -22,7 +20,6 @@ from typing import IO, Any, NoReturn, TypeAlias
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 from numpy.typing import NDArray
 
@@ -37,133 +34,221 @@ from urmpipe_models.errors import (
     map_collecting_errors,
     python_command,
 )
-from urmpipe_pipeline.array_choice import Choice, Name, Question
+from urmpipe_pipeline.array_choice import Choice, Name, Question, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.logs.formats.form import spread_names
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import ROLE, UNIT, arrow_column
 from urmpipe_pipeline.logs.formats.own import FORM, GIVEN
 from urmpipe_pipeline.logs.formats.parquet import is_table
 from urmpipe_pipeline.logs.formats.text import refuse_unpacked, refuse_wide
+from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
 
+MAX_LISTED = 9  # choices of a question, or arrays that are not read, in a message
+MAX_JOINT_ROWS = 16  # rows of an array without others that may have its joints as rows, if it is wider
+
+Array: TypeAlias = NDArray[Any]
+ArrayColumn: TypeAlias = tuple[Name, str, Array]  # groups and name, unit or "", values of shape (n,)
+
+_NUMBERED = re.compile(r"\[\d+\]$")
+_IN_ORDER = re.compile(r"(arr_\d+)?")  # the names of numpy.savez(file, t, q)
 _NPY = b"\x93NUMPY"
-_IN_ORDER = re.compile(r"(arr_\d+)?")
-ROWS = 16
-"""An array alone with so few rows, and more columns, may have joints as rows."""
-
-_SHOWN = 6
-"""Arrays that are named where their lengths differ."""
-
-_DAMAGED = (
-    OSError,
-    ValueError,
-    TypeError,
-    EOFError,
-    BadZipFile,
-    NotImplementedError,
-    RuntimeError,
-    zlib.error,
-    SyntaxError,
-    TokenError,
-    OverflowError,
-    struct.error,
+_DAMAGED = (  # what NumPy and zipfile raise for damaged files
+    *(OSError, ValueError, TypeError, EOFError, BadZipFile, NotImplementedError, RuntimeError, zlib.error),
+    *(SyntaxError, TokenError, OverflowError, struct.error),
 )
-"""What NumPy and zipfile raise of files that are damaged, or packed as Python does not unpack them."""
 
-Array: TypeAlias = npt.NDArray[Any]
+# Arrays of a file
 
 
-def read_numpy(path: Path) -> MemoryTable:
+def make_array_table(
+    path: Path,
+    choice: Choice,
+    columns: Iterable[ArrayColumn],
+    scalars: Mapping[str, float],
+    separator: str,
+    not_read: Sequence[str] = (),
+    *,
+    is_named: bool | None = None,
+) -> MemoryTable:
+    """Return the columns of some arrays as a table.
+
+    A column is called by its groups, without those that all columns share. A clock is called by its name
+    alone, if no other one is called so.
+
+    Args:
+        path: The file.
+        choice: Which arrays of the file they are.
+        columns: The columns.
+        scalars: Single numbers of the file, of which one may be the time between samples.
+        separator: Sign between groups in names.
+        not_read: The other arrays of the file, as a message lists them.
+        is_named: Whether the columns have names; None: unless all are entries of one array.
+    """
+    columns = list(columns)
+    refuse_wide(len(columns), str(path))
+    shared = 0
+    if "topic" not in choice.applied:
+        groups = zip(*(name[:-1] for name, _, _ in columns), strict=False)
+        shared = sum(1 for _ in takewhile(lambda same: len(set(same)) == 1, groups))
+    clocks = {k: values for k, (name, _, values) in enumerate(columns) if has_clock(name[-1:])}
+    first = next(iter(clocks.values()), None)
+    same = [k for k, values in clocks.items() if first is not None and np.array_equal(values, first)]
+    is_unique = len(same) == len(clocks)
+    named: dict[str, tuple[str, Array]] = {}
+    for k, (name, unit, values) in enumerate(columns):
+        if is_unique and k in same[1:]:
+            continue
+        label = name[-1] if is_unique and k in same else separator.join(name[shared:])
+        named[label if label not in named else separator.join(name)] = unit, values
+    times, reasons = find_even_times(scalars, named, choice.rows) if is_named is not False else ({}, [])
+    named = {name: ("", values) for name, values in times.items()} | named
+    fields, arrays = [], []
+    for column, (unit, values) in named.items():
+        arrays.append(pa.array(values.tolist()) if values.dtype == object else arrow_column(values))
+        fields.append(pa.field(column, arrays[-1].type, metadata={UNIT: unit} if unit else None))
+    if not_read:
+        more = f" and {len(not_read) - MAX_LISTED} more" if len(not_read) > MAX_LISTED else ""
+        rows = f"they have no column of {choice.rows} rows"
+        reasons.append(Inference("arrays", f"{', '.join(not_read[:MAX_LISTED])}{more} are not read", rows))
+    if is_named is None:
+        patterns = vocabulary().joint["position"]
+        is_named = len(choice.names) > 1 or not all(map(_NUMBERED.search, named))
+        is_named = is_named or any(pattern.search(key([*named][-1])) for pattern in patterns)
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+    return MemoryTable(path.stem, table, is_named, path, tuple(reasons), choice.applied)
+
+
+def spread_array(name: Name, values: Array, rows: int) -> Iterator[ArrayColumn]:
+    """Yield the columns of an array with samples along one of its axes: NAME, or NAME_1, NAME_2, ..."""
+    matrix = (values if len(values) == rows else values.T).reshape(rows, -1)
+    count = matrix.shape[1]
+    labels = spread_names([name[-1]], [count if count > 1 or not name[-1] else 0])
+    for label, column in zip(labels, matrix.T, strict=True):
+        yield (*name[:-1], label if name[-1] else label[1:]), "", np.ascontiguousarray(column)
+
+
+def ask_for_arrays(path: Path, question: Question) -> NoReturn:
+    """Raise the question which episode, or which arrays of one length, are read."""
+    values = [value for value, _ in question.choices]
+    shown = ", ".join(values[:MAX_LISTED]) + ", ..." * (len(values) > MAX_LISTED)
+    parts = f"{len(values)} episodes" if question.option == "episode" else f"arrays of {len(values)} lengths"
+    if question.requested is not None:
+        parts = f"no {question.option} {question.requested} among {parts}"
+    hints = (Hint(question.option, value, f"reads {rows}") for value, rows in question.choices[:MAX_LISTED])
+    raise LogError(Finding(file=str(path), found=f"{parts}: {shown}", allowed="one", hints=tuple(hints)))
+
+
+# The clock of a number
+
+
+def has_clock(names: Iterable[str]) -> bool:
+    """Return whether a column is named like a time."""
+    return any(pattern.search(key(split_unit(name)[0])) for name in names for pattern in vocabulary().time)
+
+
+def is_period(name: str) -> bool:
+    """Return whether a number is named like the time between samples."""
+    return any(pattern.search(key(name)) for pattern in vocabulary().period)
+
+
+def times_of_period(period: float, rows: int, evidence: str) -> tuple[dict[str, Array], Inference]:
+    """Return the column of even times in [ns], shape (rows,), of a time between samples in [s]."""
+    times = np.rint(np.arange(rows) * (period * 1e9)).astype(np.int64)
+    return {"t [ns]": times}, Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),))
+
+
+def find_even_times(
+    scalars: Mapping[str, float], names: Iterable[str], rows: int
+) -> tuple[dict[str, Array], list[Inference]]:
+    """Return the times of the only number that is a time between samples, if no column is named like a time.
+
+    A number of more than 0.05 may be in ms: it is not taken.
+    """
+    periods = [
+        (name, value) for name, value in scalars.items() if 0.0 < value <= SURELY_SECONDS and is_period(name)
+    ]
+    if len(periods) != 1 or has_clock(names):
+        return {}, []
+    ((name, period),) = periods
+    times, inference = times_of_period(period, rows, f"{name} = {period:g} in the file")
+    return times, [inference]
+
+
+# NumPy files
+
+
+def read_numpy(path: Path, options: LogMap) -> MemoryTable:
     """Return the table of a .npy or .npz file. Objects are not loaded: that would run code of the file.
 
     Raises:
-        LogError: If the file is damaged, holds no table, or arrays of different lengths.
+        LogError: If the file is damaged or has no table; with a question if it has several episodes, or
+            arrays of several lengths.
     """
     try:
-        arrays = dict(_arrays(path))
+        stored = dict(_iter_stored(path))
     except _DAMAGED as error:
         reason = (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
         raise LogError(Finding(f"cannot be read: {reason}", file=str(path))) from None
-    tables = {name: array for name, array in arrays.items() if array is not None and _is_table(array)}
-    if not tables:
-        raise LogError(_no_table(path, arrays))
-    tables = _upright(tables)
-    _refuse_lengths(path, tables)
-    in_order = all(_IN_ORDER.fullmatch(name) for name in tables)  # of numpy.savez(file, t, q)
-    wide = [array for array in tables.values() if array.ndim == 2 and len(array) <= ROWS < array.shape[1]]
-    in_order = in_order or len(tables) == len(wide) == 1  # joints as rows, which are asked about
-    named = not in_order or bool(tables.get("", np.empty(0)).dtype.names)
-    values = dict(_columns(tables))
-    single = {name: float(one.item()) for name, one in arrays.items() if one is not None and _is_number(one)}
-    times, said = even_times(single, values) if named else ({}, ())
-    columns = pa.table({name: arrow_column(one) for name, one in (times | values).items()})
-    return MemoryTable(path.stem, columns, named=named, path=path, inferences=said)
-
-
-def even_times(
-    single: Mapping[str, float], columns: Mapping[str, Array]
-) -> tuple[dict[str, Array], tuple[Inference, ...]]:
-    """Return the times that a single number between samples gives, if no column is named like a time.
-
-    One of more than 0.05 may be in ms: it says nothing.
-    """
-    words = vocabulary()
-    if any(pattern.search(key(split_unit(name)[0])) for name in columns for pattern in words.time):
-        return {}, ()
-    periods = {
-        name: value
-        for name, value in single.items()
-        if 0.0 < value <= SURELY_SECONDS and any(pattern.search(key(name)) for pattern in words.period)
+    arrays = dict[Name, Array]()
+    for name, array in stored.items():
+        place = tuple(name.split("/"))
+        if array is not None and array.dtype.names:
+            arrays |= {(*place[:-1], field): array[field] for field in array.dtype.names}
+        elif array is not None:
+            arrays[place] = array
+    tables = {
+        name: array
+        for name, array in arrays.items()
+        if array.dtype.kind in "biufmM" and array.ndim in (1, 2) and array.size > 1
     }
-    if len(periods) != 1:
-        return {}, ()
-    ((name, period),) = periods.items()
-    rows = len(next(iter(columns.values())))
-    times = np.rint(np.arange(rows) * (period * 1e9)).astype(np.int64)
-    said = Inference("period", f"{period:g} s", f"{name} = {period:g} in the file", hints=(Hint("period"),))
-    return {"t [ns]": times}, (said,)
-
-
-def _is_number(array: Array) -> bool:
-    return array.size == 1 and array.dtype.kind in "uif"
-
-
-def _upright(tables: Mapping[str, Array]) -> dict[str, Array]:
-    """Return arrays with a row a sample: joints as rows are turned where an array of one dimension tells."""
-    alone = {len(array) for array in tables.values() if array.ndim == 1}
-    rows = alone.pop() if len(alone) == 1 else None
-    return {
-        name: array.T if array.ndim == 2 and len(array) != rows == array.shape[1] else array
-        for name, array in tables.items()
+    shapes = {name: array.shape for name, array in tables.items()}
+    choice = choose_arrays(shapes, options.episode, options.topic, separator="/", by_rows=True)
+    if isinstance(choice, Question):
+        ask_for_arrays(path, choice)
+    if not choice.names:
+        raise LogError(_describe_no_table(path, stored))
+    in_order = all(len(name) == 1 and _IN_ORDER.fullmatch(name[0]) for name in tables)
+    wide = [a for a in tables.values() if a.ndim == 2 and len(a) <= MAX_JOINT_ROWS < a.shape[1]]
+    is_named = not in_order and not len(tables) == len(wide) == 1  # joints as rows are asked about
+    depth = len(choice.group)
+    spread = (spread_array(name[depth:], tables[name], choice.rows) for name in choice.names)
+    scalars = {
+        "/".join(name): float(array.item())
+        for name, array in arrays.items()
+        if array.size == 1 and array.dtype.kind in "uif"
     }
+    left_out = [f"{'/'.join(name)} {tables[name].shape}" for name in choice.left_out]
+    columns = (column for part in spread for column in part)
+    return make_array_table(path, choice, columns, scalars, "/", left_out, is_named=is_named)
 
 
-def _arrays(path: Path) -> Iterator[tuple[str, Array | None]]:
-    """Yield the arrays of a file by name, without one if it is no archive; None of one of objects."""
+def _iter_stored(path: Path) -> Iterator[tuple[str, Array | None]]:
+    """Yield the arrays of a file by name, "" if it is no archive; None instead of an array of objects."""
     with path.open("rb") as file:
         if file.read(len(_NPY)) == _NPY:
             file.seek(0)
-            yield "", _array(file, file, path.stat().st_size)
+            yield "", _read_array(file, file, path.stat().st_size)
             return
     with ZipFile(path) as archive:
         members = archive.infolist()
         refuse_wide(len(members), str(path))
-        refuse_unpacked(path, sum(one.file_size for one in members))
-        for one in members:
-            with archive.open(one) as header, archive.open(one) as data:
-                yield one.filename.removesuffix(".npy"), _array(header, data, one.file_size)
+        refuse_unpacked(path, sum(member.file_size for member in members))
+        for member in members:
+            with archive.open(member) as header, archive.open(member) as data:
+                yield member.filename.removesuffix(".npy"), _read_array(header, data, member.file_size)
 
 
-def _array(header: IO[bytes], data: IO[bytes], size: int) -> Array | None:
-    """Return an array, its header read before from the same bytes of some size; None of one of objects.
+def _read_array(header: IO[bytes], data: IO[bytes], size: int) -> Array | None:
+    """Return an array whose header is read first, from the same bytes; None of one of objects.
 
     Raises:
-        ValueError: If the header tells of more numbers than the bytes can hold.
+        ValueError: If the header states more numbers than the bytes can hold.
     """
     version = np.lib.format.read_magic(header)
-    read_header = (
-        np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    )
+    is_old = version == (1, 0)
+    read_header = np.lib.format.read_array_header_1_0 if is_old else np.lib.format.read_array_header_2_0
     shape, _, kind = read_header(header)
     if kind.hasobject:
         return None
@@ -174,166 +259,27 @@ def _array(header: IO[bytes], data: IO[bytes], size: int) -> Array | None:
     return np.asarray(np.lib.format.read_array(data, allow_pickle=False))
 
 
-def _no_table(path: Path, arrays: Mapping[str, Array | None]) -> Finding:
-    """Return what is said of a file without a table; of one of Python's objects with a command."""
+def _describe_no_table(path: Path, arrays: Mapping[str, Array | None]) -> Finding:
+    """Return the finding about a file without a table; about a Python object with a command."""
     shapes = (f"{name or 'an array'} {array.shape}" for name, array in arrays.items() if array is not None)
     if (shown := ", ".join(shapes)) or "" not in arrays:
         allowed = "numbers in one or two dimensions, one row per sample"
         return Finding(file=str(path), found=shown or "no array of numbers", allowed=allowed)
+    output = "log.npz" if path.name != "log.npz" else "table.npz"
     command = python_command(
-        f"import numpy; numpy.savez({_written(path)!r},"
+        f"import numpy; numpy.savez({output!r},"
         f" **dict(numpy.load({path.as_posix()!r}, allow_pickle=True).item()))"
     )
     hint = Hint("", effect=f"only if you trust it, since loading it runs its code: {command}")
     return Finding(file=str(path), found="a Python object", allowed="arrays of numbers", hints=(hint,))
 
 
-def _written(path: Path) -> str:
-    return "log.npz" if path.name != "log.npz" else "table.npz"
-
-
-def _is_table(array: Array) -> bool:
-    """Return whether an array is rows: of numbers, dates or lengths of time, or of fields by name."""
-    rows = array.dtype.names is not None or array.dtype.kind in "biufmM"
-    return rows and array.ndim in (1, 2) and array.size > 1
-
-
-def _refuse_lengths(path: Path, tables: Mapping[str, Array]) -> None:
-    """Raise if arrays have different lengths, with a command that keeps those of one."""
-    lengths = Counter[int]()
-    for array in tables.values():
-        lengths[len(array)] += array.size
-    if len(lengths) == 1:
-        return
-    shown = ", ".join(f"{name} {array.shape}" for name, array in list(tables.items())[:_SHOWN])
-    more = f" and {len(tables) - _SHOWN} more" if len(tables) > _SHOWN else ""
-    keep = f"len(f[k]) == {lengths.most_common(1)[0][0]}"
-    wide = next((name for name, array in tables.items() if array.ndim == 2 and "/" in name), "")
-    folder = next((one for one in _folders(wide) if len(_lengths_in(one, tables)) == 1), None)
-    keep = keep if folder is None else f"k.startswith({folder!r})"
-    if folder is None:
-        keep = f"f[k].ndim and {keep}"
-    command = python_command(
-        f"import numpy; f = numpy.load({path.as_posix()!r});"
-        f" numpy.savez({_written(path)!r}, **{{k: f[k] for k in f if {keep}}})"
-    )
-    hint = Hint("", effect=f"to keep those of one length: {command}")
-    raise LogError(Finding(file=str(path), found=shown + more, allowed="arrays of one length", hints=(hint,)))
-
-
-def _folders(name: str) -> Iterator[str]:
-    """Yield the folders that a name stands in, the outermost first."""
-    parts = name.split("/")[:-1]
-    yield from ("/".join(parts[: k + 1]) + "/" for k in range(len(parts)))
-
-
-def _lengths_in(folder: str, tables: Mapping[str, Array]) -> set[int]:
-    return {len(array) for name, array in tables.items() if name.startswith(folder)}
-
-
-def _columns(tables: Mapping[str, Array]) -> Iterator[tuple[str, Array]]:
-    """Yield the columns by name; those of an array of several are numbered from 1, as the reader has them."""
-    last = [name.split("/")[-1] for name in tables]
-    for name, array in tables.items():
-        short = name.split("/")[-1] if len(set(last)) == len(last) else name
-        if array.dtype.names is not None:
-            fields = {field: array[field].reshape(len(array), -1) for field in array.dtype.names}
-            yield from _columns({field: one for field, one in fields.items() if _is_table(one)})
-            continue
-        matrix = array.reshape(len(array), -1)
-        for k, values in enumerate(matrix.T, start=1):
-            alone = matrix.shape[1] == 1
-            yield short if alone and short else f"{short}_{k}".removeprefix("_"), values
-
-
-SHOWN = 9  # choices of a question, or arrays that are not read, which a message lists
-
-_NUMBERED = re.compile(r"\[\d+\]$")
-
-ArrayColumn = tuple[Name, str, NDArray[Any]]
-"""The groups and the name of a column, its unit or an empty text, and its values, shape (n,)."""
-
-
-def make_array_table(
-    path: Path,
-    choice: Choice,
-    columns: Sequence[ArrayColumn],
-    scalars: Mapping[str, float],
-    separator: str,
-    not_read: Sequence[str] = (),
-) -> MemoryTable:
-    """Return the columns of some arrays as a table.
-
-    A column is called by its groups, without those that all columns share. A clock is called by its own name,
-    if no other one is called so.
-
-    Args:
-        path: The file.
-        choice: Which arrays of the file they are.
-        columns: The columns.
-        scalars: Single numbers of the file, of which one may be the time between samples.
-        separator: Sign between groups in names.
-        not_read: The other arrays of the file, as a message lists them.
-    """
-    shared = 0
-    if "topic" not in choice.applied:
-        groups = zip(*(name[:-1] for name, _, _ in columns), strict=False)
-        shared = sum(1 for _ in takewhile(lambda same: len(set(same)) == 1, groups))
-    clocks = {k: values for k, (name, _, values) in enumerate(columns) if _is_clock(name[-1])}
-    first = next(iter(clocks.values()), None)
-    same = [k for k, values in clocks.items() if first is not None and np.array_equal(values, first)]
-    is_unique = len(same) == len(clocks)
-    named: dict[str, tuple[str, NDArray[Any]]] = {}
-    for k, (name, unit, values) in enumerate(columns):
-        if is_unique and k in same[1:]:
-            continue
-        label = name[-1] if is_unique and k in same else separator.join(name[shared:])
-        named[label if label not in named else separator.join(name)] = unit, values
-    times, reasons = even_times(scalars, {name: values for name, (_, values) in named.items()})
-    arrays = [arrow_column(values) for values in times.values()]
-    arrays += [
-        pa.array(values.tolist()) if values.dtype == object else arrow_column(values)
-        for _, values in named.values()
-    ]
-    names, units = [*times, *named], [""] * len(times) + [unit for unit, _ in named.values()]
-    fields = [
-        pa.field(name, array.type, metadata={UNIT: unit} if unit else None)
-        for name, array, unit in zip(names, arrays, units, strict=True)
-    ]
-    inferences = [*reasons]
-    if not_read:
-        more = f" and {len(not_read) - SHOWN} more" if len(not_read) > SHOWN else ""
-        rows = f"they have no column of {choice.rows} rows"
-        inferences.append(Inference("arrays", f"{', '.join(not_read[:SHOWN])}{more} are not read", rows))
-    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
-    patterns = vocabulary().joint["position"]
-    says = len(choice.names) > 1 or not all(map(_NUMBERED.search, named))
-    says = says or any(pattern.search(key(names[-1])) for pattern in patterns)
-    return MemoryTable(path.stem, table, says, path, tuple(inferences), choice.applied)
-
-
-def _is_clock(name: str) -> bool:
-    return any(pattern.search(key(split_unit(name)[0])) for pattern in vocabulary().time)
-
-
-def ask_for_arrays(path: Path, question: Question) -> NoReturn:
-    """Raise the question which episode, or which arrays of one length, are read."""
-    values = [value for value, _ in question.choices]
-    shown = ", ".join(values[:SHOWN]) + ", ..." * (len(values) > SHOWN)
-    parts = f"{len(values)} episodes" if question.option == "episode" else f"arrays of {len(values)} lengths"
-    if question.requested is not None:
-        parts = f"no {question.option} {question.requested} among {parts}"
-    hints = (Hint(question.option, value, f"reads {rows}") for value, rows in question.choices[:SHOWN])
-    raise LogError(Finding(file=str(path), found=f"{parts}: {shown}", allowed="one", hints=tuple(hints)))
-
+# Arrays of Python code
 
 TIMES = "n times in s, or datetime64 or timedelta64"
 JOINTS = "an array of shape (n, joints), in rad or m; a table is a log"
 POSES = "an array of shape (n, 3), in m, (n, 7), with quaternions x, y, z, w behind, or (n, 4, 4)"
-
 POSITION, QUATERNION = ("tcp_x", "tcp_y", "tcp_z"), ("tcp_qx", "tcp_qy", "tcp_qz", "tcp_qw")
-
-Array_given_arrays = NDArray[Any]
 
 
 def arrays_to_table(
@@ -355,126 +301,101 @@ def arrays_to_table(
         names: Of the joints; by default q1, q2, ...
         name: What to call the log.
         robot: The arm: it tells which joints slide.
-        units: Columns by name of which a unit is given apart; "" for every angle.
+        units: Columns by name whose unit is an option; "" for every angle.
 
     Raises:
         OptionError: With each array of another shape, or if they do not have one length.
     """
-    parts: tuple[Callable[[], Array_given_arrays | None], ...] = (
-        lambda: _times(t),
-        lambda: _joints(q),
-        lambda: _poses(recorded_tcp),
+    parts = ((_times, t), (_joints, q), (_poses, recorded_tcp))
+    times, values, poses = map_collecting_errors(
+        lambda part: None if part[1] is None else part[0](part[1]), parts
     )
-    times, values, poses = map_collecting_errors(lambda make: make(), parts)
     if values is None and poses is None:
         raise OptionError(Finding(parameter="q", found="none", allowed=JOINTS))
-    _refuse_lengths_given_arrays({"t": times, "q": values, "recorded_tcp": poses})
+    arrays = {"t": times, "q": values, "recorded_tcp": poses}
+    lengths = {parameter: len(array) for parameter, array in arrays.items() if array is not None}
+    if len(set(lengths.values())) > 1:
+        found = ", ".join(f"{rows} rows of {parameter}" for parameter, rows in lengths.items())
+        raise OptionError(f"found {found}, allowed: as many of each")
     columns: list[tuple[str, str, str, Any]] = []
     if times is not None:
         columns.append(("t", "" if times.dtype.kind in "mM" else "s", "time 0", times))
     if values is not None:
-        joints = _names(names, values.shape[1])
-        columns += [
-            (label, unit, f"joint {k}", values[:, k])
-            for k, (label, unit) in enumerate(zip(joints, _units(joints, robot, units), strict=True))
-        ]
+        count = values.shape[1]
+        labels = names or [f"q{k + 1}" for k in range(count)]
+        if len(labels) != count or len(set(labels)) < count:
+            allowed = f"a name for each of the {count} joints, each once"
+            raise OptionError(Finding(parameter="names", found=", ".join(names), allowed=allowed))
+        moving = robot.moving if robot is not None and len(robot.moving) == count else [None] * count
+        for k, (label, joint) in enumerate(zip(labels, moving, strict=True)):
+            angle = "" if "" in units else "rad"
+            unit = "m" if joint is not None and joint.kind != "revolute" else angle
+            columns.append((label, unit, f"joint {k}", values[:, k]))
     if poses is not None:
-        wide = [(label, "m", f"position {k}") for k, label in enumerate(POSITION)]
-        wide += [(label, "", f"rotation {k}") for k, label in enumerate(QUATERNION[: poses.shape[1] - 3])]
-        columns += [(*told, poses[:, k]) for k, told in enumerate(wide)]
-    arrays = [arrow_column(array) for *_, array in columns]
+        labels = [*POSITION, *QUATERNION][: poses.shape[1]]
+        roles = [("m", f"position {k}") for k in range(3)] + [("", f"rotation {k}") for k in range(4)]
+        columns += [
+            (label, *role, poses[:, k]) for k, (label, role) in enumerate(zip(labels, roles, strict=False))
+        ]
+    made = [arrow_column(array) for *_, array in columns]
     fields = [
         pa.field(label, array.type, metadata={UNIT: "" if label in units else unit, ROLE: role})
-        for (label, unit, role, _), array in zip(columns, arrays, strict=True)
+        for (label, unit, role, _), array in zip(columns, made, strict=True)
     ]
-    return MemoryTable(
-        name, pa.Table.from_arrays(arrays, schema=pa.schema(fields, {GIVEN: "", FORM: "quat_xyzw"}))
-    )
+    schema = pa.schema(fields, {GIVEN: "", FORM: "quat_xyzw"})
+    return MemoryTable(name, pa.Table.from_arrays(made, schema=schema))
 
 
-def _times(t: Any) -> Array_given_arrays | None:
+def _times(t: Any) -> Array:
     """Return times as an array of shape (n,)."""
-    if t is None:
-        return None
     try:
         array = np.asarray(np.ma.filled(t, np.nan) if isinstance(t, np.ma.MaskedArray) else t)
         array = array if array.dtype.kind != "O" else array.astype("datetime64[ns]")
         array = array if array.dtype.kind in "mMiuc" else array.astype(np.float64)
     except (TypeError, ValueError):
-        raise _unfit("t", t, TIMES) from None
+        raise _shape_error("t", t, TIMES) from None
     if array.ndim != 1 or not len(array) or array.dtype.kind == "c":
-        raise _unfit("t", t, TIMES)
+        raise _shape_error("t", t, TIMES)
     return array
 
 
-def _joints(q: Any) -> FloatArray | None:
+def _joints(q: Any) -> FloatArray:
     """Return joint values as an array of shape (n, joints)."""
-    if q is None:
-        return None
     array = _numbers("q", q, JOINTS)
     if array.ndim != 2 or not array.size:
-        raise _unfit("q", q, JOINTS)
+        raise _shape_error("q", q, JOINTS)
     return array
 
 
-def _poses(given: Any) -> FloatArray | None:
+def _poses(poses: Any) -> FloatArray:
     """Return positions, and quaternions where there are orientations, of shape (n, 3) or (n, 7)."""
-    if given is None:
-        return None
-    array = _numbers("recorded_tcp", given, POSES)
+    array = _numbers("recorded_tcp", poses, POSES)
     if array.ndim == 2 and len(array) and array.shape[1] in (3, 7):
         return array
     if array.ndim != 3 or not len(array) or array.shape[1:] != (4, 4):
-        raise _unfit("recorded_tcp", given, POSES)
+        raise _shape_error("recorded_tcp", poses, POSES)
     from urmpipe_models.math3d import to_quaternions
 
-    turned = to_quaternions(array[:, :3, :3].reshape(-1, 9), "matrix")
-    return np.column_stack([array[:, :3, 3], turned])
+    quaternions = to_quaternions(array[:, :3, :3].reshape(-1, 9), "matrix")
+    return np.column_stack([array[:, :3, 3], quaternions])
 
 
-def _numbers(parameter: str, given: Any, allowed: str) -> FloatArray:
+def _numbers(parameter: str, value: Any, allowed: str) -> FloatArray:
     """Return numbers as an array, NaN where they are masked."""
     try:
-        array = np.ma.asanyarray(given)
-        if is_table(given) or array.dtype.kind == "c":
-            raise _unfit(parameter, given, allowed)
+        array = np.ma.asanyarray(value)
+        if is_table(value) or array.dtype.kind == "c":
+            raise _shape_error(parameter, value, allowed)
         return np.asarray(np.ma.filled(array.astype(np.float64), np.nan), dtype=np.float64)
     except (TypeError, ValueError):
-        raise _unfit(parameter, given, allowed) from None
+        raise _shape_error(parameter, value, allowed) from None
 
 
-def _unfit(parameter: str, given: Any, allowed: str) -> OptionError:
-    """Return the error about what is no array of a shape."""
-    shape = getattr(given, "shape", None)
-    text = format_value(given)
-    if isinstance(given, np.ndarray):
-        text = "a complex array" if given.dtype.kind == "c" else "an array"
+def _shape_error(parameter: str, value: Any, allowed: str) -> OptionError:
+    shape = getattr(value, "shape", None)
+    text = format_value(value)
+    if isinstance(value, np.ndarray):
+        text = "a complex array" if value.dtype.kind == "c" else "an array"
     if shape is not None:
         text += f" of shape {tuple(shape)}"
     return OptionError(Finding(parameter=parameter, found=text, allowed=allowed))
-
-
-def _refuse_lengths_given_arrays(arrays: dict[str, Array_given_arrays | None]) -> None:
-    """Raise an `OptionError` if some arrays do not have one length."""
-    lengths = {name: len(array) for name, array in arrays.items() if array is not None}
-    if len(set(lengths.values())) > 1:
-        found = ", ".join(f"{rows} rows of {name}" for name, rows in lengths.items())
-        raise OptionError(f"found {found}, allowed: as many of each")
-
-
-def _names(names: Sequence[str], joints: int) -> Sequence[str]:
-    """Return the names of the joints, by default q1, q2, ..."""
-    if not names:
-        return [f"q{k + 1}" for k in range(joints)]
-    if len(names) != joints or len(set(names)) < joints:
-        allowed = f"a name for each of the {joints} joints, each once"
-        raise OptionError(Finding(parameter="names", found=", ".join(names), allowed=allowed))
-    return names
-
-
-def _units(joints: Sequence[str], robot: Chain | None, given: Collection[str]) -> Iterator[str]:
-    """Yield the unit of each joint: m where it slides; none of an angle where that is given apart."""
-    moving = robot.moving if robot is not None and len(robot.moving) == len(joints) else [None] * len(joints)
-    for joint in moving:
-        slides = joint is not None and joint.kind != "revolute"
-        yield "m" if slides else "" if "" in given else "rad"

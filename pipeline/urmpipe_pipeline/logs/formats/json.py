@@ -7,7 +7,7 @@ Numbers are read from their text, so that they have the same values as in a CSV 
 1. `sniff_json_lines`: JSON lines become text with tabs and the same line numbers. A damaged line is a row
    that cannot be read.
 2. `read_json`: any other document becomes a table in memory, and messages name its rows. The forms that
-   pandas writes are known.
+   pandas writes are known; of arrays of several lengths, or episodes, the user chooses (`array_choice`).
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.files import log_stem
+from urmpipe_pipeline.array_choice import Name, Question, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.logs.formats.arrays import ask_for_arrays
 from urmpipe_pipeline.logs.formats.cells import is_number, printable
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.text import Segment, head_lines, refuse_wide, text_segment
 from urmpipe_pipeline.logs.formats.text_table import TextTable
+from urmpipe_pipeline.logs.log_map import LogMap
 
-SEPARATORS = str.maketrans('\t\r\n"', "   '")
-"""What replaces signs that would end a cell or a line of text with tabs."""
+MAX_DIGITS = 17  # decimal digits of a double
 
+_SEPARATORS = str.maketrans('\t\r\n"', "   '")  # would end a cell or a line of text with tabs
 _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 _BEGINNING = re.compile(r'\s*(?:\[\s*(?:[\[{]|$)|\{\s*")')
 _DOCUMENT = re.compile(r"\s*(?:\[\s*\{|[\[{]\r?\n)")  # no other text begins so
 _UNIT_LAST = re.compile(r"(.*\S)\s*[\[(]([^\[\]()\d]+)[\])]")
-_CONSTANTS = 16  # an array of at most this length next to longer ones is none of samples: limits, a base
-_DIGITS = 17  # decimal digits of a double
-_ALLOWED = "an array of objects, or arrays of one length"
 
 Record = dict[str, str]
 
@@ -59,7 +59,7 @@ def sniff_json_lines(segment: Segment) -> TextTable | None:
     for _, line in segment.lines():
         record = _read_record(line)
         if record is None:
-            rows.append((line.translate(SEPARATORS).strip(), 0))
+            rows.append((line.translate(_SEPARATORS).strip(), 0))
             continue
         if record.keys() != names.keys():
             names |= dict.fromkeys(record)
@@ -68,7 +68,7 @@ def sniff_json_lines(segment: Segment) -> TextTable | None:
         is_usual = [*record] == usual
         row = "\t".join(record.values() if is_usual else [record.get(name, "") for name in names])
         if '"' in row or "\n" in row or "\r" in row or row.count("\t") >= len(names):
-            row = "\t".join([record.get(name, "").translate(SEPARATORS) for name in names])
+            row = "\t".join([record.get(name, "").translate(_SEPARATORS) for name in names])
         rows.append((row, len(names)))
     text = "\n".join(row + "\t" * (len(names) - width) if width else row for row, width in rows)
     sample = (row.split("\t") for row in text.split("\n", MAX_SAMPLED_ROWS)[:MAX_SAMPLED_ROWS])
@@ -76,7 +76,7 @@ def sniff_json_lines(segment: Segment) -> TextTable | None:
         segment=text_segment(segment.path, f"{text}\n", "\t", ()),
         delimiter="\t",
         decimal=".",
-        names=tuple(printable(name.translate(SEPARATORS)) for name in names),
+        names=tuple(printable(name.translate(_SEPARATORS)) for name in names),
         units=(),
         header=1,
         first_line=1,
@@ -86,11 +86,12 @@ def sniff_json_lines(segment: Segment) -> TextTable | None:
     )
 
 
-def read_json(segment: Segment) -> MemoryTable | None:
+def read_json(segment: Segment, options: LogMap) -> MemoryTable | None:
     """Return the table of a JSON document; None if the text is something else, or JSON lines.
 
     Raises:
-        LogError: If it is damaged, or holds no arrays of numbers of one length.
+        LogError: If it is damaged or holds no arrays of numbers; with a question if they have several
+            lengths, or are those of several episodes.
     """
     if not _BEGINNING.match(segment.head) or _is_json_lines(segment):
         return None
@@ -101,22 +102,37 @@ def read_json(segment: Segment) -> MemoryTable | None:
         is_lone = "\n" not in text.strip()
         if not (is_lone or _DOCUMENT.match(text) or segment.path.suffix.lower() == ".json"):
             return None
-        fault = (
-            f"JSON that is damaged or cut ({error.msg if isinstance(error, json.JSONDecodeError) else error})"
-        )
-        line = error.lineno if isinstance(error, json.JSONDecodeError) else None
+        reason, line = str(error), None
+        if isinstance(error, json.JSONDecodeError):
+            reason, line = error.msg, error.lineno
+        fault = f"JSON that is damaged or cut ({reason})"
         raise LogError(Finding(file=file, line=line, found=fault, allowed="a whole document")) from None
-    columns, left_out = _find_columns(document, file)
+    arrays = dict[Name, dict[str, list[str]]]()
+    for path, array in _iter_arrays(document, ()):
+        columns = _columns("/".join(path), array, file)
+        if any(is_number(cell, ".") for cells in columns.values() for cell in cells):
+            arrays[path] = columns
+    if not arrays:
+        allowed = "an array of objects, or arrays of one length"
+        raise LogError(Finding(file=file, found="JSON without an array of numbers", allowed=allowed))
+    shapes = {path: (len(next(iter(columns.values()))),) for path, columns in arrays.items()}
+    choice = choose_arrays(shapes, options.episode, options.topic, separator="/", by_rows=True)
+    if isinstance(choice, Question):
+        ask_for_arrays(segment.path, choice)
+    columns = {name: cells for path in choice.names or arrays for name, cells in arrays[path].items()}
+    shared = os.path.commonprefix([*columns]).rpartition("/")[0]  # noqa: RUF071 (names, not paths)
+    columns = {name.removeprefix(f"{shared}/"): cells for name, cells in columns.items()}
     named = not all(re.fullmatch(r"\[\d+\]", name) for name in columns)
-    texts = [*columns.values()]
-    if not named and not any(is_number(column[0], ".") for column in texts):  # names in the first row
-        columns = {column[0]: column[1:] for column in texts}
+    if not named and not any(is_number(cells[0], ".") for cells in columns.values()):
+        columns = {cells[0]: cells[1:] for cells in columns.values()}  # names in the first row
         named = True
     table = pa.table({name: _column(cells) for name, cells in columns.items()})
     inferences = [Inference("JSON", "a document", "its beginning")]
-    if left_out:
-        inferences.append(Inference("arrays left out", ", ".join(left_out), "they have other lengths"))
-    return MemoryTable(log_stem(segment.path), table, named, segment.path, tuple(inferences))
+    if choice.names and choice.left_out:
+        names = ", ".join(name for path in choice.left_out for name in arrays[path])
+        inferences.append(Inference("arrays left out", names, "they have other lengths"))
+    stem = log_stem(segment.path)
+    return MemoryTable(stem, table, named, segment.path, tuple(inferences), choice.applied)
 
 
 def _is_json_lines(segment: Segment) -> bool:
@@ -132,22 +148,22 @@ def _read_record(line: str) -> Record | None:
         value = _DECODER.decode(line)
     except (ValueError, RecursionError):
         return None
-    return _cells(value, "", {}) if isinstance(value, dict) else None
+    return _add_cells(value, "", {}) if isinstance(value, dict) else None
 
 
-def _cells(value: Any, name: str, record: Record) -> Record:
+def _add_cells(value: Any, name: str, record: Record) -> Record:
     """Add the texts of a value to a record: of objects as GROUP/NAME, of arrays as NAME[0]; return it."""
     if isinstance(value, str):
         record[name] = value
     elif isinstance(value, dict):
         for key, inner in value.items():
-            _cells(inner, f"{name}/{key}" if name else key, record)
+            _add_cells(inner, f"{name}/{key}" if name else key, record)
     elif isinstance(value, list):
         for k, inner in enumerate(value):
             if isinstance(inner, str):  # most are numbers
                 record[_indexed(name, k)] = inner
             else:
-                _cells(inner, _indexed(name, k), record)
+                _add_cells(inner, _indexed(name, k), record)
     else:
         record[name] = "" if value is None else str(value)
     return record
@@ -160,33 +176,7 @@ def _indexed(name: str, k: int) -> str:
     return f"{unit[1]}[{k}] [{unit[2]}]" if unit else f"{name}[{k}]"
 
 
-def _find_columns(document: Any, file: str) -> tuple[dict[str, list[str]], list[str]]:
-    """Return the columns of a document, all of one length, and the names of its other arrays."""
-    tables: dict[int, dict[str, list[str]]] = {}
-    for name, array in _arrays(document, ""):
-        records = [_cells(entry, name, {}) for entry in array]
-        names = dict.fromkeys(key for record in records for key in record)
-        refuse_wide(len(names), file)
-        columns = {key: [record.get(key, "") for record in records] for key in names}
-        tables.setdefault(len(array), {}).update(columns)
-    numeric = {
-        length: columns
-        for length, columns in tables.items()
-        if any(is_number(cell, ".") for cells in columns.values() for cell in cells)
-    }
-    if not numeric:
-        raise LogError(Finding(file=file, found="JSON without an array of numbers", allowed=_ALLOWED))
-    longest = max(numeric)
-    lengths = [k for k in numeric if k != longest and (k > _CONSTANTS or longest <= _CONSTANTS)]
-    if lengths:
-        shown = (f"{next(iter(numeric[length]))} ({length})" for length in sorted([longest, *lengths]))
-        raise LogError(Finding(file=file, found=f"arrays such as {', '.join(shown)}", allowed=_ALLOWED))
-    shared = os.path.commonprefix([*numeric[longest]]).rpartition("/")[0]  # noqa: RUF071 (names, not paths)
-    columns = {name.removeprefix(f"{shared}/"): cells for name, cells in numeric[longest].items()}
-    return columns, [name for length in numeric if length != longest for name in numeric[length]]
-
-
-def _arrays(value: Any, name: str) -> Iterator[tuple[str, Sequence[Any]]]:
+def _iter_arrays(value: Any, name: Name) -> Iterator[tuple[Name, Sequence[Any]]]:
     """Yield the arrays of a document by name; of pandas also objects with a value for each row."""
     if isinstance(value, list):
         yield name, value
@@ -196,13 +186,23 @@ def _arrays(value: Any, name: str) -> Iterator[tuple[str, Sequence[Any]]]:
         yield name, list(value.values())
     elif isinstance(value, dict):
         for key, inner in value.items():
-            yield from _arrays(inner, f"{name}/{key}" if name else key)
+            yield from _iter_arrays(inner, (*name, key))
+
+
+def _columns(name: str, array: Sequence[Any], file: str) -> dict[str, list[str]]:
+    """Return the cells of the entries of an array by name."""
+    records = [_add_cells(entry, name, {}) for entry in array]
+    names = dict.fromkeys(key for record in records for key in record)
+    refuse_wide(len(names), file)
+    return {key: [record.get(key, "") for record in records] for key in names}
 
 
 def _column(cells: Sequence[str]) -> pa.Array:
     """Return cells as numbers; as texts if they are not numbers, or have more digits than a double."""
     texts = pa.array([cell or None for cell in cells], pa.string())
-    if any(len(cell) > _DIGITS and sum(map(str.isdigit, cell.lstrip("-0."))) > _DIGITS for cell in cells):
+    if any(
+        len(cell) > MAX_DIGITS and sum(map(str.isdigit, cell.lstrip("-0."))) > MAX_DIGITS for cell in cells
+    ):
         return texts
     for kind in (pa.int64(), pa.float64()):
         try:

@@ -11,14 +11,15 @@ from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, LogWarning
 from urmpipe_pipeline.logs.formats import coppeliasim
+from urmpipe_pipeline.logs.formats.bag import MAGIC, is_bag_folder, is_packed
 from urmpipe_pipeline.logs.formats.cells import is_number
+from urmpipe_pipeline.logs.formats.files import first_bytes, import_optional
 from urmpipe_pipeline.logs.formats.json import read_json, sniff_json_lines
 from urmpipe_pipeline.logs.formats.labels import refuse_among_rows, refuse_conflict, sniff_labels, with_names
-from urmpipe_pipeline.logs.formats.libraries import read_typed
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
 from urmpipe_pipeline.logs.formats.own import in_si
-from urmpipe_pipeline.logs.formats.programs.program_text import read_program
+from urmpipe_pipeline.logs.formats.programs import read_program
 from urmpipe_pipeline.logs.formats.shape import sniff_arrays, turned
 from urmpipe_pipeline.logs.formats.sniff import across, sniff
 from urmpipe_pipeline.logs.formats.table import choose_rows
@@ -126,15 +127,45 @@ def _opened(one: Path | MemoryTable, options: LogMap) -> Segment | MemoryTable:
     """Return a table as it is in memory, a file of typed columns or a program read, any other as text."""
     if isinstance(one, MemoryTable):
         return one
-    if (typed := read_typed(one, options)) is not None:
+    if (typed := _read_typed(one, options)) is not None:
         return typed
     if (sheet := read_workbook(one, options)) is not None:
         return sheet
     text = open_text(one, any_suffix=options.source is not None)
-    table = read_program(text, options) or read_json(text)
+    table = read_program(text, options) or read_json(text, options)
     if table is None:
         refuse_long_lines(text)
     return table or text
+
+
+def _read_typed(path: Path, options: LogMap) -> MemoryTable | None:
+    """Return the table of a file of typed columns; None of any other file, which may be text."""
+    head = first_bytes(path, 128)
+    is_zipped_arrays = head.startswith(b"PK\x03\x04") and path.suffix.lower() == ".npz"
+    if head.startswith((b"PAR1", b"PARE", b"ARROW1")):
+        from urmpipe_pipeline.logs.formats.parquet import read_feather, read_parquet
+
+        return read_feather(path) if head.startswith(b"ARROW1") else read_parquet(path, head, options)
+    if head.startswith(b"MATLAB 5.0 MAT-file"):
+        from urmpipe_pipeline.logs.formats.matlab import read_mat
+
+        return read_mat(path, head, options)
+    if head.startswith((b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file")):
+        import_optional("h5py", path, "an HDF5 file")
+        from urmpipe_pipeline.logs.formats.matlab import read_hdf5
+
+        return read_hdf5(path, options)
+    if head.startswith(b"\x93NUMPY") or is_zipped_arrays:
+        from urmpipe_pipeline.logs.formats.arrays import read_numpy
+
+        return read_numpy(path, options)
+    if head.startswith(tuple(MAGIC)) or is_packed(path) or is_bag_folder(path):
+        for library in ("mcap.reader", "rosbags.typesys"):
+            import_optional(library, path, "a recording of messages")
+        from urmpipe_pipeline.logs.formats.bag_table import read_bag
+
+        return read_bag(path, options)
+    return None
 
 
 def _shaped(layouts: Sequence[LogTable], options: LogMap) -> list[LogTable]:

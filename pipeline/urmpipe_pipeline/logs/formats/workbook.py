@@ -3,8 +3,6 @@
 1. `read_workbook` finds the sheet: the only one with a table, or `--sheet`.
 2. Its cells become text with tabs between them. Header, units and decimal sign are then inferred as those of
    any text, and line numbers are the row numbers of the sheet.
-
-The cells come from `workbook_cells` in a separate process, which a damaged .xls file may end.
 """
 
 from __future__ import annotations
@@ -19,14 +17,17 @@ from zipfile import BadZipFile, ZipFile
 
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
-from urmpipe_pipeline import workbook_cells
+from urmpipe_pipeline.file_contents import Cell, Row, Sheet, clock_text
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_number
-from urmpipe_pipeline.logs.formats.libraries import import_optional
+from urmpipe_pipeline.logs.formats.files import (
+    first_bytes,
+    import_optional,
+    password_error,
+    read_separately,
+)
 from urmpipe_pipeline.logs.formats.text import Segment, refuse_unpacked, text_segment
 from urmpipe_pipeline.logs.log_map import LogMap
-from urmpipe_pipeline.subprocess_reader import ReaderCrashError, read_in_subprocess
-from urmpipe_pipeline.workbook_cells import PASSWORD, Cell, Row, Sheet, clock_text
 
 _ZIP, _OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _SUFFIXES = (".xlsx", ".xlsm", ".xlsb", ".ods")
@@ -49,28 +50,18 @@ def read_workbook(path: Path, options: LogMap) -> Segment | None:
             python-calamine is not installed.
         OptionError: If there is no such sheet.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(len(_OLE))
-    except OSError:
-        return None  # the reader of text reports it
+    head = first_bytes(path, len(_OLE))
     is_zipped = head.startswith(_ZIP) and _is_zipped_workbook(path)
     if not is_zipped and head != _OLE:
         return None
-    is_encrypted = not is_zipped and path.suffix.lower() in _SUFFIXES  # a zip archive in a compound file
-    sheet = _choose_sheet(path, PASSWORD if is_encrypted else _read_sheets(path), options.sheet)
-    inference = Inference("sheet", sheet[0].name, sheet[1], hints=(Hint("sheet"),))
-    return text_segment(path, "\n".join(_lines(sheet[0].rows, options.decimal)) + "\n", "\t", (inference,))
-
-
-def _read_sheets(path: Path) -> list[Sheet] | str:
-    """Return the sheets of a workbook, or why it cannot be read."""
+    if not is_zipped and path.suffix.lower() in _SUFFIXES:  # a zip archive, encrypted in a compound file
+        raise password_error(path)
     import_optional("python_calamine", path, "a workbook")
-    try:
-        sheets: list[Sheet] | str = read_in_subprocess(path, workbook_cells.__name__)
-    except ReaderCrashError as error:
-        return str(error)
-    return sheets
+    save = Hint("", effect="open it in a spreadsheet program and save it again")
+    sheets = read_separately(path, "a workbook", "workbook", hints=(save,))
+    sheet, why = _choose_sheet(path, sheets, options.sheet)
+    inference = Inference("sheet", sheet.name, why, hints=(Hint("sheet"),))
+    return text_segment(path, "\n".join(_lines(sheet.rows, options.decimal)) + "\n", "\t", (inference,))
 
 
 def _is_zipped_workbook(path: Path) -> bool:
@@ -88,38 +79,30 @@ def _is_zipped_workbook(path: Path) -> bool:
         return path.suffix.lower() in _SUFFIXES
 
 
-def _choose_sheet(path: Path, sheets: list[Sheet] | str, requested: str | None) -> tuple[Sheet, str]:
+def _choose_sheet(path: Path, sheets: Sequence[Sheet], requested: str | None) -> tuple[Sheet, str]:
     """Return a sheet, and why it is chosen."""
-    if sheets == PASSWORD:
-        save = Hint("", effect="open it in a spreadsheet program and save it without a password, or as CSV")
-        raise _error(path, "a workbook with a password", "a workbook without one", save)
-    if isinstance(sheets, str):
-        save = Hint("", effect="open it in a spreadsheet program and save it again")
-        raise _error(path, f"a workbook that cannot be read ({sheets})", "a whole one", save)
     names = [sheet.name for sheet in sheets]
     if requested is not None:
         number = int(requested) if requested.isdecimal() and requested.isascii() else 0
         if requested not in names and not 1 <= number <= len(names):
-            allowed = ", ".join(map(format_value, names))
-            raise OptionError(
-                Finding(file=str(path), parameter="sheet", found=format_value(requested), allowed=allowed)
-            )
+            found, allowed = format_value(requested), ", ".join(map(format_value, names))
+            raise OptionError(Finding(file=str(path), parameter="sheet", found=found, allowed=allowed))
         return sheets[names.index(requested) if requested in names else number - 1], "given as an option"
     shown = [sheet for sheet in sheets if sheet.is_shown] or sheets
     tables = [sheet for sheet in shown if _numeric_rows(sheet, 2) > 1]
     tables = tables or [sheet for sheet in shown if _numeric_rows(sheet, 1) > 1]
-    if len(tables) > 1:
-        counts = (format_count(_numeric_rows(sheet, 1), "row") for sheet in tables)
-        hints = [
-            Hint("sheet", sheet.name, f"reads its {count} of numbers")
-            for sheet, count in zip(tables, counts, strict=True)
-        ]
-        raise _error(path, f"{len(tables)} sheets with a table", "one", *hints)
-    if not tables:
-        fault = f"no rows of numbers in {format_count(len(shown), 'sheet')} ({', '.join(names)})"
+    if len(tables) == 1:
+        return tables[0], "the only sheet" if len(names) == 1 else "the only sheet with a table"
+    if tables:
+        counts = [(sheet.name, format_count(_numeric_rows(sheet, 1), "row")) for sheet in tables]
+        hints = [Hint("sheet", name, f"reads its {count} of numbers") for name, count in counts]
+        found, allowed = f"{len(tables)} sheets with a table", "one"
+    else:
+        found = f"no rows of numbers in {format_count(len(shown), 'sheet')} ({', '.join(names)})"
+        allowed = "a table with one row per sample"
         values = "if its cells are formulas, save it in a spreadsheet program, which adds their values"
-        raise _error(path, fault, "a table with one row per sample", Hint("", effect=values))
-    return tables[0], "the only sheet" if len(names) == 1 else "the only sheet with a table"
+        hints = [Hint("", effect=values)]
+    raise LogError(Finding(file=str(path), found=found, allowed=allowed, hints=tuple(hints)))
 
 
 def _numeric_rows(sheet: Sheet, count: int) -> int:
@@ -142,43 +125,28 @@ def _lines(rows: Sequence[Row], decimal: str | None) -> Iterator[str]:
     has_times = {k for row in rows for k, cell in enumerate(row) if isinstance(cell, datetime)}
     for row in rows:
         cells = [_TEXTS[type(cell)](cell) for cell in row]
-        if decimal in (",", "comma"):
-            cells = [
-                text.replace(".", ",") if isinstance(cell, float) else text
-                for cell, text in zip(row, cells, strict=True)
-            ]
-        for k in has_times:
-            cells[k] += " 00:00:00" if type(row[k]) is date else ""
+        for k, cell in enumerate(row):
+            if isinstance(cell, float) and decimal in (",", "comma"):
+                cells[k] = cells[k].replace(".", ",")
+            elif k in has_times and type(cell) is date:
+                cells[k] += " 00:00:00"
         if sum(map(bool, cells)) == 1 and not any(_is_numeric(cell) for cell in row if cell != ""):
             cells = cells[: next(k for k, text in enumerate(cells) if text) + 1]
         yield "\t".join(cells) if any(cells) else ""
 
 
-def _number(value: float) -> str:
-    """Return the shortest digits of a number, whole numbers without a point as spreadsheets show them."""
-    return repr(value).removesuffix(".0")
-
-
-def _plain(text: str) -> str:
-    return "" if text == "#N/A" else text.translate(_SEPARATORS).strip()
-
-
-def _length_of_time(length: timedelta) -> str:
+def _duration_text(length: timedelta) -> str:
     rest = length - timedelta(length.days)
     return f"{length.days} days {clock_text(rest // timedelta(microseconds=1) * 1000)}"
 
 
 _TEXTS: Mapping[type, Callable[[Any], str]] = {
-    float: _number,
+    float: lambda cell: repr(cell).removesuffix(".0"),  # whole numbers as spreadsheets show them
     int: str,
     bool: str,
-    str: _plain,
+    str: lambda cell: "" if cell == "#N/A" else cell.translate(_SEPARATORS).strip(),
     date: date.isoformat,
     datetime: lambda cell: cell.isoformat(" "),
     time: time.isoformat,
-    timedelta: _length_of_time,
+    timedelta: _duration_text,
 }
-
-
-def _error(path: Path, fault: str, allowed: str, *hints: Hint) -> LogError:
-    return LogError(Finding(file=str(path), found=fault, allowed=allowed, hints=hints))

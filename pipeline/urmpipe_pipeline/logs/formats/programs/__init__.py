@@ -1,1 +1,0 @@
-"""Robot and PLC programs as tables: the positions that they declare or move to, the arrays that they hold."""
