@@ -36,12 +36,12 @@ from urmpipe_pipeline.logs.formats.numbers import Numbers
 from urmpipe_pipeline.logs.formats.opening import PATH, TABLE
 from urmpipe_pipeline.logs.formats.padding import without_padding
 from urmpipe_pipeline.logs.formats.text_table import first_left_out
-from urmpipe_pipeline.logs.log_map import LogMap
+from urmpipe_pipeline.logs.log_map import Evidence, LogMap
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.proofs import Recorded, prove_by_kinematics
 from urmpipe_pipeline.logs.rates import SURE_VARIED, period_of, rounded_period
 from urmpipe_pipeline.logs.roles import Roles
-from urmpipe_pipeline.logs.rotation import settle_rotation, without_contradicted, without_interpolated
+from urmpipe_pipeline.logs.rotation import Arm, settle_rotation
 from urmpipe_pipeline.logs.row_checks import (
     MOST_SKIPPED,
     as_poses,
@@ -230,7 +230,7 @@ class _Measured:
     form: RotationForm | None
     inferences: Sequence[Inference]
     warnings: Sequence[LogWarning]
-    doubts: Mapping[int, str]
+    evidence: Mapping[int, Evidence]
     by_source: bool
 
     @property
@@ -351,38 +351,39 @@ def _measured(
     finder = UnitFinder(sources, prove_by_kinematics(robot, raw))
     clock = None if content.clock is None or content.still else t_ns
     judged = np.sort(q, axis=0) if content.still else q  # in no order, poses have no wraps
-    units = finder.joints(roles.joints, judged, clock, robot) if roles.joints else []
-    rates = finder.derivatives(roles.rates, units, 1)
-    seconds = finder.derivatives(roles.accelerations, units, 2)
+    units = finder.settle_joints(roles.joints, judged, clock, robot) if roles.joints else []
+    rates = finder.settle_rates(roles.rates, units, 1)
+    seconds = finder.settle_rates(roles.accelerations, units, 2)
     q = _in_si(q, units)
-    lengths = finder.positions(roles.position, tcp, arm=bool(roles.joints)) if roles.position else []
+    lengths = (
+        finder.settle_positions(roles.position, tcp, beside_joints=bool(roles.joints))
+        if roles.position
+        else []
+    )
     tcp = _in_si(tcp, lengths)
     planar = len(roles.position) == 2
     if planar:
         tcp = np.column_stack((tcp, np.zeros(len(tcp))))
-    stated = finder.rotations(roles.rotation, roles.forms)
-    arm = (robot, q) if robot and roles.joints else None
-    given = options.rotation is not None
-    base = finder.kinematic.base if finder.kinematic else None
-    rotation, between = without_interpolated(rotation, [column.name for column in roles.rotation])
-    turned = settle_rotation(roles.rotation, roles.forms, rotation, stated, arm, base, form_given=given)
-    if turned.form:
-        finder.warn_not_reached(roles.rotation, stated, turned.units, "rotation", "the orientation is")
-    turning = [roles.rotation[k] for k in turned.order]
-    rotation, contradicted = without_contradicted(
-        _in_si(rotation[:, turned.order], turned.units),
-        turned.form,
-        None if roles.measured or content.still else arm,
-        [column.name for column in turning],
+    turned = settle_rotation(
+        roles.rotation,
+        roles.forms,
+        rotation,
+        stated := sources.of_rotation(roles.rotation, roles.forms),
+        Arm(robot, q) if robot and roles.joints else None,
+        finder.kinematic.base if finder.kinematic else None,
+        form_given=options.rotation is not None,
+        in_base=not (roles.measured or content.still),
     )
-    doubts = finder.doubts | {column.number: turned.doubt for column in turning if turned.doubt}
+    if turned.form:
+        finder.warn_not_reached(roles.rotation, stated, turned.units, "rotation")
+    evidence = finder.evidence | {column.number: turned.evidence for column in turned.columns}
     return _Measured(
         groups=(
             _Group(roles.joints, q, units),
             _Group(roles.rates, _in_si(qd, rates), rates),
             _Group(roles.accelerations, _in_si(qdd, seconds), seconds),
             _Group(roles.position, tcp, lengths),
-            _Group(turning, rotation, turned.units),
+            _Group(turned.columns, turned.values, turned.units),
         ),
         form=turned.form,
         inferences=(
@@ -390,9 +391,9 @@ def _measured(
             *([Inference("z of the position", "0 m", "x and y are given alone")] if planar else []),
             *turned.inferences,
         ),
-        warnings=(*finder.warnings, *between, *turned.warnings, *contradicted),
-        doubts=doubts,
-        by_source=finder.by_source,
+        warnings=(*finder.warnings, *turned.warnings),
+        evidence=evidence,
+        by_source=finder.uses_source,
     )
 
 
@@ -498,7 +499,8 @@ def _used_columns(
             sign = signs[i] if role in ("joint", "rate", "acceleration") else 1
             offset = offsets[i] if role == "joint" else 0.0
             header = _header(plan, column)
-            doubt = measured.doubts.get(column.number, "")
+            known = measured.evidence.get(column.number)
+            doubt = known.why if known and known.basis == "assumed" else ""
             read = (unit.name, unit.factor, sign, offset)
             yield LogColumn(column.name, header, role, i, *read, column.number, doubt)
 

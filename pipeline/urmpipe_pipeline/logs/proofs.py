@@ -423,14 +423,24 @@ def rotation_distances(computed: FloatArray, recorded: FloatArray) -> tuple[floa
         computed: R_k, unit quaternions x, y, z, w [-], shape (n, 4).
         recorded: S_k, likewise.
     """
-    angles = rotation_angle(computed, recorded)
-    direct = float(np.median(angles))
+    direct = float(np.median(rotation_angle(computed, recorded)))
+    return direct, float(np.median(fit_turn(computed, recorded)[1])), _relative_distance(computed, recorded)
+
+
+def fit_turn(computed: FloatArray, recorded: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return `mean_turn` without the rows far from it, and the angles after it in [rad], shape (n,)."""
     kept = np.ones(len(computed), dtype=np.bool_)
     for _ in range(3):
-        turn = mean_turn(computed[kept], recorded[kept])[np.newaxis].repeat(len(computed), axis=0)
-        angles = rotation_angle(quaternion_product(computed, turn), recorded)
+        turn = mean_turn(computed[kept], recorded[kept])
+        angles = turned_angles(computed, turn, recorded)
         kept = angles <= max(REJECTED * float(np.median(angles)), 1e-9)
-    return direct, float(np.median(angles)), _relative_distance(computed, recorded)
+    return turn, angles
+
+
+def turned_angles(computed: FloatArray, turn: FloatArray, recorded: FloatArray) -> FloatArray:
+    """Return the angles between orientations in [rad], the computed ones turned, shape (n,)."""
+    turned = quaternion_product(computed, np.broadcast_to(turn, computed.shape))
+    return rotation_angle(turned, recorded)
 
 
 def _relative_distance(computed: FloatArray, recorded: FloatArray) -> float:

@@ -297,7 +297,7 @@ def _poses(
     table = PoseTable(plan, position, None, beside, rows.clock, rows.faults, (), tuple(warnings))
     if form is None:
         return replace(table, inferences=(*finder.inferences, *told))
-    by_name = [one.unit if one else None for one in finder.rotations(columns, (form,))]
+    by_name = [one.unit if one else None for one in finder.sources.of_rotation(columns, (form,))]
     units, assumed = rotation_units(columns, form, _finite(turned), by_name)
     rotation, none = target_rotations(columns, form, turned * [unit.factor for unit in units])
     position[list(none)] = np.nan
@@ -330,7 +330,7 @@ def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[l
     A point further away in m than any arm reaches is a target out of reach.
     """
     columns = plan.roles.position
-    units = finder.positions(columns, np.zeros((1, 3)))
+    units = finder.settle_positions(columns, np.zeros((1, 3)))
     source = plan.tables.known.units if plan.tables.known else {}
     told = "length" in source or any(one.unit or one.number in plan.units for one in columns)
     nearest = np.abs(_finite(values)).max(axis=1).min(initial=np.inf)
@@ -353,7 +353,7 @@ def _further(
     for (name, column), cells in zip(plan.roles.further.items(), values.T, strict=True):
         factor = 1.0
         if further[name].length and finder.sources.find(column, ("length",)):
-            factor = finder.positions([column], np.zeros((1, 1)))[0].factor
+            factor = finder.settle_positions([column], np.zeros((1, 1)))[0].factor
         elif further[name].length:
             factor = lengths[0].factor
             said.append(unit_inference([column], lengths[0].name, "as x, y, z", every=False))

@@ -20,7 +20,7 @@ from urmpipe_models.math3d import (
 )
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.logs.rotation import interpolated_rows
+from urmpipe_pipeline.logs.rotation import find_interpolated_rows
 
 Read = Callable[..., JointLog]
 
@@ -147,6 +147,6 @@ def test_each_row_between_is_found_in_any_unit(
     grid, values = resampled(t, spelled * factor, ratio)
     _, smooth = resampled(t, angles, ratio)
     off = rotation_angle(to_quaternions(values / factor, "rpy"), to_quaternions(smooth, "rpy"))
-    np.testing.assert_array_equal(interpolated_rows(values), off > 0.1)
-    assert not interpolated_rows(spelled * factor).any()
+    np.testing.assert_array_equal(find_interpolated_rows(values), off > 0.1)
+    assert not find_interpolated_rows(spelled * factor).any()
     assert len(grid) == len(values)
