@@ -473,8 +473,12 @@ class UnitFinder:
             sliding = self._find_sliding(columns, values, unit) if may_slide else []
             self._note([c for c in columns if c not in sliding], unit, "proved", proof, every=True)
             if sliding:
-                hints, subject = unit_hints(sliding, "mm"), _subject(sliding, "joint", are_all=False)
-                self._assume(sliding, unit, subject, "joint", hints, f" as the others: {proof}")
+                hints = (
+                    Hint("unit", {"": unit.name}, "confirms it"),
+                    *unit_hints(sliding, "mm", "if they slide"),
+                )
+                subject = _subject(sliding, "joint", are_all=False)
+                self._assume(sliding, unit, subject, "joint", hints, f", as the others have {proof}")
             return unit
         sizes = [peak(column) for column in values.T]
         large = [column for column, size in zip(columns, sizes, strict=True) if size > 2 * TWO_TURNS]
@@ -589,6 +593,7 @@ class UnitFinder:
         """Warn that columns are taken to be in a unit that nothing states or proves."""
         self._note(columns, unit, "assumed", "assumed", every=unit.quantity == "angle")
         names = ", ".join(column.name for column in columns)
-        message = f"no unit is given for {names}: {subject} taken as {unit.name}{why}"
+        of = "" if subject.startswith(names) else f" for {names}"
+        message = f"no unit is given{of}: {subject} taken as {unit.name}{why}"
         warning = LogWarning(ASSUMED_UNIT, message, hints=tuple(hints), role=role, blocks_verdict=asks)
         self._warn(columns, replace(warning, assumption=f"{subject} in {unit.name}"))
