@@ -160,6 +160,8 @@ def show(value: object) -> list[str]:
     """Return lines that show a value: texts as they are, numbers by nine digits, records without defaults."""
     if value is None or isinstance(value, str):
         return [line.rstrip() for line in (value or "").splitlines()]
+    if isinstance(value, tuple) and all(isinstance(one, str) for one in value) and "\n" in "".join(value):
+        return [line.rstrip() for one in value for line in one.splitlines()]
     line = _inline(value)
     if len(line) > WIDTH and isinstance(value, Mapping):
         return [f"{key}: {_inline(one)}" for key, one in value.items()]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +10,11 @@ import pytest
 from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
-from asserting import INCREASE, OTHER_TIME
-from urmpipe_models.arm.chain import Chain, Joint
+from read_text import arm
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
 from urmpipe_pipeline.logs.formats import text_table
-
-Read = Callable[..., JointLog]
-Wrong = Callable[..., list[str]]
 
 LABELLED = b"connected\nTime: 0.1 q values: [1, 2] Type: 0\nTime: 0.2 q values: [1, 3] Type: 0\n"
 SPECIMENS = [
@@ -37,33 +32,13 @@ SPECIMENS = [
     b"t,q1\n0,1\n<<<<<<< HEAD\n1,2\n=======\n1,3\n>>>>>>> other\nt,q1\n0,1\n",
 ]
 PIECES = [
-    *(b"[", b"]", b"Time:", b"\n ", b"=======\n", b"q1 = "),
-    *(b",", b";", b"\n", b"\r", b"\t", b" ", b".", b'"', b"#", b"%", b"[deg]", b"(m)", b"q1", b"time", b""),
-    *(
-        b"nan",
-        b"inf",
-        b"Null",
-        b"1e999",
-        b"1e99999999",
-        b"9" * 30,
-        b"-1",
-        b"\xff",
-        b"\x00",
-        b"\xe4",
-        b"\xef\xbb\xbf",
-    ),
-]
+    *b"[|]|Time:|\n |=======\n|q1 = |,|;|\n|\r|\t| |.|\"|#|%|[deg]|(m)|q1|time||nan|inf|1e999".split(b"|"),
+    b"Null", b"-1", b"1e99999999", b"9" * 30, b"\xff", b"\x00", b"\xe4", b"\xef\xbb\xbf",
+]  # fmt: skip
 OPTIONS = [
-    *(
-        LogMap(),
-        LogMap(skip_bad=True),
-        LogMap(source="path"),
-        LogMap(source="coppeliasim"),
-        LogMap(time="1"),
-    ),
-    *(LogMap(joints=("2", "3")), LogMap(unit={"": "deg"}), LogMap(delimiter=";", decimal=",")),
-]
-ROBOTS = [None, *(Chain("arm", tuple(Joint(f"j{k}") for k in range(count))) for count in (1, 2))]
+    LogMap(), LogMap(skip_bad=True), LogMap(source="path"), LogMap(source="coppeliasim"), LogMap(time="1"),
+    LogMap(joints=("2", "3")), LogMap(unit={"": "deg"}), LogMap(delimiter=";", decimal=","),
+]  # fmt: skip
 
 
 @st.composite
@@ -80,7 +55,7 @@ def damaged(draw: st.DrawFn) -> bytes:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @settings(max_examples=120, deadline=None)
-@given(damaged(), st.sampled_from(OPTIONS), st.sampled_from(ROBOTS))
+@given(damaged(), st.sampled_from(OPTIONS), st.sampled_from([None, arm(1), arm(2)]))
 @example(LABELLED.replace(b"q values", b"q\r values", 1), LogMap(), None)
 @example(b'connected\nTime:"]" values: [1, 3] Type: 0\n', LogMap(), None)
 @example(LABELLED.replace(b"1, 2", b""), LogMap(), None)
@@ -122,153 +97,10 @@ def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: Lo
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         path = Path(folder) / "log.csv"
         path.write_bytes(content)
-        whole = outcome(path, options)
+        in_one = outcome(path, options)
         patch.setattr(text_table, "BLOCK_BYTES", size)
         patch.setattr(text_table, "READ_BY_ROW", 8)
-        assert outcome(path, options) == whole
-
-
-def rows(count: int, start: float = 0.0) -> list[str]:
-    """Rows of a log of two joints at 10 ms."""
-    return [f"{start + 0.01 * k:.2f},0.{k % 7},1.{k % 5}" for k in range(count)]
-
-
-def joined(*lines: str) -> str:
-    return "\n".join(["t,q1 [rad],q2 [rad]", *lines]) + "\n"
-
-
-@pytest.mark.parametrize("behind", [30, 100_000])
-def test_a_header_again_begins_a_second_log(wrong: Wrong, behind: int) -> None:
-    said = "found the header again, allowed: one log per file; a second log begins here"
-    said += "; --rows 1:100 or --rows 102:-1 reads these rows"
-    assert wrong(joined(*rows(100), "t,q1 [rad],q2 [rad]", *rows(behind))) == [f"log.csv:102: {said}"]
-
-
-@pytest.mark.parametrize("header", ["t,q1 [deg],q2 [deg]", "t,q2 [rad],q1 [rad]", "T,Q1,q2"])
-def test_another_header_begins_a_second_log_that_is_not_skipped(wrong: Wrong, header: str) -> None:
-    """Its rows may be in other units, or in another order, and go on in time."""
-    text = joined(*rows(300), header, *rows(300, 3.0))
-    said = f"found another header, {header!r}, allowed: one log per file; a second log begins here"
-    said += "; --rows 1:300 reads these rows"
-    assert wrong(text, skip_bad=True) == wrong(text) == [f"log.csv:302: {said}"]
-
-
-@pytest.mark.parametrize("message", ["q1,paused,by hand", "[WARN],late,twice"])
-def test_a_message_is_no_header(read: Read, message: str) -> None:
-    assert read(joined(*rows(300), message, *rows(300, 3.0)), skip_bad=True).rows == 600
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("also", ["", "# paused\n"])
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
-def test_a_last_cell_that_is_cut_is_no_value(read: Read, wrong: Wrong, encoding: str, also: str) -> None:
-    """The recorder was killed while it wrote: 1.0471 became 1.0, as only the other rows tell."""
-    lines = [f"{0.01 * k:.2f},{k / 70:.4f},{1 + k / 900:.4f}" for k in range(300)]
-    text = joined(*lines[:150]) + also + "\n".join(lines[150:])
-    assert read(text, encoding=encoding).rows == 300
-    cut, line = text[:-2], 301 + bool(also)
-    said = "where the file ends, allowed: as many decimals as in the other rows"
-    assert wrong(cut, encoding=encoding) == [
-        f"log.csv:{line}: found '{cut[-4:]}' {said}",
-        "log.csv: 1 of 300 rows cannot be read; --skip-bad leaves them out",
-    ]
-    assert read(cut, encoding=encoding, skip_bad=True).rows == 299
-    assert read(text + "\n# 0.5", encoding=encoding).rows == 300
-    uneven = joined(*(f"{0.01 * k:.2f},{k / 70!r},{1 + k / 900!r}" for k in range(300)))
-    assert read(uneven[:-9], encoding=encoding).rows == 300
-
-
-def test_a_byte_of_no_text_has_a_line(wrong: Wrong) -> None:
-    text = joined(*rows(100), "1.00,0.\0,1.5", *rows(9, 1.01))
-    assert wrong(text) == ["log.csv:102: found the byte 0x00, allowed: text, as in the lines above"]
-    assert wrong("GIF\0\n") == ["log.csv: found a binary file, allowed: a text table (CSV)"]
-
-
-def test_a_clock_that_begins_again_begins_a_second_log(wrong: Wrong) -> None:
-    assert wrong(joined(*rows(100), *rows(30))) == [
-        "log.csv:102, column t: found 2 logs in one file: the clock begins again in row 101, allowed: one"
-        f" log; --rows 1:100 or --rows 101:130 reads one{OTHER_TIME}"
-    ]
-    assert wrong(joined(*rows(100), *rows(30, 0.5))) == [
-        f"log.csv:102, column t: found 0.5 s after 0.99 s, {INCREASE}"
-    ]
-
-
-def test_rows_on_end_that_are_wrong_alike_are_one_finding(wrong: Wrong) -> None:
-    longer = [f"{row},7" for row in rows(500, 4.0)]
-    assert wrong(joined(*rows(300), "paused", "by hand", *longer)) == [
-        "log.csv:302: found 1 cell ('paused'), allowed: 3",
-        "log.csv:303: found 1 cell ('by hand'), allowed: 3",
-        "log.csv:304: found 4 cells, allowed: 3 (and so 499 more rows below it)",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("header", "said"),
-    [
-        ("t,q1", "found 2 names over rows of 3 cells, allowed: one name per column; add 1 name"),
-        (
-            "t,q1,q2,q3,q4",
-            "found 5 names over rows of 3 cells, allowed: one name per column; remove 2 names",
-        ),
-    ],
-)
-def test_a_header_of_another_width(wrong: Wrong, header: str, said: str) -> None:
-    text = "\n".join([header, "0.0,1.5,0.5", "0.3,1.5,0.5", "0.4,1.5,0.5"])
-    without = "or delete line 1: without names the columns are taken as joints in order"
-    assert wrong(text) == [f"log.csv:1: {said}, {without}"]
-
-
-def test_rows_that_cannot_be_read_are_left_out_if_asked_for(read: Read, wrong: Wrong) -> None:
-    lines = rows(1000)
-    lines[100], lines[500], lines[501] = "torn, 0.5", "5.00,abc,1.5", "(paused)"
-    said = [
-        "log.csv:102: found 2 cells, allowed: 3",
-        "log.csv:502, column q1 [rad]: found 'abc', allowed: a number,"
-        " or an empty, Null or NaN cell where a sample is missing",
-        "log.csv:503: found 1 cell ('(paused)'), allowed: 3",
-    ]
-    assert wrong(joined(*lines)) == [
-        *said, "log.csv: 3 of 1000 rows cannot be read; --skip-bad leaves them out"
-    ]  # fmt: skip
-    log = read(joined(*lines), skip_bad=True)
-    kept = np.delete(np.arange(1000), [100, 500, 501])
-    np.testing.assert_array_equal(log.t_ns, kept * 10_000_000)
-    np.testing.assert_array_equal(log.q, np.c_[kept % 7 / 10, (kept % 5 + 10) / 10])
-    skipped = [(w.row, w.message) for w in log.warnings if w.kind == "skipped-row"]
-    assert skipped == [
-        (101, "data row 101 of the file is left out: found 2 cells, allowed: 3"),
-        (501, f"data row 501 of the file is left out: {said[1].partition(', ')[2]}"),
-        (502, "data row 502 of the file is left out: found 1 cell ('(paused)'), allowed: 3"),
-    ]
-
-
-def test_lines_stay_those_of_the_file_when_rows_are_left_out(wrong: Wrong) -> None:
-    lines = rows(400)
-    lines[100], lines[300] = "torn", "2.00,inf,1"
-    assert wrong(joined(*lines), skip_bad=True) == [
-        "log.csv:302, column q1 [rad]: found inf, allowed: finite numbers",
-        f"log.csv:302, column t: found 2 s after 2.99 s, {INCREASE}",
-    ]
-
-
-def test_no_more_than_one_row_in_a_hundred_is_left_out(read: Read, wrong: Wrong) -> None:
-    lines = rows(300)
-    lines[20] = lines[120] = lines[220] = "torn"
-    assert read(joined(*lines), skip_bad=True).rows == 297
-    lines[221] = "torn"
-    assert wrong(joined(*lines), skip_bad=True)[-1] == (
-        "log.csv: skip_bad (--skip-bad): 4 of 300 rows cannot be read, allowed: 1% of them"
-    )
-
-
-def test_many_rows_left_out_are_counted(read: Read) -> None:
-    lines = rows(10_000)
-    lines[50::200] = ["torn"] * 50
-    warnings = [w for w in read(joined(*lines), skip_bad=True).warnings if w.kind == "skipped-row"]
-    assert len(warnings) == 21
-    assert warnings[-1].message == "30 more rows are left out"
-    assert warnings[0].row == 51
+        assert outcome(path, options) == in_one
 
 
 @pytest.mark.slow
@@ -278,12 +110,12 @@ def test_many_rows_left_out_are_counted(read: Read) -> None:
 )
 def test_a_damaged_log_is_the_sound_one_without_its_wrong_rows(places: set[int], damage: str) -> None:
     """Over several blocks, comments between."""
-    lines = rows(80_000)
+    lines = [f"{0.01 * k:.2f},0.{k % 7},1.{k % 5}" for k in range(80_000)]
     for place in places:
         lines[place] = damage
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
-        path.write_text(joined(*lines))
+        path.write_text("\n".join(["t,q1 [rad],q2 [rad]", *lines, ""]))
         log = read_log([path], LogMap(skip_bad=True))
     kept = np.delete(np.arange(80_000), sorted(places))
     np.testing.assert_array_equal(log.t_ns, (kept - kept[0]) * 10_000_000)
