@@ -23,9 +23,8 @@ from urmpipe_models.math3d import fit_rotation, to_matrices
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.logs.clock_columns import EPOCH
-from urmpipe_pipeline.logs.clock_text import ZONED
 from urmpipe_pipeline.logs.formats.clock_forms import DATE
-from urmpipe_pipeline.logs.row_checks import REBUILT, SPREAD
+from urmpipe_pipeline.logs.timestamps import REBUILT, SPREAD, ZONED
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.run import Run
 from urmpipe_pipeline.trajectories import AlignMode, Sync, Trajectory, extent, joint_order, run_finding

@@ -1,331 +1,137 @@
-"""The unit of a clock of numbers: given, in its name, known of the source, or shown by its values.
+"""The clock of a table: its columns, its unit, and the times of a log without one.
 
-Steps of 1 to 500 without a unit may be in s or in ms: how fast the joints would turn decides.
-
-The clock: which column is the time, its unit or the form of its text.
-
-Clocks in numbers that count from midnight, and begin again there.
-
-Times in a file of their own: a column, or a row of n values as MATLAB's writematrix leaves a vector.
-
-Of a file with more columns the user names the one with the times: FILE:COLUMN.
+1. Columns: those that the user gives, that a header names, or whose numbers run like a clock
+   (`clock_columns`); or a file of times next to the log (`find_time_file`).
+2. Unit of a clock of numbers (`find_unit`): the option; the name of the column; the program that wrote the
+   log; the year, since a Unix time of 2000 to 2100 is one in a single unit; else the step, since a log has
+   usually periods of 0.5 ms to 1 s. Steps of 1 to 500 may be s or ms: the speed of the joints decides
+   (`settle_unit_by_speed`). If several units remain, the user is asked; days and ticks are refused.
+3. Without a clock (`even_clock`): rows at the period that the user gives, else at 5 ms, with a warning.
 """
 
 from __future__ import annotations
 
 import math
 import os.path
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_models.wraps import FULL_TURN
-from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, GAP, PASSED_OVER, Inference, LogWarning
+from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.logs.clock_columns import (
     EPOCH,
-    all_are,
-    given_time,
-    runs_evenly,
-    steps_of,
-    time_columns,
-)
-from urmpipe_pipeline.logs.clock_text import (
-    EVEN,
-    EXPONENTS,
-    MIDNIGHT_NS,
+    MAX_PERIOD,
+    MIN_PERIOD,
+    OTHER_CLOCK,
     OTHER_TIME,
-    Chosen,
-    add_nights,
-    known_forms,
-    read_cells,
+    TimeColumns,
+    complete_time,
+    find_time_columns,
+    has_form,
+    is_named_time,
+    runs_evenly,
 )
 from urmpipe_pipeline.logs.columns import Column, find_column, unit_hints
 from urmpipe_pipeline.logs.formats.cells import LONGEST_NS, TextCells
 from urmpipe_pipeline.logs.formats.clock_forms import (
     DATE,
     DENSE_DATE,
+    EXPONENTS,
     SECOND_NS,
     TIME_OF_DAY,
     UNPADDED_NS,
-    Form,
+    ClockForm,
+    find_forms,
+    read_cells,
 )
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import UNREADABLE, ClockColumn, Numbers
+from urmpipe_pipeline.logs.formats.numbers import ClockColumn
 from urmpipe_pipeline.logs.formats.opening import Tables, open_tables
 from urmpipe_pipeline.logs.formats.sniff import across
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.proofs import peak
 from urmpipe_pipeline.logs.vocabulary import KnownSource, Unit, key, vocabulary
 
-SHORTEST, LONGEST = 0.0005, 1.0
-"""Usual periods of a log in [s]: they tell the unit of a clock that does not say it."""
+DEFAULT_PERIOD = 0.005  # s, Tsp of the paper ([UrmArm2021]_ eq. 22), if nothing gives the time
+TIME_FILE = "time file"  # kind of the inference about a clock in a separate file
 
-_UNUSUAL, _IMPOSSIBLE = 0.0002, 1e-5
-"""Periods in [s] below which a log is unusual, and below which no joint is sampled: days or hours look so."""
+MAX_PAUSE = 20.0  # s, median step of times since 1970, and of days or ticks
+UNUSUAL_PERIOD, IMPOSSIBLE_PERIOD = 0.0002, 1e-5  # s, below which a period is reported, or refused
+S_OR_MS = (1.0, 500.0)  # steps that may be in s or in ms
+MIN_STEP_MS = 5.0  # a log in ms rarely has shorter steps: 200 Hz
+MAX_SPEED = 30.0  # rad/s, which no joint exceeds
+USUAL_SPEED = 5.0  # rad/s, which joints rarely exceed
+MIN_MOTION = 0.01  # share of the largest step below which the joints rest
 
-FAST = 30.0  # no joint turns faster [rad/s]
-USUAL = 5.0  # joints of logs seldom do [rad/s]: in s instead of ms they would turn at 0.3 deg/s at most
-RESTS = 0.01  # share of the largest step of all joints below which they rest
-SHORTEST_MS = 5.0  # a log in ms has seldom shorter steps: 200 Hz
-_S_OR_MS = (1.0, 500.0)  # steps of these lengths may be in s or in ms
-
-_DAYS = {
+_ALLOWED = ", ".join(EXPONENTS)
+_EXAMPLES = "2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
+_ALLOWED_FORMS = f"numbers in s, ms, us or ns, or times such as {_EXAMPLES}"
+_DATES = (19_700_101_000_000, 21_000_101_000_000)  # YYYYMMDDhhmmss
+_DAYS = {  # 2000 to 2100, and the conversion to Unix time
     "Excel's days since 1900": ((36_526.0, 73_051.0), "(t - 25569) * 86400 is Unix time in s"),
     "MATLAB's datenum in days": ((730_486.0, 767_011.0), "(t - 719529) * 86400 is Unix time in s"),
     "Julian days": ((2_451_544.5, 2_488_069.5), "(t - 2440587.5) * 86400 is Unix time in s"),
 }
-"""2000 to 2100 as some count days, and what makes a Unix time of them."""
-
 _TICKS = {
     ".NET's ticks of 100 ns": ((6.308e17, 6.624e17), "(t - 621355968000000000) / 10 is Unix time in us"),
     "Windows' ticks of 100 ns": ((1.259e17, 1.575e17), "(t - 116444736000000000) / 10 is Unix time in us"),
 }
-"""The same in ticks."""
-
-_SECONDS_A_DAY = 86_400.0
-
-_UNITS = ", ".join(EXPONENTS)
-
-Found = tuple[str, str, tuple[LogWarning, ...]]
-"""A unit, why, and what a person should know."""
 
 
-def unit_of(
-    time: Column,
-    layout: LogTable,
-    source: KnownSource | None,
-    units: Mapping[int, Unit],
-    *,
-    lasts: bool = False,
-) -> Found:
-    """Return the unit of a time column, why, and a warning if it is assumed.
-
-    Args:
-        time: The column.
-        layout: How its table is written.
-        source: What is known of the source.
-        units: Units given by the user, by the column's number.
-        lasts: Whether it holds durations, not times.
-
-    Raises:
-        LogError: If it is a unit that is not read, or cannot be told.
-        OptionError: If it is given as one that is no time.
-    """
-    given = units.get(time.number)
-    if given is not None:
-        if given.name not in EXPONENTS:
-            found = f"{given.name} for the time {format_value(time.name)}"
-            raise OptionError(Finding(parameter="unit", found=found, allowed=_UNITS, hints=OTHER_TIME))
-        return given.name, "given as an option", ()
-    named = time.unit or vocabulary().unit(time.key)  # "seconds" has no other name
-    if named is not None and named.name in EXPONENTS:
-        return named.name, "its name", ()
-    long = time.unit_text or time.key.rpartition("_")[2]
-    if long.lower() in vocabulary().long_times:
-        message = f"found the unit {format_value(long)}, allowed: {_UNITS}; convert the times"
-        raise layout.error(message, time.header, *EVEN)
-    if source is not None and "time" in source.units:
-        return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
-    return _by_values(time, layout, lasts=lasts)
-
-
-def _by_values(time: Column, layout: LogTable, *, lasts: bool) -> Found:
-    """Tell the unit by the year that the times give, or else by their steps; durations are steps."""
-    times = layout.numbers(time.index)
-    start = 0.0 if lasts or not times else times[0]
-    steps = sorted(step for step in (times if lasts else steps_of(times)) if step > 0)
-    step = steps[len(steps) // 2] if steps else 0.0
-    likely = [u for u, e in EXPONENTS.items() if SHORTEST < step * 10.0 ** (e - 9) <= LONGEST]
-    epoch = _since_1970(start, step)
-    if epoch is not None and not (likely and step * 10.0 ** (EXPONENTS[epoch] - 9) > LONGEST):
-        return epoch, "it counts from 1970, so as Unix time it is of our years", ()
-    if epoch is not None:
-        raise _question(time, layout, f"times of our years in steps of {step:g}", [epoch, *likely])
-    _refuse_other_epochs(time, layout, start, step)
-    if step <= SHORTEST:
-        return _short(time, layout, step)
-    evidence = f"its steps of {step:g}"
-    if likely == ["ms"] and any(number % 1 for number in times):
-        return "s", evidence, (_assumed(time, step),)
-    if len(likely) == 1:
-        return likely[0], evidence, ()
-    if "s" in likely:
-        return "s", evidence, (_assumed(time, step),)
-    raise _question(time, layout, f"steps of {step:g}", likely or list(EXPONENTS))
-
-
-def unit_by_speed(
-    time: Column, layout: LogTable, speed: Callable[[], float | None], *, lasts: bool
-) -> Found | None:
-    """Return s or ms by how fast the joints would turn; None if the steps show it.
-
-    Args:
-        time: The column; only its steps show its unit.
-        layout: How its table is written.
-        speed: Returns the joints' speed as if it were in s, in [rad/s]; None if none of them moves.
-        lasts: Whether it holds durations, not times.
-
-    Raises:
-        LogError: If it may be either.
-    """
-    times = layout.numbers(time.index)
-    steps = sorted(step for step in (times if lasts else steps_of(times)) if step > 0)
-    step = steps[len(steps) // 2] if steps else 0.0
-    since_1970 = not lasts and bool(times) and _since_1970(times[0], step)
-    if since_1970 or not _S_OR_MS[0] <= step <= _S_OR_MS[1]:
-        return None
-    integers, in_s = not any(number % 1 for number in times), speed()
-    if in_s is None:
-        turn, unit = "no joint moves", "ms" if integers and step >= SHORTEST_MS else "s"
-    else:
-        turn = f"the joints turn at up to {1e3 * in_s:.2g} rad/s as ms, at {in_s:.2g} rad/s as s"
-        usual = 1e3 * in_s <= USUAL
-        unit = "s" if 1e3 * in_s > FAST or not (integers or usual) else "ms" if integers and usual else ""
-    if not unit or (unit == "ms" and step < SHORTEST_MS):
-        raise _question(time, layout, f"{'whole ' * integers}steps of {step:g} ({turn})", ["s", "ms"])
-    return unit, f"its steps of {step:g}, and {turn}", (_assumed(time, step, unit, f", since {turn}"),)
-
-
-def speed_of(q: FloatArray, passed: FloatArray) -> float | None:
-    """Return how fast the joints turn in nine of ten rows in which they move, in [rad/s]; None if none moves.
-
-    Their steps are in [rad], shape (n, joints), and take so many [s], shape (n,).
-    """
-    size = np.fmax.reduce(np.abs(q), axis=1, initial=0.0)
-    moves = (size > RESTS * np.fmax.reduce(size, initial=0.0)) & (passed > 0)
-    speeds = np.sort(size[moves] / passed[moves])
-    return float(speeds[int(0.9 * (len(speeds) - 1))]) if len(speeds) else None
-
-
-def in_si(
-    values: FloatArray, joints: Sequence[Column], units: Mapping[int, Unit], source: KnownSource | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return joint values in [rad] or [m], and a turn of each joint, shape (joints,): 0 where it slides.
-
-    By the units of the columns; without one, values beyond a turn in rad are taken as deg. They are in
-    the file's own units, shape (..., joints).
-    """
-    angle = source.units.get("angle") if source else None
-    beyond = peak(values.reshape(-1, values.shape[-1])) > FULL_TURN
-    usual = angle or vocabulary().units["deg" if beyond else "rad"]
-    each = [units.get(joint.number) or units.get(0) or joint.unit or usual for joint in joints]
-    slides = np.array([unit.quantity == "length" for unit in each])
-    return values * [unit.factor for unit in each], np.where(slides, 0.0, FULL_TURN)
-
-
-def _refuse_other_epochs(time: Column, layout: LogTable, start: float, step: float) -> None:
-    """Raise if times of our years count days, or ticks of 100 ns, from another year than 1970."""
-    in_days = 0.0 < step * _SECONDS_A_DAY <= 20 * LONGEST
-    in_ticks = SHORTEST < step * 1e-7 <= 20 * LONGEST
-    kinds = (_DAYS if in_days else {}) | (_TICKS if in_ticks else {})
-    for kind, ((first, last), cure) in kinds.items():
-        if first <= start <= last:
-            message = f"found {start:.15g} in steps of {step:.3g}, as {kind}, allowed: times in {_UNITS}"
-            hints = unit_hints([time], "s" if in_days else "ns", "keeps them unchanged")
-            raise layout.error(f"{message}; convert them: {cure}", time.header, *hints, *EVEN)
-
-
-def _since_1970(start: float, step: float) -> str | None:
-    """Return the unit in which a time is a Unix time of our years, if there is one."""
-    for unit, exponent in EXPONENTS.items():
-        scale = 10.0 ** (exponent - 9)
-        if EPOCH[0] <= start * scale <= EPOCH[1] and step * scale <= 20 * LONGEST:
-            return unit
-    return None
-
-
-def _short(time: Column, layout: LogTable, step: float) -> Found:
-    """Return s for short steps, or for none; raise where they are too short for a log."""
-    if 0 < step < _IMPOSSIBLE:
-        said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
-        hints = unit_hints([time], "s", "keeps them unchanged")
-        raise layout.error(f"{said}; convert them", time.header, *hints, *EVEN)
-    return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
-
-
-def _assumed(time: Column, step: float, unit: str = "s", why: str = "") -> LogWarning:
-    said = f"the time {format_value(time.name)} steps by {step:.6g}: taken as {unit}{why}"
-    hints, taken = (*unit_hints([time], unit, "confirms it"), *OTHER_TIME), f"the times are in {unit}"
-    return LogWarning("assumed-unit", said, hints=hints, assumption=taken, role="time")
-
-
-def _question(time: Column, layout: LogTable, found: str, units: list[str]) -> LogError:
-    """Ask which of some units is meant."""
-    hints = (*(Hint("unit", {time.called: unit}, "specifies it") for unit in units), *OTHER_TIME)
-    return layout.error(f"found {found}, which may be {' or '.join(units)}", time.header, *hints)
-
-
-PAPER_PERIOD = 0.005
-"""Tsp of the paper in [s]: taken where nothing tells the time. Source: [UrmArm2021]_ eq. 22."""
-
-FORMS_TOLD = "numbers in s, ms, us or ns, or times such as 2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
-"""What a clock may look like, for errors."""
-
-
-_DATES = (19_700_101_000_000, 21_000_101_000_000)
-"""Dates written as numbers, YYYYMMDDhhmmss."""
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
+class Clock(NamedTuple):
     """The clock of one table.
 
     Attributes:
-        columns: One column, or seconds and nanoseconds apart; none if the table has no time.
-        parts: The same for the reader.
-        unit: Its unit: s, ms, us, ns, or where it is text "date" or "time of day".
-        told: Whether the user or the name of its column tells that unit.
-        inferences: What was found out.
-        warnings: What a person should know.
-        by_source: Whether the source told that unit.
-        lasts: Whether each row has a duration, and the times are their sum.
+        columns: One column, or the two of a split time; none if the table has no time.
+        parts: The same for the reader; none if the times are not read, as of static poses.
+        unit: Its unit: s, ms, us, ns, or of text "date" or "time of day".
+        is_stated: Whether the user or the name of its column states that unit.
+        by_source: Whether the program that wrote the log does.
+        are_durations: Whether each row has a duration, and the times are their sum.
+        inferences: How columns and unit were found.
+        warnings: About the columns and the unit.
     """
 
     columns: tuple[Column, ...] = ()
     parts: tuple[ClockColumn, ...] = ()
     unit: str = "s"
-    told: bool = False
+    is_stated: bool = False
+    by_source: bool = False
+    are_durations: bool = False
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
-    by_source: bool = False
-    lasts: bool = False
-
-    @property
-    def exponent(self) -> int:
-        """Power of ten from its unit to [ns]; of text that of s."""
-        return EXPONENTS.get(self.unit, 9)
 
     @property
     def as_label(self) -> Clock:
-        """The same as what static poses have for one: columns whose times are not read."""
+        """The same columns, whose times are not read."""
         return Clock(self.columns, inferences=self.inferences[:1])
 
     @property
     def units(self) -> dict[str, str]:
         """The unit of each of its columns by name."""
-        return {column.name: _unit_of(part) for column, part in zip(self.columns, self.parts, strict=True)}
+        return {column.name: _part_unit(part) for column, part in zip(self.columns, self.parts, strict=True)}
 
-    def shown(self, nanoseconds: int) -> str:
-        """Return a time as the file would write it."""
+    def format(self, nanoseconds: int) -> str:
+        """Return a time as the file writes it."""
+        sign, (seconds, rest) = "-" * (nanoseconds < 0), divmod(abs(nanoseconds), SECOND_NS)
         if self.unit == DATE:
             seconds, rest = divmod(nanoseconds, SECOND_NS)
-            date = np.datetime64(seconds, "s").item().isoformat(" ")
-            return f"{date}.{rest:09d}".rstrip("0").rstrip(".")
-        if self.unit == TIME_OF_DAY:
-            sign, (seconds, rest) = "-" * (nanoseconds < 0), divmod(abs(nanoseconds), SECOND_NS)
-            clock = f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
-            return f"{sign}{clock}.{rest:09d}".rstrip("0").rstrip(".")
-        value = Decimal(nanoseconds).scaleb(-EXPONENTS[self.unit]).normalize()
-        return f"{value:f} {self.unit}"
+            text = np.datetime64(seconds, "s").item().isoformat(" ")
+        elif self.unit == TIME_OF_DAY:
+            text = f"{sign}{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+        else:
+            return f"{Decimal(nanoseconds).scaleb(-EXPONENTS[self.unit]).normalize():f} {self.unit}"
+        return f"{text}.{rest:09d}".rstrip("0").rstrip(".")
 
 
-def _unit_of(part: ClockColumn) -> str:
-    """Return the unit of a column of the clock."""
+def _part_unit(part: ClockColumn) -> str:
     if part.forms:
         return part.forms[0].unit
     return next(unit for unit, exponent in EXPONENTS.items() if exponent == part.exponent)
@@ -341,175 +147,321 @@ def find_clocks(
     """Return the clock of each table.
 
     Raises:
-        LogError: If a time is text of an unknown form, or its unit is unclear.
-        OptionError: If its unit is given as one that is no time.
+        LogError: If a time is text of an unknown form, or if its column or unit is ambiguous.
+        OptionError: If the unit given for it is not a unit of time.
     """
     clocks = []
-    for table, layout in enumerate(tables.layouts):
-        own = [column for column in columns if column.table == table]
-        chosen = time_columns(own, layout, options, joints)
-        clock = clock_of(chosen, layout, tables.known, units, label=options.poses)
-        if chosen.passed_over:
-            names = ", ".join(column.name for column in chosen.passed_over)
-            hints = tuple(Hint("time", column.called, "takes it") for column in chosen.passed_over)
-            passed = f"{names} passed over for {chosen.columns[0].name}"
-            clock = replace(clock, warnings=(*clock.warnings, LogWarning(PASSED_OVER, passed, hints=hints)))
+    for k, table in enumerate(tables.layouts):
+        in_table = [column for column in columns if column.table == k]
+        time = find_time_columns(in_table, table, options, joints)
+        clock = make_clock(time, table, tables.known, units, is_label=bool(options.poses))
+        if time.passed_over:
+            names = ", ".join(column.name for column in time.passed_over)
+            hints = tuple(Hint("time", column.called, "takes it") for column in time.passed_over)
+            message = f"{names} passed over for {time.columns[0].name}"
+            warning = LogWarning(PASSED_OVER, message, hints=hints)
+            clock = clock._replace(warnings=(*clock.warnings, warning))
         clocks.append(clock)
     return tuple(clocks)
 
 
-def clock_of(
-    chosen: Chosen,
-    layout: LogTable,
+def make_clock(
+    time: TimeColumns,
+    table: LogTable,
     source: KnownSource | None,
     units: Mapping[int, Unit],
     *,
-    label: bool = False,
+    is_label: bool = False,
 ) -> Clock:
-    """Return the clock that columns make; as a label it has no times.
+    """Return the clock of some columns; as a label it has no times.
 
     Raises:
-        LogError: If the time is text in no form that is known, or its unit cannot be told.
-        OptionError: If its unit is given as one that is no time.
+        LogError: If the time is text of an unknown form, or if its unit is ambiguous.
+        OptionError: If the unit given for it is not a unit of time.
     """
-    columns = chosen.columns
+    columns = time.columns
     if not columns:
-        return Clock(inferences=(Inference("time column", "none", chosen.why, hints=OTHER_TIME),))
-    names = tuple(column.name for column in columns)
-    found = Inference("time column", " and ".join(names), chosen.why, columns=names, hints=OTHER_TIME)
-    if label:
-        return Clock(columns, inferences=(found,))
-    time = columns[0]
-    forms = chosen.forms or _forms_of_numbers(time, layout, source, units)
+        return Clock(inferences=(Inference("time column", "none", time.evidence, hints=OTHER_TIME),))
+    names, first = tuple(column.name for column in columns), columns[0]
+    inference = Inference("time column", " and ".join(names), time.evidence, columns=names, hints=OTHER_TIME)
+    if is_label:
+        return Clock(columns, inferences=(inference,))
+    forms = time.forms or _find_form_of_numbers(first, table, source, units)
     if forms and not any(column.text for column in columns):
         parts = tuple(ClockColumn(c.index, forms=(form,)) for c, form in zip(columns, forms, strict=True))
-        return Clock(columns, parts, _unit_of(parts[0]), inferences=(found,))
-    if time.text:
-        parts = tuple(_text_part(column, layout, units) for column in columns)
-        return Clock(columns, parts, _unit_of(parts[0]), inferences=(found,))
-    if chosen.rest is not None:
-        parts = (ClockColumn(time.index, EXPONENTS["s"]), ClockColumn(columns[1].index, chosen.rest))
-        return Clock(columns, parts, "s", inferences=(found,))
-    unit, evidence, warnings = unit_of(time, layout, source, units, lasts=chosen.lasts)
-    _refuse_ages(time, layout, unit)
-    told = time.number in units or time.unit is not None
-    by_source = not told and source is not None and "time" in source.units
-    clock = Clock(columns, told=told, inferences=(found,), by_source=by_source, lasts=chosen.lasts)
-    return _with_unit(clock, unit, evidence, warnings)
+    elif first.text:
+        parts = tuple(ClockColumn(c.index, forms=_find_text_forms(c, table, units)) for c in columns)
+    elif time.rest_exponent is not None:
+        parts = (ClockColumn(first.index, 9), ClockColumn(columns[1].index, time.rest_exponent))
+    else:
+        choice = find_unit(first, table, source, units, are_durations=time.are_durations)
+        _check_range(first, table, choice.unit)
+        clock = Clock(columns, are_durations=time.are_durations, inferences=(inference,))
+        return _with_unit(clock, choice)
+    return Clock(columns, parts, _part_unit(parts[0]), inferences=(inference,))
 
 
-def _with_unit(clock: Clock, unit: str, evidence: str, warnings: tuple[LogWarning, ...]) -> Clock:
-    """Return a clock of one column of numbers with its unit."""
-    (time,) = clock.columns
+def _find_form_of_numbers(
+    column: Column, table: LogTable, source: KnownSource | None, units: Mapping[int, Unit]
+) -> tuple[ClockForm, ...]:
+    """Return the form of numbers without a unit that are dates, or seconds with unpadded nanoseconds.
+
+    20210411222721.5 is a date. 7.5000000 is 7 s and 5 ms if only so the numbers do not run backwards.
+    """
+    is_stated = column.number in units or column.unit_text or (source is not None and "time" in source.units)
+    if is_stated or column.text:
+        return ()
+    if has_form(column, DENSE_DATE, table):
+        return (DENSE_DATE,)
+    is_backwards = (np.diff(table.numbers(column.index)) < 0).any()
+    if table.arrow is not None or not is_backwards or not has_form(column, UNPADDED_NS, table):
+        return ()
+    times = read_cells(TextCells.of(table.cells(column.index)), UNPADDED_NS)
+    return (UNPADDED_NS,) if (np.diff(times) > 0).all() else ()
+
+
+def _find_text_forms(column: Column, table: LogTable, units: Mapping[int, Unit]) -> tuple[ClockForm, ...]:
+    cells, given_unit = table.cells(column.index), units.get(column.number)
+    forms = find_forms(cells)
+    if not forms:
+        message = f"found {format_value(cells[0])}, allowed: {_ALLOWED_FORMS}"
+        raise table.error(message, column.header, *OTHER_TIME)
+    unit = given_unit or column.unit
+    selected = tuple(form for form in forms if unit is not None and unit.name in form.keys)
+    if given_unit is not None and not selected:
+        keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
+        raise _wrong_unit(column, given_unit, keys)
+    return selected or forms
+
+
+def _wrong_unit(column: Column, unit: Unit, allowed: str) -> OptionError:
+    found = f"{unit.name} for the time {format_value(column.name)}"
+    return OptionError(Finding(parameter="unit", found=found, allowed=allowed, hints=OTHER_TIME))
+
+
+def _check_range(time: Column, table: LogTable, unit: str) -> None:
+    """Raise if 64 bits cannot store the times in [ns]: they are in another unit."""
+    for value in table.numbers(time.index)[:1]:
+        if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
+            of_epoch = [u for u, e in EXPONENTS.items() if EPOCH[0] <= value * 10.0 ** (e - 9) <= EPOCH[1]]
+            hint = Hint("unit", {time.called: (*of_epoch, "ns")[0]}, "applies this")
+            if unit == "s" and _DATES[0] <= value < _DATES[1]:
+                hint = Hint("", effect="a date is read if it is written as 2021-04-11 22:27:21.5")
+            message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
+            raise table.error(message, time.header, hint, *OTHER_TIME)
+
+
+class UnitChoice(NamedTuple):
+    """A unit of time, why, where it is from, and warnings about it."""
+
+    unit: str
+    evidence: str
+    warnings: tuple[LogWarning, ...] = ()
+    is_stated: bool = False
+    by_source: bool = False
+
+
+def _with_unit(clock: Clock, choice: UnitChoice) -> Clock:
+    (time,), unit = clock.columns, choice.unit
     other = (Hint("unit", {time.called: "s" if unit != "s" else "ms"}),)
-    why = Inference("unit of the time", unit, evidence, columns=(time.name,), hints=other)
-    parts, inferences = (ClockColumn(time.index, EXPONENTS[unit]),), (clock.inferences[0], why)
-    return replace(clock, parts=parts, unit=unit, inferences=inferences, warnings=warnings)
+    inference = Inference("unit of the time", unit, choice.evidence, columns=(time.name,), hints=other)
+    return clock._replace(
+        parts=(ClockColumn(time.index, EXPONENTS[unit]),),
+        unit=unit,
+        is_stated=choice.is_stated,
+        by_source=choice.by_source,
+        inferences=(clock.inferences[0], inference),
+        warnings=choice.warnings,
+    )
 
 
-def by_joints(clock: Clock, tables: Tables, joints: Sequence[Column], units: Mapping[int, Unit]) -> Clock:
-    """Return a clock with the unit in which the joints turn at usual speeds, if only its steps show one.
+def find_unit(
+    time: Column,
+    table: LogTable,
+    source: KnownSource | None,
+    units: Mapping[int, Unit],
+    *,
+    are_durations: bool = False,
+) -> UnitChoice:
+    """Return the unit of a column of numbers that are times or durations.
+
+    Args:
+        time: The column.
+        table: How its table is written.
+        source: The program that wrote the log, if it is known.
+        units: Units that the user gives, by the column's number.
+        are_durations: Whether they are durations.
+
+    Raises:
+        LogError: If the unit is one that is not read, or if it is ambiguous.
+        OptionError: If the given unit is not a unit of time.
+    """
+    given_unit = units.get(time.number)
+    if given_unit is not None:
+        if given_unit.name not in EXPONENTS:
+            raise _wrong_unit(time, given_unit, _ALLOWED)
+        return UnitChoice(given_unit.name, "given as an option", is_stated=True)
+    named = time.unit or vocabulary().unit(time.key)  # "seconds" has no other name
+    if named is not None and named.name in EXPONENTS:
+        return UnitChoice(named.name, "its name", is_stated=True)
+    long = time.unit_text or time.key.rpartition("_")[2]
+    if long.lower() in vocabulary().long_times:
+        message = f"found the unit {format_value(long)}, allowed: {_ALLOWED}; convert the times"
+        raise table.error(message, time.header, *OTHER_CLOCK)
+    if source is not None and "time" in source.units:
+        unit = source.units["time"].name
+        return UnitChoice(unit, f"{source.name} writes {unit}", by_source=True)
+    return _find_unit_by_values(time, table, are_durations=are_durations)
+
+
+def _find_unit_by_values(time: Column, table: LogTable, *, are_durations: bool) -> UnitChoice:
+    start, step = _start_and_step(time, table, are_durations=are_durations)
+    usual = [u for u, e in EXPONENTS.items() if MIN_PERIOD < step * 10.0 ** (e - 9) <= MAX_PERIOD]
+    since_1970 = _unit_since_1970(start, step)
+    if since_1970 is not None:
+        if usual and step * 10.0 ** (EXPONENTS[since_1970] - 9) > MAX_PERIOD:
+            raise _ask_unit(time, table, f"times of our years in steps of {step:g}", [since_1970, *usual])
+        return UnitChoice(since_1970, "it counts from 1970, so as Unix time it is of our years")
+    _check_days_and_ticks(time, table, start, step)
+    if 0 < step < IMPOSSIBLE_PERIOD:
+        message = (
+            f"found steps of {step:.3g}, as of days or hours, allowed: times in {_ALLOWED}; convert them"
+        )
+        hints = unit_hints([time], "s", "keeps them unchanged")
+        raise table.error(message, time.header, *hints, *OTHER_CLOCK)
+    if step <= MIN_PERIOD:
+        return UnitChoice(
+            "s", "the usual unit", _assumed(time, step, "s") if 0 < step < UNUSUAL_PERIOD else ()
+        )
+    is_fractional = any(number % 1 for number in table.numbers(time.index))
+    if ("s" in usual and len(usual) > 1) or (usual == ["ms"] and is_fractional):
+        return UnitChoice("s", f"its steps of {step:g}", _assumed(time, step, "s"))
+    if len(usual) != 1:
+        raise _ask_unit(time, table, f"steps of {step:g}", usual or list(EXPONENTS))
+    return UnitChoice(usual[0], f"its steps of {step:g}")
+
+
+def _start_and_step(time: Column, table: LogTable, *, are_durations: bool) -> tuple[float, float]:
+    """Return the first time and the median of the steps that are positive, 0 without one, in its unit."""
+    times = table.numbers(time.index)
+    steps = np.array(times) if are_durations else np.diff(times)
+    steps = np.sort(steps[steps > 0])
+    start = times[0] if times and not are_durations else 0.0
+    return start, float(steps[len(steps) // 2]) if len(steps) else 0.0
+
+
+def _unit_since_1970(start: float, step: float) -> str | None:
+    """Return the unit in which a time is a Unix time of 2000 to 2100; or None."""
+    for unit, exponent in EXPONENTS.items():
+        scale = 10.0 ** (exponent - 9)
+        if EPOCH[0] <= start * scale <= EPOCH[1] and step * scale <= MAX_PAUSE:
+            return unit
+    return None
+
+
+def _check_days_and_ticks(time: Column, table: LogTable, start: float, step: float) -> None:
+    """Raise if times of 2000 to 2100 count days, or ticks of 100 ns, from another year than 1970."""
+    are_days = 0.0 < step * 86_400.0 <= MAX_PAUSE
+    are_ticks = MIN_PERIOD < step * 1e-7 <= MAX_PAUSE
+    for kind, ((first, last), cure) in ((_DAYS if are_days else {}) | (_TICKS if are_ticks else {})).items():
+        if first <= start <= last:
+            message = f"found {start:.15g} in steps of {step:.3g}, as {kind}, allowed: times in {_ALLOWED}"
+            hints = unit_hints([time], "s" if are_days else "ns", "keeps them unchanged")
+            raise table.error(f"{message}; convert them: {cure}", time.header, *hints, *OTHER_CLOCK)
+
+
+def _assumed(time: Column, step: float, unit: str, why: str = "") -> tuple[LogWarning]:
+    message = f"the time {format_value(time.name)} steps by {step:.6g}: taken as {unit}{why}"
+    hints, assumption = (*unit_hints([time], unit, "confirms it"), *OTHER_TIME), f"the times are in {unit}"
+    return (LogWarning("assumed-unit", message, hints=hints, assumption=assumption, role="time"),)
+
+
+def _ask_unit(time: Column, table: LogTable, found: str, units: Sequence[str]) -> LogError:
+    hints = (*(Hint("unit", {time.called: unit}, "specifies it") for unit in units), *OTHER_TIME)
+    return table.error(f"found {found}, which may be {' or '.join(units)}", time.header, *hints)
+
+
+def settle_unit_by_speed(
+    clock: Clock, tables: Tables, joints: Sequence[Column], units: Mapping[int, Unit]
+) -> Clock:
+    """Return a clock in s or ms by the speed of the joints, if only its steps show the unit.
 
     Raises:
         LogError: If it may be s or ms.
     """
-    if len(clock.parts) != 1 or clock.parts[0].forms or clock.told or clock.by_source:
+    if len(clock.parts) != 1 or clock.parts[0].forms or clock.is_stated or clock.by_source:
         return clock
     (time,) = clock.columns
-    layout = tables.layouts[time.table]
-    if vocabulary().unit(time.key) is not None:  # "seconds" has no other name
+    table = tables.layouts[time.table]
+    start, step = _start_and_step(time, table, are_durations=clock.are_durations)
+    if not S_OR_MS[0] <= step <= S_OR_MS[1] or _unit_since_1970(start, step):
         return clock
-
-    @np.errstate(over="ignore", invalid="ignore")  # huge numbers
-    def speed() -> float | None:
-        if not joints:
-            return None
-        main = [joint for joint in joints if joint.table == joints[0].table]
-        times = tables.layouts[time.table].values([time.index])[:, 0]
-        q = tables.layouts[main[0].table].values([joint.index for joint in main])
-        if len(q) != len(times) or len(q) < 2:
-            return None
-        q, turns = in_si(q, main, units, tables.known)
-        steps = np.diff(q, axis=0)
-        steps -= np.rint(steps / FULL_TURN) * turns
-        return speed_of(steps, times[1:] if clock.lasts else np.diff(times))
-
-    unit = unit_by_speed(time, layout, speed, lasts=clock.lasts)
+    are_integers = not any(number % 1 for number in table.numbers(time.index))
+    speed = _speed_in_s(clock, tables, joints, units)
+    if speed is None:
+        why, unit = "no joint moves", "ms" if are_integers and step >= MIN_STEP_MS else "s"
+    else:
+        why = f"the joints turn at up to {1e3 * speed:.2g} rad/s as ms, at {speed:.2g} rad/s as s"
+        is_usual = 1e3 * speed <= USUAL_SPEED
+        if 1e3 * speed > MAX_SPEED or not (are_integers or is_usual):
+            unit = "s"
+        else:
+            unit = "ms" if are_integers and is_usual and step >= MIN_STEP_MS else ""
+    if not unit:
+        found = f"{'whole ' * are_integers}steps of {step:g} ({why})"
+        raise _ask_unit(time, table, found, ["s", "ms"])
     others = tuple(warning for warning in clock.warnings if warning.kind == PASSED_OVER)
-    return clock if unit is None else _with_unit(clock, unit[0], unit[1], (*others, *unit[2]))
+    warnings = (*others, *_assumed(time, step, unit, f", since {why}"))
+    return _with_unit(clock, UnitChoice(unit, f"its steps of {step:g}, and {why}", warnings))
 
 
-def _forms_of_numbers(
-    column: Column, layout: LogTable, source: KnownSource | None, units: Mapping[int, Unit]
-) -> tuple[Form, ...]:
-    """Return the form of numbers whose unit nobody tells and that are dates, or seconds with nanoseconds.
+@np.errstate(over="ignore", invalid="ignore")  # huge numbers
+def _speed_in_s(
+    clock: Clock, tables: Tables, joints: Sequence[Column], units: Mapping[int, Unit]
+) -> float | None:
+    """Return the speed in [rad/s] that nine of ten rows in motion stay below, as if the clock were in s.
 
-    20210411222721.5 is a date. 7.5000000 is 7 s and 5 ms where the numbers run backwards and so they do not.
+    None if no joint moves.
     """
-    told = column.number in units or column.unit_text or (source is not None and "time" in source.units)
-    if told or column.text:
-        return ()
-    if all_are(DENSE_DATE, column, layout):
-        return (DENSE_DATE,)
-    backwards = min(steps_of(layout.numbers(column.index)), default=0.0) < 0
-    if layout.arrow is not None or not backwards or not all_are(UNPADDED_NS, column, layout):
-        return ()
-    times = read_cells(TextCells.of(layout.cells(column.index)), UNPADDED_NS)
-    return (UNPADDED_NS,) if (np.diff(times) > 0).all() else ()
+    main = [joint for joint in joints if joint.table == joints[0].table]
+    times = tables.layouts[clock.columns[0].table].values([clock.columns[0].index])[:, 0]
+    q = tables.layouts[main[0].table].values([joint.index for joint in main]) if main else times[:0]
+    if len(q) != len(times) or len(q) < 2:
+        return None
+    q, turns = joints_in_si(q, main, units, tables.known)
+    steps = np.diff(q, axis=0)
+    steps -= np.rint(steps / FULL_TURN) * turns
+    durations = times[1:] if clock.are_durations else np.diff(times)
+    size = np.fmax.reduce(np.abs(steps), axis=1, initial=0.0)
+    moves = (size > MIN_MOTION * np.fmax.reduce(size, initial=0.0)) & (durations > 0)
+    speeds = np.sort(size[moves] / durations[moves])
+    return float(speeds[int(0.9 * (len(speeds) - 1))]) if len(speeds) else None
 
 
-def _text_part(column: Column, layout: LogTable, units: Mapping[int, Unit]) -> ClockColumn:
-    """Return a column of text for the reader: the forms that it may have."""
-    cells, given = layout.cells(column.index), units.get(column.number)
-    forms = known_forms(cells)
-    if not forms:
-        raise layout.error(
-            f"found {format_value(cells[0])}, allowed: {FORMS_TOLD}", column.header, *OTHER_TIME
-        )
-    wanted = given or column.unit
-    asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
-    if given is not None and not asked:
-        keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
-        found = f"{given.name} for the time {format_value(column.name)}"
-        raise OptionError(Finding(parameter="unit", found=found, allowed=keys, hints=OTHER_TIME))
-    return ClockColumn(column.index, forms=asked or forms)
+def joints_in_si(
+    values: FloatArray, joints: Sequence[Column], units: Mapping[int, Unit], source: KnownSource | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return joint values in [rad] or [m], shape (..., joints), and the period of each, 0 if it slides.
 
-
-def _refuse_ages(time: Column, layout: LogTable, unit: str) -> None:
-    """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
-    for value in layout.numbers(time.index)[:1]:
-        if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
-            since_1970 = [u for u, e in EXPONENTS.items() if EPOCH[0] <= value * 10.0 ** (e - 9) <= EPOCH[1]]
-            hint = Hint("unit", {time.called: (*since_1970, "ns")[0]}, "applies this")
-            if unit == "s" and _DATES[0] <= value < _DATES[1]:
-                hint = Hint("", effect="a date is read if it is written as 2021-04-11 22:27:21.5")
-            message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
-            raise layout.error(message, time.header, hint, *OTHER_TIME)
-
-
-def unused_period(keyword: str) -> LogWarning:
-    """Return the warning that a period has no effect, since the file has a clock; by its keyword."""
-    hints = (Hint("time", "none", "leaves the clock out"),)
-    return LogWarning("period-not-used", "no effect: the log has a clock", parameter=keyword, hints=hints)
-
-
-def unused_for_poses(given: Mapping[str, object]) -> list[LogWarning]:
-    """Return a warning for each keyword with a value, all about motions, since the rows are static poses."""
-    said = "no effect: the rows are static poses, which have no time"
-    return [LogWarning("not-for-poses", said, parameter=name) for name, value in given.items() if value]
+    By the units of the columns; without one, values beyond a turn in rad are taken as deg.
+    """
+    angle = source.units.get("angle") if source else None
+    is_beyond = peak(values.reshape(-1, values.shape[-1])) > FULL_TURN
+    usual = angle or vocabulary().units["deg" if is_beyond else "rad"]
+    column_units = [units.get(joint.number) or units.get(0) or joint.unit or usual for joint in joints]
+    is_sliding = np.array([unit.quantity == "length" for unit in column_units])
+    return values * [unit.factor for unit in column_units], np.where(is_sliding, 0.0, FULL_TURN)
 
 
 def even_clock(
     rows: int, period: float | None, given_by: str = "period", like: str = ""
 ) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
-    """Return the times in [ns], shape (rows,), of a log without a clock, what they rest on, and a warning.
-
-    The warning tells that the period is assumed, if it is.
+    """Return the times of a log without a clock in [ns], shape (rows,), the evidence, and a warning.
 
     Args:
         rows: Number of rows.
-        period: Time between rows in [s], if the user gave it.
-        given_by: The keyword that gave it, for errors.
+        period: Time between rows in [s], if the user gives it.
+        given_by: The keyword that gives it, for errors.
         like: A column that may be the time, for the warning.
 
     Raises:
@@ -518,159 +470,130 @@ def even_clock(
     if period is not None and not (math.isfinite(period) and period >= 1e-9):
         allowed = "a positive time of 1e-9 s or more"
         raise OptionError(Finding(parameter=given_by, found=f"{period:g} s", allowed=allowed))
-    step = PAPER_PERIOD if period is None else period
+    step = DEFAULT_PERIOD if period is None else period
     if rows * step * 1e9 >= LONGEST_NS:
         allowed = f"less than {LONGEST_NS / 1e9 / rows:g} s for {rows} rows"
         raise OptionError(Finding(parameter=given_by, found=f"{step:g} s", allowed=allowed))
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
+    evidence = "assumed" if period is None else "given as an option"
+    inferences = (Inference("period", f"{step:g} s", evidence, hints=(Hint("period"),)),)
     if period is not None:
-        return times, (Inference("period", f"{step:g} s", "given as an option", hints=(Hint("period"),)),), []
-    hints = [Hint("period", None, "sets another time between rows")]
-    always = Hint("time", like, "takes this column as the time: it always increases")
-    hints.append(always if like else OTHER_TIME[0])
-    said = "no time column: the rows are taken as 5 ms apart"
-    assumed = "the rows are 5 ms apart"
-    warning = LogWarning(ASSUMED_PERIOD, said, hints=tuple(hints), assumption=assumed, role="time")
-    return times, (Inference("period", "0.005 s", "assumed", hints=(Hint("period"),)),), [warning]
+        return times, inferences, []
+    rising = Hint("time", like, "takes this column as the time: it always increases")
+    message, assumption = "no time column: the rows are taken as 5 ms apart", "the rows are 5 ms apart"
+    hints = (Hint("period", None, "sets another time between rows"), rising if like else OTHER_TIME[0])
+    warning = LogWarning(ASSUMED_PERIOD, message, hints=hints, assumption=assumption, role="time")
+    return times, inferences, [warning]
 
 
-def over_midnight(numbers: Numbers, clock: Clock) -> Numbers:
-    """Return the numbers with a clock that goes on where seconds of the day begin again, as it does else."""
-    times = numbers.clock
-    if times is None or clock.lasts or clock.unit not in EXPONENTS or numbers.texts:
-        return numbers
-    if len(times) < 3 or times.min() <= UNREADABLE or np.diff(times).min() > -MIDNIGHT_NS:
-        return numbers
-    days = times.copy()
-    add_nights(days)
-    steps, back = np.diff(days), np.diff(times) <= -MIDNIGHT_NS
-    if not 0 < steps[back].min() <= steps[back].max() <= GAP * np.median(steps):
-        return numbers
-    said = "the clock falls back by nearly 24 h, as seconds of the day do at midnight: it is taken to go on"
-    warning = LogWarning("over-midnight", said, int(np.argmax(back)) + 2, hints=OTHER_TIME)
-    return replace(numbers, clock=days, warnings=(*numbers.warnings, warning))
+def unused_period(keyword: str) -> LogWarning:
+    """Return the warning that a period has no effect, since the file has a clock; by its keyword."""
+    hints = (Hint("time", "none", "leaves the clock out"),)
+    return LogWarning("period-not-used", "no effect: the log has a clock", parameter=keyword, hints=hints)
 
 
-TIME_FILE = "time file"
-"""The kind of the inference about a clock that is a file of its own."""
+def unused_for_poses(options: Mapping[str, object]) -> list[LogWarning]:
+    """Return a warning for each option with a value, all about motions, since the rows are static poses."""
+    message = "no effect: the rows are static poses, which have no time"
+    return [LogWarning("not-for-poses", message, parameter=name) for name, value in options.items() if value]
 
 
-def named_file(time: str | None) -> tuple[Path, str] | None:
-    """Return file and column of FILE:COLUMN; None of the name of a column alone.
+# Times in a separate file
 
-    The file ends at the last colon before which the name of one stands.
+
+def split_file_column(time: str | None) -> tuple[Path, str] | None:
+    """Return file and column of FILE:COLUMN; None for the name of a column.
+
+    The file ends at the last colon before which the name of a file is.
     """
-    colons = [place for place, sign in enumerate(time or "") if sign == ":"]
-    parts = ((time[:place], time[place + 1 :]) for place in reversed(colons)) if time else ()
-    for file, column in parts:
-        if column and os.path.isfile(file):  # noqa: PTH113 (of a name that is too long Path raises)
+    parts = (time or "").split(":")
+    for k in range(len(parts) - 1, 0, -1):
+        file, column = ":".join(parts[:k]), ":".join(parts[k:])
+        if column and os.path.isfile(file):  # noqa: PTH113 (for a name that is too long Path raises)
             return Path(file), column
     return None
 
 
-def with_time_file(tables: Tables, options: LogMap) -> tuple[Tables, int | None]:
-    """Return the tables of a log, behind them that of the file whose column the user names as the time.
-
-    Returns:
-        The tables, and the index of that of the times; None if the user names no file.
+def append_time_file(tables: Tables, options: LogMap) -> tuple[Tables, int | None]:
+    """Return the tables of a log with that of the file of times that the user gives, and its index or None.
 
     Raises:
-        LogError: If the file is no table.
-        OptionError: If the log has more tables than one.
+        LogError: If the file is not a table.
+        OptionError: If the log has several tables.
     """
-    named = named_file(options.time)
-    if named is None:
+    file_column = split_file_column(options.time)
+    if file_column is None:
         return tables, None
     if len(tables.layouts) > 1:
         found = f"{format_value(options.time or '')} for {len(tables.layouts)} tables"
         raise OptionError(Finding(parameter="time", found=found, allowed="FILE:COLUMN for one table"))
-    plain = LogMap(delimiter=options.delimiter, decimal=options.decimal)
     try:
-        apart = open_tables([named[0]], plain)
+        times = open_tables([file_column[0]], LogMap(delimiter=options.delimiter, decimal=options.decimal))
     except LogError:
-        apart = open_tables([named[0]], LogMap())  # it may be written in another way than the log
-    layout, rows = across(apart.layouts[0]), tables.layouts[0].rows
-    if rows is not None and rows[-1] < layout.count_rows():
-        layout = layout.take(rows)
-    layouts, titles = (*tables.layouts, layout), (*tables.titles, apart.titles[0])
+        times = open_tables([file_column[0]], LogMap())  # it may be written in another way than the log
+    table, rows = across(times.layouts[0]), tables.layouts[0].rows
+    if rows is not None and rows[-1] < table.count_rows():
+        table = table.take(rows)
+    layouts, titles = (*tables.layouts, table), (*tables.titles, times.titles[0])
     return replace(tables, layouts=layouts, titles=titles), 1
 
 
-def clocks_apart(
+def find_time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
+    """Return which of two tables has only the times of the other; None if neither does.
+
+    It is a single column or row that is named like a time, or whose file is; or the only one of the two,
+    without a header, that runs in even steps.
+    """
+    if len(tables.layouts) != 2 or len(set(tables.paths)) != 2:
+        return None
+    in_tables = [[column for column in columns if column.table == k] for k in (0, 1)]
+    single = [k for k in (0, 1) if len(in_tables[k]) == 1]
+    named = [k for k in single if is_named_time(in_tables[k][0].key) or is_named_time(key(tables.titles[k]))]
+    if len(named) == 1:
+        return named[0]
+    layouts = tables.layouts
+    even = [k for k in single if layouts[k].header is None and runs_evenly(layouts[k].numbers(0))]
+    return even[0] if len(single) == len(even) == 1 else None
+
+
+def find_clocks_with_file(
     tables: Tables, columns: Sequence[Column], index: int, options: LogMap, units: Mapping[int, Unit]
 ) -> tuple[Clock, ...]:
     """Return the clocks of two tables, of which one has the times of the other.
 
-    Of the other a clock that is not used has columns, which are no joints, and no times.
+    A clock of the other table is not read, but its columns are no joints.
 
     Raises:
-        LogError: If both tables have a time and the user names none, or its unit cannot be told.
+        LogError: If both tables have a time and the user gives none, or if its unit is ambiguous.
     """
-    named = named_file(options.time)
-    if named is None:
-        found = clock_of_file(tables, columns, index, units, label=options.poses)
-        return tuple(found if table == index else Clock() for table in (0, 1))
-    own = [[column for column in columns if column.table == table] for table in (0, 1)]
-    layout = tables.layouts[index]
-    numbered = [replace(column, number=column.index + 1) for column in own[index]]
-    column = own[index][find_column(numbered, named[1], parameter="time").index]
-    chosen = given_time(column, own[index], layout)
-    found = clock_of(chosen, layout, None, units, label=options.poses)
-    first, *others = found.inferences
-    title = f"{named[0].name}:{named[1]}"
-    said = replace(first, value=title, kind=TIME_FILE)
-    main = 1 - index
-    try:
-        beside = time_columns(own[main], tables.layouts[main], replace(options, time=None), None)
-    except LogError:  # it may have a time or not: the one that is named is used
-        beside = Chosen((), "")
-    return Clock(beside.columns), replace(found, inferences=(said, *others))
-
-
-def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
-    """Return which of two tables holds nothing but the times of the other; None if neither does.
-
-    It is a single column, or a single row, that is named like a time (the column or the file), or the only
-    one of the two, without a header, that runs in even steps.
-    """
-    if len(tables.layouts) != 2 or len(set(tables.paths)) != 2:
-        return None
-    single = [i for i in (0, 1) if sum(column.table == i for column in columns) == 1]
-    named = [i for i in single if _is_named(tables, columns, i)]
-    if len(named) == 1:
-        return named[0]
-    layouts = tables.layouts
-    even = [i for i in single if layouts[i].header is None and runs_evenly(layouts[i].numbers(0))]
-    return even[0] if len(single) == len(even) == 1 else None
-
-
-def clock_of_file(
-    tables: Tables, columns: Sequence[Column], index: int, units: Mapping[int, Unit], *, label: bool = False
-) -> Clock:
-    """Return the clock that a file of times makes; as a label it has no times.
-
-    Raises:
-        LogError: If the other table has a time as well, or the unit of the times cannot be told.
-    """
-    layout, title = tables.layouts[index], tables.layouts[index].path.name
-    for column in columns:
-        if column.table != index and _is_time(column.key):
-            other = tables.layouts[column.table]
-            hints = (Hint("time", None, "selects the column"), Hint("time", "none", "leaves both out"))
-            message, file = f"found a time here and in {title}, allowed: one clock", other.file
-            raise LogError(Finding(message, file, other.header_line, column=column.header, hints=hints))
-    own = tuple(column for column in columns if column.table == index)
-    form = "one row" if layout.across else "one column"
-    chosen = Chosen(own, f"{title} holds nothing but {form} of times")
-    found = clock_of(chosen, layout, tables.known, units, label=label)
-    first, *others = found.inferences
-    return replace(found, inferences=(replace(first, kind=TIME_FILE), *others))
-
-
-def _is_named(tables: Tables, columns: Sequence[Column], index: int) -> bool:
-    own = next(column for column in columns if column.table == index)
-    return _is_time(own.key) or _is_time(key(tables.titles[index]))
-
-
-def _is_time(name: str) -> bool:
-    return any(pattern.search(name) for pattern in (*vocabulary().time, *vocabulary().dates))
+    in_file = tuple(column for column in columns if column.table == index)
+    in_log = [column for column in columns if column.table != index]
+    table, log_layout = tables.layouts[index], tables.layouts[1 - index]
+    unused, file_column = Clock(), split_file_column(options.time)
+    if file_column is None:
+        title, source = table.path.name, tables.known
+        for column in in_log:
+            if is_named_time(column.key):
+                hints = (Hint("time", None, "selects the column"), Hint("time", "none", "leaves both out"))
+                message, place = (
+                    f"found a time here and in {title}, allowed: one clock",
+                    log_layout.header_line,
+                )
+                raise LogError(Finding(message, log_layout.file, place, column=column.header, hints=hints))
+        form = "one row" if table.across else "one column"
+        time, value = TimeColumns(in_file, f"{title} holds nothing but {form} of times"), ""
+    else:
+        numbered = [replace(column, number=column.index + 1) for column in in_file]
+        column = in_file[find_column(numbered, file_column[1], parameter="time").index]
+        time, source = complete_time(column, in_file, table), None
+        value = f"{file_column[0].name}:{file_column[1]}"
+        try:
+            without = replace(options, time=None)
+            unused = Clock(find_time_columns(in_log, log_layout, without, None).columns)
+        except LogError:  # it may have a time or not: the given one is used
+            pass
+    clock = make_clock(time, table, source, units, is_label=bool(options.poses))
+    first, *others = clock.inferences
+    first = replace(first, value=value or first.value, kind=TIME_FILE)
+    clock = clock._replace(inferences=(first, *others))
+    return tuple(clock if table == index else unused for table in (0, 1))

@@ -1,36 +1,31 @@
-"""What steps say about numbers that increase: those of a clock, or of a joint that turns one way.
+"""Which columns of a table are the time.
 
-A clock runs evenly, but for gaps and for how its times are rounded, or it jitters: its steps are rough. The
-steps of a joint change smoothly. Only a solver with variable steps has a clock like that, and it begins at 0.
+`find_time_columns` takes the first of these that the table has:
 
-Dates in digits alone: 20200714163904, or 20200714 beside 163904.5.
+1. the column that the user gives, with the other part of a split time;
+2. with a header: a column named like a time; with a unit of time; without a name, if it always increases;
+   text that is a date or a time of day (a date and a time of day in two columns are one clock); digits that
+   are dates (YYYYMMDDhhmmss, or YYYYMMDD next to hhmmss); durations, whose sum is the clock;
+3. without a header: text and dates as above; Unix times; a split time; the column that alone increases,
+   - first or last, in steps that jitter, as those of no joint do, or
+   - first, in even steps, while other columns move.
+   What increases in another way may be the time, a counter or a joint: the user is asked.
 
-A clock in two columns: whole seconds, and what goes on from them in ns, us, ms or decimals of a second.
-
-Their names tell it, or their numbers: the second column falls back where the first one steps, and the time of
-both goes on there as it does within a second.
-
-A duration a row instead of a time: the clock is their sum.
-
-The clock of a table without a header: by what stands in its columns, from the first row to the last.
-
-Which columns of a table hold the time: by their names, or by what stands in them.
+A split time is whole seconds in one column, and the rest of a second in ns, us, ms or decimals in another: by
+their names, or because the rest falls back where the seconds step, and their sum continues there as it does
+within a second.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, Hint, LogError, format_value
+from urmpipe_models.errors import Hint, LogError
 from urmpipe_models.math3d import column_count
-from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.logs.clock_text import EXPONENTS, OTHER_TIME, Chosen, known_forms, read_cells
 from urmpipe_pipeline.logs.columns import Column, Kind, chosen_columns, find_column
 from urmpipe_pipeline.logs.formats.cells import TextCells, count_up, is_missing
 from urmpipe_pipeline.logs.formats.clock_forms import (
@@ -38,740 +33,548 @@ from urmpipe_pipeline.logs.formats.clock_forms import (
     DENSE_DATE,
     DENSE_DAY,
     DENSE_TIME,
-    IN_DIGITS,
+    DIGITS,
+    EXPONENTS,
+    SECOND_NS,
     TIME_OF_DAY,
-    Form,
-    in_digits,
+    UNREADABLE,
+    ClockForm,
+    expand_exponent,
+    find_forms,
+    read_cells,
 )
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import UNREADABLE, Numbers
 from urmpipe_pipeline.logs.formats.opening import PATH
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import have_length_1, trailing_matrix, trailing_quaternion
 from urmpipe_pipeline.logs.unnamed import clock_before_pose
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
-Steps = Literal["even", "rough", "smooth", "rounded"]
-"""How numbers increase: "rounded" have few digits, and may be a joint or a clock."""
+GIVEN = "given as an option"  # the evidence for a column that the user gives
+OTHER_TIME = (
+    Hint("time", None, "names the time column"),
+    Hint("time", "none", "leaves the time column out"),
+)
+OTHER_CLOCK = (*OTHER_TIME, Hint("period", None, "sets the time between rows then"))
 
-EVENLY = 0.01
-"""Steps of a clock that runs evenly differ by less than this share."""
+EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
+MIN_PERIOD, MAX_PERIOD = 0.0005, 1.0  # s, usual periods of a log
+MAX_PAUSE = 20.0  # s, median step of Unix times
+MIN_HOURS = 10_000  # hhmmss without leading zeros has hours from here on: 0:59:59 is 5959
+MAX_SEAM = 10.0  # steps within a second by which a split time may continue where the seconds step
+MIN_ROWS = 10  # with fewer rows a joint may increase by chance, and only the first column may be the time
+MAX_FAULTS = 0.02  # share of steps in which a damaged clock may stand still or run backwards; two at least
+MIN_RESTS, MIN_CHANGES = 0.1, 10  # share of steps in which a coarse clock rests, and number of others
+MAX_LISTED = 8  # columns in a question
 
-GAPS = 0.1
-"""Share of its steps that may be longer: gaps."""
-
-ROUNDED = 2.5
-"""Steps that change by no more than this many times the last digit are rounded: nothing else shows ..."""
-
-FEW = 0.05
-"""... but in this share of them."""
-
-ROUGH = 0.5
-"""Steps are rough if they change from one to the next by more than this share of how far they are from the
-usual one, in the median: 1.4 for noise, 0.1 or less for what is sampled ten times in its shortest period."""
-
-MULTIPLE = 0.1
-"""A multiple is one within this share, as far as FINEST tells."""
-
-FINEST = 1e-6
-"""Sizes of steps that differ by less than this share of the usual one are the same."""
+Steps = Literal["even", "rough", "smooth", "unclear"]
 
 
-def steps_of(times: Sequence[float]) -> list[float]:
-    """Return the steps between times."""
-    return [after - before for before, after in pairwise(times)]
+class TimeColumns(NamedTuple):
+    """The columns of a clock.
 
-
-def increases(times: Sequence[float]) -> bool:
-    """Return whether times increase from each to the next."""
-    steps = steps_of(times)
-    return bool(steps) and min(steps) > 0
-
-
-def runs_evenly(times: Sequence[float]) -> bool:
-    """Return whether numbers increase in steps that differ by less than 1 %."""
-    steps = steps_of(times)
-    return len(steps) >= 2 and min(steps) > 0 and max(steps) - min(steps) <= EVENLY * max(steps)
-
-
-def kind_of_steps(values: FloatArray) -> Steps:
-    """Return how ten or more numbers of any unit increase, shape (n,)."""
-    steps = np.diff(values)
-    usual = float(np.median(steps))
-    away, change = np.abs(steps - usual), np.abs(np.diff(steps))
-    odd = away > FINEST * usual
-    if odd.mean() <= GAPS and (steps[odd] > usual).all():
-        return "even"
-    digit = _last_digit(steps / usual) * usual
-    line = np.linspace(values[0], values[-1], len(values))
-    if np.ptp(steps) <= ROUNDED * digit and np.abs(values - line).max() <= 2 * digit:
-        return "even"
-    if np.mean(change > ROUNDED * digit) < FEW:
-        return "rounded"
-    measure = np.mean if np.median(away) <= EVENLY * usual else np.median  # of which a few are late
-    rough = measure(change) > ROUGH * measure(away)
-    return ("even" if away.max() <= EVENLY * usual else "rough") if rough else "smooth"
-
-
-def _last_digit(sizes: FloatArray) -> float:
-    """Return what all sizes of steps differ by multiples of, 0 if there is nothing; the usual size is 1."""
-    apart = np.rint(np.sort(sizes) / FINEST)
-    between = np.diff(apart)
-    digit = between[between > 1].min(initial=np.inf)
-    if not np.isfinite(digit):
-        return 0.0
-    multiples = (apart - apart[0]) / digit
-    return float(digit * FINEST) if np.abs(multiples - np.rint(multiples)).max() < MULTIPLE else 0.0
-
-
-def counts_rows(values: FloatArray, *, any_step: bool) -> bool:
-    """Return whether numbers in [-], shape (n,), count rows: from 0 or 1 in steps of 1, or of any whole."""
-    steps = np.diff(values)
-    if (values % 1 != 0).any() or (steps != steps[0]).any():
-        return False
-    return any_step or (steps[0] == 1 and values[0] in (0, 1))
-
-
-_HOURS = 10_000
-"""Times of day without the zeros before them show their hours from here on: 0:59:59 is 5959."""
-
-
-def dates_in_digits(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
-    """Return the only column of dates with times, or a day and the only time of day that is beside it."""
-    numeric = [column for column in columns if not column.text]
-    dates = [column for column in numeric if all_are(DENSE_DATE, column, layout)]
-    if len(dates) == 1:
-        return Chosen((dates[0],), "its numbers are dates, YYYYMMDDhhmmss", forms=(DENSE_DATE,))
-    days = [column for column in numeric if all_are(DENSE_DAY, column, layout)]
-    times = [column for column in numeric if _tells_hours(column, layout)] if len(days) == 1 else []
-    if len(times) == 1:
-        both = (DENSE_DAY, DENSE_TIME)
-        return Chosen((days[0], times[0]), "a date and a time of day in digits", forms=both)
-    return None
-
-
-def all_are(form: Form, column: Column, layout: LogTable) -> bool:
-    """Return whether all sampled cells of a column, and one at least, are times of a form."""
-    if form in IN_DIGITS and not column.text:
-        written = (in_digits(cell) for cell in layout.number_texts(column.index))
-    else:
-        written = (cell for cell in layout.cells(column.index) if not is_missing(cell))
-    first = next(written, None)
-    if first is None or not form.match(first):
-        return False
-    return bool((read_cells(TextCells.of([first, *written]), form) > UNREADABLE).all())
-
-
-def _tells_hours(column: Column, layout: LogTable) -> bool:
-    """Return whether a column holds times of day with their hours, and not only seconds."""
-    if not all_are(DENSE_TIME, column, layout):
-        return False
-    cells, numbers = layout.cells(column.index), layout.numbers(column.index)
-    padded = all(len(cell.replace(",", ".").partition(".")[0]) >= 6 for cell in cells if not is_missing(cell))
-    return (padded or min(numbers) >= _HOURS) and len(set(numbers)) > 1
-
-
-SECOND = 1e9
-"""A second in [ns]."""
-
-EPOCH = (946_684_800.0, 4_102_444_800.0)
-"""2000 to 2100 as Unix time in [s]."""
-
-PERIODS = (0.0005, 1.0)
-"""Usual periods of a log in [s]."""
-
-SEAM = 10.0
-"""Where the seconds step, the time goes on by less than this many steps within a second."""
-
-
-def named_halves(columns: Sequence[Column], layout: LogTable) -> Iterator[Chosen]:
-    """Yield columns of whole seconds, each with that of what goes on from them, by their names."""
-    words, numeric = vocabulary(), [column for column in columns if not column.text]
-    for first in (column for column in numeric if words.time_seconds.search(column.key)):
-        stem = words.time_seconds.sub("", first.key)
-        for unit, pattern in words.time_rests.items():
-            for second in numeric:
-                same = pattern.search(second.key) and pattern.sub("", second.key) == stem
-                if same and second is not first and _are_halves(first, second, layout, unit):
-                    said = "seconds and decimals of them" if unit == "s" else f"seconds and {unit}"
-                    yield Chosen((first, second), f"their names: {said} apart", EXPONENTS[unit])
-
-
-def halves_beside(first: Column, columns: Sequence[Column], layout: LogTable) -> Chosen | None:
-    """Return a column of whole seconds with what goes on from them beside it, by their numbers; or None.
-
-    Where a whole log lies within a second only a Unix time is taken for seconds, and only whole numbers for
-    what goes on from them; in a table with a header their name has to say so.
+    Attributes:
+        columns: One column, or two that are added; empty without a time.
+        evidence: Why they are the time.
+        rest_exponent: Power of ten to [ns] of the rest of a split time.
+        forms: The form of each column of dates and times of day in digits.
+        are_durations: Whether each row has a duration, and the times are their sum.
+        passed_over: Times of the side that is not read.
     """
-    if not _repeats_whole(layout.numbers(first.index)):
-        return None
-    for second in (column for column in columns if abs(column.index - first.index) == 1 and not column.text):
-        numbers = layout.numbers(second.index)
-        if not numbers or min(numbers) < 0 or max(numbers) >= SECOND or min(numbers) == max(numbers):
-            continue
-        named = any(pattern.search(second.key) for pattern in vocabulary().time_rests.values())
-        rest = rest_of(layout.values([first.index, second.index]), short=layout.header is None or named)
-        if rest is not None:
-            return Chosen((first, second), "whole seconds, and what goes on from them beside it", rest)
-    return None
+
+    columns: tuple[Column, ...]
+    evidence: str
+    rest_exponent: int | None = None
+    forms: tuple[ClockForm, ...] = ()
+    are_durations: bool = False
+    passed_over: tuple[Column, ...] = ()
 
 
-def rest_of(values: FloatArray, *, short: bool = True) -> int | None:
-    """Return the power of ten from the second column to [ns], if it goes on from the seconds of the first.
-
-    Args:
-        values: Both columns, shape (n, 2).
-        short: Whether they may lie within one second, which is a Unix time then.
-    """
-    if len(values) < 3 or not np.isfinite(values).all():
-        return None
-    seconds, rest = values.T
-    turns, steps = np.diff(seconds), np.diff(rest)
-    inside = turns == 0
-    if (seconds % 1 != 0).any() or (turns < 0).any() or not inside.any() or (steps[inside] < 0).any():
-        return None
-    decimals = bool((rest % 1 != 0).any())
-    fitting = [
-        exponent
-        for exponent in ((9,) if decimals else (0, 3, 6))
-        if rest.min() >= 0
-        and rest.max() * 10.0**exponent < SECOND
-        and _goes_on(seconds, turns, steps * 10.0**exponent, short=short and not decimals)
-    ]
-    return fitting[0] if len(fitting) == 1 else None
-
-
-def _goes_on(seconds: FloatArray, turns: FloatArray, steps: FloatArray, *, short: bool) -> bool:
-    """Return whether the time goes on over the turns of a second as within it; steps are in [ns]."""
-    inside = steps[turns == 0]
-    usual = float(inside.mean())
-    if not PERIODS[0] * SECOND < usual <= PERIODS[1] * SECOND:
-        return False
-    over = (turns * SECOND + steps)[turns == 1]
-    if not len(over):
-        return short and EPOCH[0] <= seconds[0] <= EPOCH[1]
-    longest = SEAM * max(usual, float(inside[inside > 0].mean()))
-    return bool((over >= 0).all()) and float(np.mean(over <= longest)) > 0.5
-
-
-def _are_halves(first: Column, second: Column, layout: LogTable, unit: str) -> bool:
-    """Return whether columns with the names of halves hold them: the second stays below a second."""
-    seconds, rest = layout.numbers(first.index), layout.numbers(second.index)
-    below = SECOND / 10 ** EXPONENTS[unit]
-    if any(number % 1 for number in seconds) or not all(0 <= number < below for number in rest):
-        return False
-    if not seconds or seconds[0] != seconds[-1]:
-        return True
-    return bool(np.nanmax(layout.values([second.index]), initial=0.0) < below)
-
-
-def _repeats_whole(numbers: Sequence[float]) -> bool:
-    """Return whether numbers are whole, never fall, and some follow their like."""
-    steps = np.diff(numbers)
-    repeats = bool((steps >= 0).all() and (steps == 0).any())
-    return repeats and not np.mod(numbers, 1).any()
-
-
-SUMMED = "clock-summed"
-"""The kind of the warning about a clock that is the sum of durations."""
-
-
-def durations(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
-    """Return the first column that is named like a duration and holds one a row; None without one."""
-    for column in columns:
-        if not column.text and is_duration(column, layout):
-            return Chosen((column,), "its name: one duration per row", lasts=True)
-    return None
-
-
-def is_duration(column: Column, layout: LogTable) -> bool:
-    """Return whether a column is named like a duration, and its numbers neither increase nor fall below 0."""
-    numbers = layout.numbers(column.index)
-    named = any(pattern.search(column.key) for pattern in vocabulary().durations)
-    return named and bool(numbers) and min(numbers) >= 0 < max(numbers) and not increases(numbers)
-
-
-def summed(numbers: Numbers, name: str) -> Numbers:
-    """Return the numbers with the times that the durations in [ns] in place of their clock add up to.
-
-    Each is taken as the time since the row before, so that the first one is before the first row; if the
-    last one is 0 and the first is not, as the time to the row behind.
-    """
-    durations = numbers.clock
-    if durations is None or not len(durations):
-        return numbers
-    known = durations > UNREADABLE
-    ahead = len(durations) > 1 and known[-1] and durations[-1] == 0 < durations[0]
-    times = np.cumsum(np.where(known, durations, 0))
-    times = np.where(known, times - durations if ahead else times, durations)
-    which = "to the row behind" if ahead else "since the row before"
-    said = f"{name} is one duration per row: the time is their sum, each taken as the time {which}"
-    warning = LogWarning(SUMMED, said, hints=OTHER_TIME)
-    return replace(numbers, clock=times, warnings=(*numbers.warnings, warning))
-
-
-FEW_ROWS = 10
-"""With fewer rows a joint may increase throughout by chance, and only the first column is looked at."""
-
-DAMAGED = 0.02
-"""Share of its steps in which a damaged clock may stand still or run backwards; two at least."""
-
-STAIR = 10
-"""A clock that stands still between its steps has so many of them at least, and no longer rest than one such
-part of the rows."""
-
-RESTS = 0.1
-"""... and rests in this share of the rows at least."""
-
-HARDLY = 20.0
-"""A clock's steps are hardly ever so many times smaller than its mean step; a joint's are while it rests."""
-
-SHOWN = 8
-"""Columns that are named in a question."""
-
-PAUSE = 20.0
-"""The median step of a Unix time, in [s], is at most this long."""
-
-
-def without_header(
-    columns: Sequence[Column], layout: LogTable, options: LogMap, joints: int | None
-) -> Chosen | None:
-    """Return the clock of a table without a header; None if it has none.
-
-    It is a date in digits, seconds with what goes on from them, a Unix time, or the column that alone
-    increases through the whole file. If the robot's joints take all columns, or only one is there, it has
-    none.
+def find_time_columns(
+    columns: Sequence[Column], table: LogTable, options: LogMap, joints: int | None
+) -> TimeColumns:
+    """Return the columns of a table that are the time, and why; no columns without a time.
 
     Args:
         columns: Its columns.
-        layout: How it is written.
-        options: What the user says: the columns named as joints are no time.
-        joints: How many joints the robot has, if there is one.
+        table: The table.
+        options: What the user gives.
+        joints: Number of joints of the robot, if there is one.
 
     Raises:
-        LogError: If a column that increases may be the time, a counter or a joint.
-    """
-    path = options.source == PATH
-    columns = [
-        column for column in columns if column.header
-    ]  # others are an index, or behind a trailing sign
-    if path and (first := _before_pose(columns, layout, options)) is not None:
-        return first
-    if not options.joints and (poses := clock_before_pose(columns, layout)) is not None:
-        return Chosen(*poses)
-    if len(columns) in (1, joints):
-        return None
-    named = set(chosen_columns(columns, options.joints, parameter="joints"))
-    free = [one for one in columns if one not in named and one.index in layout.numeric_columns]
-    found = dates_in_digits(free, layout) or _epoch(free, layout)
-    if found is not None:
-        return found
-    pose = _trailing_pose(free, layout)
-    free = [one for one in free if one not in pose]
-    for column in free:
-        if (both := halves_beside(column, free, layout)) is not None:
-            return both
-    return _increasing(free, layout, joints, path=path, sure=bool(named))
-
-
-def _before_pose(columns: Sequence[Column], layout: LogTable, options: LogMap) -> Chosen | None:
-    """Return what stands before x, y, z and the orientation told, if the number of columns says so."""
-    pose = 3 + (column_count(options.rotation) if options.rotation else 0)
-    if len(columns) == pose:
-        why = f"the {pose} columns are a pose" if options.rotation else "three columns are x, y, z"
-        return Chosen((), why)
-    one_more = options.rotation and len(columns) == pose + 1 and not columns[0].text
-    if one_more and increases(layout.numbers(0)):
-        return Chosen((columns[0],), f"the {pose} columns behind it are a pose, and it increases")
-    return None
-
-
-def _trailing_pose(columns: Sequence[Column], layout: LogTable) -> tuple[Column, ...]:
-    """Return the columns at the end that are a transform, or x, y, z and a quaternion, in many rows."""
-    layouts = [layout] * (max((column.table for column in columns), default=0) + 1)
-    found = trailing_matrix(columns, layouts, some=True)
-    if found is None and len(columns) >= 7:
-        parts = [layout.numbers(column.index) for column in columns[-4:]]
-        rows = np.array(list(zip(*parts, strict=False)))
-        if len(rows) and 2 * np.count_nonzero(have_length_1(rows)) > len(rows):
-            found = trailing_quaternion(columns, layouts, some=True)
-    return (*found.position, *found.rotation) if found else ()
-
-
-def _epoch(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
-    """Return the first column of Unix times of our years, with its nanoseconds if these stand beside it."""
-    for column in columns:
-        numbers = layout.numbers(column.index)
-        if len(numbers) == len(layout.cells(column.index)) and _is_epoch(numbers):
-            both = halves_beside(column, columns, layout)
-            return both or Chosen((column,), "as Unix times its numbers are of our years")
-    return None
-
-
-def _is_epoch(numbers: Sequence[float]) -> bool:
-    """Return whether numbers are Unix times of our years that hardly ever run backwards."""
-    if len(numbers) < 2 or min(numbers) == max(numbers):
-        return False
-    steps = np.diff(numbers)
-    for exponent in EXPONENTS.values():
-        scale = 10.0 ** (exponent - 9)
-        ours = EPOCH[0] <= min(numbers) * scale and max(numbers) * scale <= EPOCH[1]
-        usual = float(np.median(steps[steps > 0])) * scale if (steps > 0).any() else 0.0
-        if ours and PERIODS[0] < usual <= PAUSE:
-            return bool(np.mean(steps < 0) <= DAMAGED)
-    return False
-
-
-@dataclass(frozen=True, slots=True)
-class _Increasing:
-    """A column that increases through the whole file."""
-
-    column: Column
-    values: FloatArray
-
-    @property
-    def first(self) -> bool:
-        """Whether it is the first one of its table."""
-        return self.column.index == 0
-
-    @property
-    def counts(self) -> bool:
-        """Whether it may count rows or frames."""
-        return counts_rows(self.values, any_step=not self.first)
-
-    @property
-    def steps(self) -> Steps:
-        """How it increases."""
-        return kind_of_steps(self.values)
-
-    @property
-    def hardly_moves(self) -> bool:
-        """Whether a quarter of the steps are much smaller than the mean one, as those of a joint at rest."""
-        steps = np.sort(np.diff(self.values))
-        return bool(steps[len(steps) // 4] < steps.mean() / HARDLY)
-
-    @property
-    def may_be_clock(self) -> bool:
-        """Whether a clock may increase so."""
-        return self.steps != "smooth" or self.values[0] == 0.0
-
-
-def _increasing(
-    columns: Sequence[Column], layout: LogTable, joints: int | None, *, path: bool, sure: bool
-) -> Chosen | None:
-    """Return the column that alone increases through the whole file; None if none does.
-
-    Args:
-        columns: Those that may be the time.
-        layout: How the table is written.
-        joints: How many joints the robot has, if there is one.
-        path: The table is a path, which has no joints.
-        sure: The joints are named, so that no other column is taken for one.
-    """
-    sampled = [layout.numbers(column.index) for column in columns]
-    may_be = [column for column, numbers in zip(columns, sampled, strict=True) if increases(numbers)]
-    indices = [layout.numeric_columns[place] for place in np.flatnonzero(layout.increasing)] if may_be else []
-    rising = [_Increasing(column, _values(layout, column)) for column in may_be if column.index in indices]
-    one_more = joints is not None and len(layout.names) == joints + 1
-    if rising and len(rising[0].values) < FEW_ROWS:
-        rising = [one for one in rising if one.first]
-        return _of_few_rows(rising, columns, layout, one_more=one_more, path=path, sure=sure)
-    clocks = rising if one_more else [one for one in rising if one.may_be_clock]
-    if not clocks:
-        _refuse_halting(columns, layout, path=path, sure=sure)
-        return None
-    if (found := _alone(clocks, rising, layout)) is not None:
-        return found
-    if not sure:
-        steps = np.diff(layout.values([column.index for column in columns]), axis=0)
-        stairs = [column for column, own in zip(columns, steps.T, strict=True) if _is_stair(own)]
-        asked = sorted([*(one.column for one in clocks), *stairs], key=lambda column: column.number)
-        raise _question(asked, layout, path=path)
-    return None
-
-
-def _alone(clocks: Sequence[_Increasing], rising: Sequence[_Increasing], layout: LogTable) -> Chosen | None:
-    """Return the only column that may be a clock by its steps, if it is one; None if that cannot be told.
-
-    It jitters; or it is the first one and runs evenly while others move, and none runs as evenly downwards.
-    What runs evenly elsewhere may be a joint.
-
-    Args:
-        clocks: Those that may be a clock.
-        rising: All that increase.
-        layout: The table.
-    """
-    one = clocks[0]
-    if len(clocks) > 1:
-        return None
-    if one.steps == "rough" and not one.hardly_moves:
-        alone = "alone increases" if len(rising) == 1 else "alone increases in steps that jitter"
-        return Chosen((one.column,), f"it {alone} through the whole file")
-    if one.first and one.steps == "even" and not one.counts and _others_move(one, layout):
-        return Chosen((one.column,), "the first column alone increases in even steps")
-    return None
-
-
-def _of_few_rows(
-    rising: Sequence[_Increasing],
-    columns: Sequence[Column],
-    layout: LogTable,
-    *,
-    one_more: bool,
-    path: bool,
-    sure: bool,
-) -> Chosen | None:
-    """Return the first column of a few rows if it alone runs evenly; ask if it may be the time.
-
-    It may if there is one column more than the robot has joints, or it begins at 0, as clocks and counters do
-    and joints seldom, and keeps near a straight line.
-    """
-    if not rising:
-        return None
-    (first,) = rising
-    even = [column for column in columns if runs_evenly(layout.numbers(column.index))]
-    if even == [first.column] and not first.counts:
-        return Chosen((first.column,), "the first column alone increases in even steps")
-    near = len(first.values) > 2 and first.values[0] == 0.0 and _keeps_near_a_line(first.values)
-    if not sure and (one_more or near):
-        raise _question([first.column], layout, path=path)
-    return None
-
-
-def _keeps_near_a_line(times: FloatArray) -> bool:
-    """Return whether times that increase stay within a mean step of the line from the first to the last."""
-    step = (times[-1] - times[0]) / (len(times) - 1)
-    return bool((np.abs(times - times[0] - np.arange(len(times)) * step) <= step).all())
-
-
-def _others_move(first: _Increasing, layout: LogTable) -> bool:
-    """Return whether another column changes, and none falls evenly.
-
-    A column that changes alone, or while others fall evenly, may be a joint.
-    """
-    others = [column for column in layout.numeric_columns if column != first.column.index]
-    values = layout.values(others)
-    falling = (np.diff(values, axis=0) < 0).all(axis=0)
-    if any(kind_of_steps(-values[:, place]) == "even" for place in np.flatnonzero(falling)):
-        return False
-    return bool((np.diff(values, axis=0) != 0).any())
-
-
-def _values(layout: LogTable, column: Column) -> FloatArray:
-    """Return all numbers of a column, shape (n,)."""
-    return layout.values([column.index])[:, 0]
-
-
-def _question(rising: Sequence[Column], layout: LogTable, *, path: bool) -> LogError:
-    """Ask which of the columns that increase is the time."""
-    what = "the time or a counter" if path else "the time, a counter or a joint"
-    if [column.index for column in rising] == [0]:
-        found = f"found a first column that increases from row to row, which may be {what}"
-    elif len(rising) == 1:
-        found = f"found column {rising[0].number}, which increases from row to row and may be {what}"
-    else:
-        numbers = ", ".join(str(column.number) for column in rising[:SHOWN])
-        more = f" and {len(rising) - SHOWN} more" if len(rising) > SHOWN else ""
-        found = f"found columns {numbers}{more}, which increase from row to row: each may be {what}"
-    return layout.error(found, None, *_which(rising, path=path))
-
-
-def _which(columns: Sequence[Column], *, path: bool) -> list[Hint]:
-    """Return what to give so that one of some columns, or none, is the time."""
-    numbers = [str(column.number) for column in columns[:SHOWN]]
-    hints = [Hint("time", number, "specifies it") for number in (*numbers, "none")]
-    return hints if path else [*hints, Hint("joints", None, "names the joint columns")]
-
-
-def _refuse_halting(columns: Sequence[Column], layout: LogTable, *, path: bool, sure: bool) -> None:
-    """Raise if a column would be a clock but for a few rows, or for the rests between its steps.
-
-    Of the former only the first column is looked at, and the first odd row is named.
-    """
-    if not columns or sure:
-        return
-    sampled = [np.diff(layout.numbers(column.index)) for column in columns]
-    may_be = [
-        column
-        for column, steps in zip(columns, sampled, strict=True)
-        if np.count_nonzero(steps < 0) <= max(2, DAMAGED * len(steps)) and (steps > 0).any()
-    ]
-    if not may_be:
-        return
-    steps = np.diff(layout.values([column.index for column in may_be]), axis=0)
-    odd = ~(steps > 0)
-    few = np.count_nonzero(odd, axis=0) <= max(2, DAMAGED * len(steps))
-    nearly = [column for column, is_near in zip(may_be, few, strict=True) if is_near and len(steps) > 8]
-    if [column.index for column in nearly] == [0]:
-        raise _odd_row(int(np.argmax(odd[:, 0])), nearly[0], layout, path=path)
-    stairs = [column for column, own in zip(may_be, steps.T, strict=True) if _is_stair(own)]
-    if len(stairs) == 1:
-        raise _question_of_stairs(stairs[0], layout, path=path)
-
-
-def _odd_row(step: int, column: Column, layout: LogTable, *, path: bool) -> LogError:
-    """Name the row that keeps a first column from increasing: it ends the first odd step, or begins it."""
-    values = _values(layout, column)
-    steps = np.diff(values)
-    usual = float(np.nanmedian(steps))
-    leaps = step > 0 and steps[step - 1] > 2 * usual
-    begins = step == 0 and 0 < steps[1] < 1.5 * usual  # the others go on from the second row
-    row = step + (0 if leaps or begins else 1)
-    cells = layout.cells(column.index)
-    found = format_value(cells[row]) if row < len(cells) else f"{values[row]:.15g}"
-    what = "the time or a counter" if path else "the time, a counter or a joint"
-    message = f"found {found} in a first column that otherwise increases, which may be {what}"
-    at = layout.file_row(row + 1)
-    line = layout.lines_of([at]).get(at)
-    return LogError(Finding(message, layout.file, line, at, hints=tuple(_which([column], path=path))))
-
-
-def _is_stair(steps: FloatArray) -> bool:
-    """Return whether numbers with such steps never fall, and rest between many steps: a coarse clock."""
-    if not (steps >= 0).all() or np.mean(steps == 0) < RESTS:
-        return False
-    changes = np.flatnonzero(steps)
-    rests = np.diff(changes, prepend=-1, append=len(steps))
-    return len(changes) >= STAIR and int(rests.max()) * STAIR <= max(len(steps), 1)
-
-
-def _question_of_stairs(column: Column, layout: LogTable, *, path: bool) -> LogError:
-    what = "the time" if path else "the time or a joint"
-    found = f"found column {column.number}, which rests and increases and never falls: it may be {what}"
-    return layout.error(found, None, *_which([column], path=path))
-
-
-GIVEN = "given as an option"
-"""The evidence for a column that the user named."""
-
-
-def time_columns(
-    columns: Sequence[Column],
-    layout: LogTable,
-    options: LogMap,
-    joints: int | None,
-) -> Chosen:
-    """Return the columns that hold the time, and why; none if there is no time.
-
-    Args:
-        columns: Those of the table.
-        layout: How it is written.
-        options: What the user says.
-        joints: How many joints the robot has, if there is one.
-
-    Raises:
-        LogError: If the column that the user names is not there, or a column of a table without a header
-            may be the time or not.
+        LogError: If the given column does not exist, or if a column may be the time or not.
     """
     if options.time is not None:
         if options.time.lower() == "none":
-            return Chosen((), GIVEN)
-        return given_time(find_column(columns, options.time, parameter="time"), columns, layout)
-    if layout.header is None:
-        found = _texts(columns, layout) or without_header(columns, layout, options, joints)
-        return found or Chosen((), "there is no header")
+            return TimeColumns((), GIVEN)
+        return complete_time(find_column(columns, options.time, parameter="time"), columns, table)
+    if table.header is None:
+        clock = _find_text(columns, table) or _find_without_header(columns, table, options, joints)
+        return clock or TimeColumns((), "there is no header")
+    dates = _find_dates_in_digits(columns, table)
+    words = (*vocabulary().time, *vocabulary().dates)
+    if dates and len(dates.columns) == 2 and any(p.search(c.key) for p in words for c in dates.columns):
+        return dates
     return (
-        _day_beside_time(columns, layout)
-        or _by_name(columns, layout)
-        or _by_content(columns, layout)
-        or _texts(columns, layout)
-        or dates_in_digits(columns, layout)
-        or durations(columns, layout)
-        or Chosen((), "no column is named like a time")
+        _find_named(columns, table)
+        or _find_by_unit(columns, table)
+        or _find_text(columns, table)
+        or dates
+        or _find_durations(columns, table)
+        or TimeColumns((), "no column is named like a time")
     )
 
 
-def given_time(column: Column, columns: Sequence[Column], layout: LogTable) -> Chosen:
-    """Return the clock of a column that the user names, with the other half of it if it is one."""
-    numeric = [one for one in columns if one.index in layout.numeric_columns]
-    pairs = [*named_halves(columns, layout), dates_in_digits(numeric, layout)]
-    near = [one for one in numeric if abs(one.index - column.index) <= 1]
-    pairs += [halves_beside(one, near, layout) for one in near]
-    both = next((one for one in pairs if one and column in one.columns), None)
-    if both is not None:
-        return both._replace(why=GIVEN)
-    return Chosen(_with_other_half(column, columns, layout), GIVEN, lasts=is_duration(column, layout))
+def complete_time(column: Column, columns: Sequence[Column], table: LogTable) -> TimeColumns:
+    """Return the clock of a column that the user gives, with the other part of a split time."""
+    numeric = [other for other in columns if other.index in table.numeric_columns]
+    near = [other for other in numeric if abs(other.index - column.index) <= 1]
+    pairs = [*_iter_named_pairs(columns, table), _find_dates_in_digits(numeric, table)]
+    pairs += [_find_rest(other, near, table) for other in near]
+    for pair in pairs:
+        if pair and column in pair.columns:
+            return pair._replace(evidence=GIVEN)
+    return TimeColumns(
+        _with_other_part(column, columns, table), GIVEN, are_durations=_is_duration(column, table)
+    )
 
 
-def _by_name(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
-    """Return a column of numbers that is named like a time, or whole seconds and what goes on from them."""
-    halves = list(named_halves(columns, layout))
-    numeric = [column for column in columns if not column.text]
-    named = ([c for c in numeric if pattern.search(c.key)] for pattern in vocabulary().time)
-    sides = ([c for c in numeric if c.kind != Kind.PLAIN and p.search(c.bare)] for p in vocabulary().time)
-    times = next((columns for columns in (*named, *sides) if columns), None)
+def suggest_time_column(
+    columns: Sequence[Column], table: LogTable, used: Collection[Column]
+) -> Column | None:
+    """Return the first unused column that may be the time though its name does not show it; or None.
+
+    It increases, and has no unit or one of time. A position or a counter of pulses may increase as well.
+    """
+    for column in columns:
+        is_free = column not in used and not column.text
+        may_be = not column.unit_text or (column.unit and column.unit.quantity == "time")
+        if is_free and may_be and _is_rising(column, table):
+            return column
+    return None
+
+
+def is_named_time(name: str) -> bool:
+    """Return whether a key is a name of a time or a date."""
+    return any(pattern.search(name) for pattern in (*vocabulary().time, *vocabulary().dates))
+
+
+# With a header
+
+
+def _find_named(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
+    pairs = list(_iter_named_pairs(columns, table))
+    words, numeric = vocabulary(), [column for column in columns if not column.text]
+    keys = [column.key for column in numeric]
+    if {"s", "l", "u", "r", "b"} <= set(keys) and keys.count("t") == 1:
+        numeric = [column for column in numeric if column.key != "t"]  # Motoman's axes S, L, U, R, B, T
+    named = ([c for c in numeric if pattern.search(c.key)] for pattern in words.time)
+    of_sides = ([c for c in numeric if c.kind != Kind.PLAIN and p.search(c.bare)] for p in words.time)
+    times = next((some for some in (*named, *of_sides) if some), None)
     if times is None:
-        return halves[0] if halves else None
-    joints = vocabulary().joint["position"]
+        return pairs[0] if pairs else None
+    joints = words.joint["position"]
     kinds = [c.kind for c in numeric if c not in times and any(p.search(c.bare) for p in joints)]
     side = min(kinds, default=Kind.MEASURED)
     time = min(times, key=lambda c: (c.kind != side, c.kind != Kind.PLAIN))
-    both = next((pair for pair in halves if time in pair.columns), None)
-    both = both or halves_beside(time, numeric, layout) or Chosen((time,), "its name")
-    return both._replace(passed_over=tuple(c for c in times if c.kind != time.kind and c not in both.columns))
+    clock = next((pair for pair in pairs if time in pair.columns), None)
+    clock = clock or _find_rest(time, numeric, table) or TimeColumns((time,), "its name")
+    passed_over = (c for c in times if c.kind != time.kind and c not in clock.columns)
+    return clock._replace(passed_over=tuple(passed_over))
 
 
-def _day_beside_time(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
-    """Return a day and a time of day in digits, of which one is named like a time."""
-    found = dates_in_digits(columns, layout)
-    words = (*vocabulary().time, *vocabulary().dates)
-    named = found and any(pattern.search(column.key) for pattern in words for column in found.columns)
-    return found if found and named and len(found.columns) == 2 else None
+def _find_by_unit(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
+    """Return the only column with a unit of time, or a first one without a name that always increases."""
+    timed = [c for c in columns if not c.text and c.unit and (c.unit.quantity, c.unit.order) == ("time", 0)]
+    if len(timed) == 1:
+        column, unit = timed[0], f"its unit, {timed[0].unit_text}"
+        are_durations = _is_duration(column, table)
+        single = TimeColumns((column,), unit, are_durations=are_durations)
+        return _find_rest(column, columns, table) or single
+    first = columns[0]
+    if first.key == "" and not first.text and _is_rising(first, table):
+        return TimeColumns((first,), "the first column has no name and always increases")
+    return None
 
 
-def _texts(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
+def _find_durations(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
+    for column in columns:
+        if not column.text and _is_duration(column, table):
+            return TimeColumns((column,), "its name: one duration per row", are_durations=True)
+    return None
+
+
+def _is_duration(column: Column, table: LogTable) -> bool:
+    """Return whether a column is named like a duration, and is neither negative nor always increasing."""
+    numbers = table.numbers(column.index)
+    is_named = any(pattern.search(column.key) for pattern in vocabulary().durations)
+    return is_named and bool(numbers) and min(numbers) >= 0 < max(numbers) and not _increases(numbers)
+
+
+def _is_rising(column: Column, table: LogTable) -> bool:
+    return not count_up(table.cells(column.index)) and _increases(table.numbers(column.index))
+
+
+def _increases(numbers: Sequence[float]) -> bool:
+    return len(numbers) > 1 and bool((np.diff(numbers) > 0).all())
+
+
+def runs_evenly(numbers: Sequence[float]) -> bool:
+    """Return whether three numbers or more increase in steps that differ by less than 1 %."""
+    steps = np.diff(numbers)
+    return len(steps) >= 2 and bool(steps.min() > 0 and np.ptp(steps) <= EVENLY * steps.max())
+
+
+# Text, and dates in digits
+
+
+def _find_text(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
     """Return a clock of text: by its name, or as the only column of its kind; a date with its time of day."""
     texts = [column for column in columns if column.text]
     words = (*vocabulary().time, *vocabulary().dates)
     named = [column for pattern in words for column in texts if pattern.search(column.key)]
-    clocks = [column for column in texts if known_forms(layout.cells(column.index))]
+    clocks = [column for column in texts if find_forms(table.cells(column.index))]
     named_clocks = [column for column in named if column in clocks]
     if named_clocks:
-        found = _with_other_half(named_clocks[0], columns, layout)
-        return Chosen(found, "its name" if len(found) == 1 else "a date and a time of day")
-    if clocks and (len(clocks) == 1 or len(_with_other_half(clocks[0], columns, layout)) == len(clocks)):
-        return Chosen(_with_other_half(clocks[0], columns, layout), "its cells are dates or times")
-    return Chosen((named[0],), "its name") if named else None
+        parts = _with_other_part(named_clocks[0], columns, table)
+        return TimeColumns(parts, "its name" if len(parts) == 1 else "a date and a time of day")
+    parts = _with_other_part(clocks[0], columns, table) if clocks else ()
+    if clocks and len(clocks) in (1, len(parts)):
+        return TimeColumns(parts, "its cells are dates or times")
+    return TimeColumns((named[0],), "its name") if named else None
 
 
-def _with_other_half(column: Column, columns: Sequence[Column], layout: LogTable) -> tuple[Column, ...]:
-    """Return a column; a date beside the only column of times of day, and the reverse, with this one."""
+def _with_other_part(column: Column, columns: Sequence[Column], table: LogTable) -> tuple[Column, ...]:
+    """Return a column; a date with the only time of day next to it, and the reverse."""
 
-    def half(column: Column) -> str | None:
-        """Return what a column holds, if it is half a clock."""
-        forms = known_forms(layout.cells(column.index)) if column.text else ()
-        return forms[0].half if forms else None
+    def partial_unit(column: Column) -> str | None:
+        forms = find_forms(table.cells(column.index)) if column.text else ()
+        return forms[0].unit if forms and forms[0].is_partial else None
 
-    other = {DATE: TIME_OF_DAY, TIME_OF_DAY: DATE}.get(half(column) or "")
-    others = [candidate for candidate in columns if other is not None and half(candidate) == other]
+    other_unit = {DATE: TIME_OF_DAY, TIME_OF_DAY: DATE}.get(partial_unit(column) or "")
+    others = [other for other in columns if other_unit is not None and partial_unit(other) == other_unit]
     if len(others) != 1:
         return (column,)
-    return (column, others[0]) if other == TIME_OF_DAY else (others[0], column)
+    return (column, others[0]) if other_unit == TIME_OF_DAY else (others[0], column)
 
 
-def _by_content(columns: Sequence[Column], layout: LogTable) -> Chosen | None:
-    """Return a column with a unit of time, or an unnamed first one that runs like a clock."""
-    timed = [c for c in columns if not c.text and c.unit and (c.unit.quantity, c.unit.order) == ("time", 0)]
-    if len(timed) == 1:
-        lasts = is_duration(timed[0], layout)
-        alone = Chosen((timed[0],), f"its unit, {timed[0].unit_text}", lasts=lasts)
-        return halves_beside(timed[0], columns, layout) or alone
-    first = columns[0]
-    if first.key == "" and not first.text and _runs_like_a_clock(first, layout):
-        return Chosen((first,), "the first column has no name and always increases")
+def _find_dates_in_digits(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
+    """Return the only column of dates with times, or a day and the only time of day next to it."""
+    numeric = [column for column in columns if not column.text]
+    dates = [column for column in numeric if has_form(column, DENSE_DATE, table)]
+    if len(dates) == 1:
+        return TimeColumns((dates[0],), "its numbers are dates, YYYYMMDDhhmmss", forms=(DENSE_DATE,))
+    days = [column for column in numeric if has_form(column, DENSE_DAY, table)]
+    times = [column for column in numeric if _has_hours(column, table)] if len(days) == 1 else []
+    if len(times) == 1:
+        forms = (DENSE_DAY, DENSE_TIME)
+        return TimeColumns((days[0], times[0]), "a date and a time of day in digits", forms=forms)
     return None
 
 
-def like_a_time(columns: Sequence[Column], layout: LogTable, used: Collection[Column]) -> Column | None:
-    """Return the first column without a role that runs like a clock, whatever its name; None without one.
+def has_form(column: Column, form: ClockForm, table: LogTable) -> bool:
+    """Return whether all sampled cells of a column, and one at least, are times of a form."""
+    if form in DIGITS and not column.text:
+        cells = [expand_exponent(cell) for cell in table.number_texts(column.index)]
+    else:
+        cells = [cell for cell in table.cells(column.index) if not is_missing(cell)]
+    if not cells or not form.match(cells[0]):
+        return False
+    return bool((read_cells(TextCells.of(cells), form) > UNREADABLE).all())
 
-    It is told, not taken: a way or a counter of pulses increases from row to row as well. One with another
-    unit than that of a time is none.
+
+def _has_hours(column: Column, table: LogTable) -> bool:
+    """Return whether a column has times of day hhmmss with hours, not only seconds."""
+    if not has_form(column, DENSE_TIME, table):
+        return False
+    cells = [cell for cell in table.cells(column.index) if not is_missing(cell)]
+    numbers = table.numbers(column.index)
+    is_padded = all(len(cell.replace(",", ".").partition(".")[0]) >= 6 for cell in cells)
+    return (is_padded or min(numbers) >= MIN_HOURS) and len(set(numbers)) > 1
+
+
+# Split times
+
+
+def _iter_named_pairs(columns: Sequence[Column], table: LogTable) -> Iterator[TimeColumns]:
+    """Yield pairs of columns that are named as seconds and the rest of them, where the rest is below 1 s."""
+    words, numeric = vocabulary(), [column for column in columns if not column.text]
+    for first in (column for column in numeric if words.time_seconds.search(column.key)):
+        seconds, stem = table.numbers(first.index), words.time_seconds.sub("", first.key)
+        if any(number % 1 for number in seconds):
+            continue
+        for unit, pattern in words.time_rests.items():
+            limit = SECOND_NS / 10 ** EXPONENTS[unit]
+            for second in numeric:
+                is_rest = pattern.search(second.key) and pattern.sub("", second.key) == stem
+                if not is_rest or second is first:
+                    continue
+                rest = table.numbers(second.index)
+                if seconds and seconds[0] == seconds[-1]:  # the first rows are not enough
+                    rest = [*rest, np.nanmax(table.values([second.index]), initial=0.0)]
+                if all(0 <= number < limit for number in rest):
+                    name = "seconds and decimals of them" if unit == "s" else f"seconds and {unit}"
+                    yield TimeColumns((first, second), f"their names: {name} apart", EXPONENTS[unit])
+
+
+def _find_rest(seconds: Column, columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
+    """Return a column of whole seconds with the rest of them next to it, by their numbers; or None.
+
+    If the log lies within one second, only a Unix time is taken as seconds, and only integers as the rest; in
+    a table with a header the rest has to be named like one.
     """
-    free = (one for one in columns if one not in used and not one.text)
-    may_be = (one for one in free if not one.unit_text or (one.unit and one.unit.quantity == "time"))
-    return next((one for one in may_be if _runs_like_a_clock(one, layout)), None)
+    numbers = table.numbers(seconds.index)
+    steps = np.diff(numbers)
+    if (steps < 0).any() or not (steps == 0).any() or np.mod(numbers, 1).any():
+        return None
+    for column in columns:
+        rest = table.numbers(column.index)
+        if abs(column.index - seconds.index) != 1 or column.text or not rest or min(rest) == max(rest):
+            continue
+        is_named = any(pattern.search(column.key) for pattern in vocabulary().time_rests.values())
+        values = table.values([seconds.index, column.index])
+        exponent = _fit_rest(*values.T, may_be_short=table.header is None or is_named)
+        if exponent is not None:
+            evidence = "whole seconds, and what goes on from them beside it"
+            return TimeColumns((seconds, column), evidence, exponent)
+    return None
 
 
-def _runs_like_a_clock(column: Column, layout: LogTable) -> bool:
-    return not count_up(layout.cells(column.index)) and increases(layout.numbers(column.index))
+def _fit_rest(seconds: FloatArray, rest: FloatArray, *, may_be_short: bool) -> int | None:
+    """Return the only power of ten to [ns] with which the rest continues seconds, both of shape (n,)."""
+    if len(seconds) < 3 or not (np.isfinite(seconds) & np.isfinite(rest)).all() or rest.min() < 0:
+        return None
+    ticks, steps = np.diff(seconds), np.diff(rest)
+    is_inside = ticks == 0
+    if (seconds % 1 != 0).any() or (ticks < 0).any() or not is_inside.any() or (steps[is_inside] < 0).any():
+        return None
+    are_decimals = bool((rest % 1 != 0).any())
+    fitting = []
+    for exponent in (9,) if are_decimals else (0, 3, 6):
+        steps_ns = steps * 10.0**exponent
+        inside, across = steps_ns[is_inside], (ticks * SECOND_NS + steps_ns)[ticks == 1]
+        usual = float(inside.mean())
+        if len(across):
+            longest = MAX_SEAM * max(usual, float(inside[inside > 0].mean())) if usual > 0 else 0.0
+            continues = (across >= 0).all() and np.mean(across <= longest) > 0.5
+        else:
+            continues = may_be_short and not are_decimals and EPOCH[0] <= seconds[0] <= EPOCH[1]
+        is_usual = MIN_PERIOD * SECOND_NS < usual <= MAX_PERIOD * SECOND_NS
+        if is_usual and continues and rest.max() * 10.0**exponent < SECOND_NS:
+            fitting.append(exponent)
+    return fitting[0] if len(fitting) == 1 else None
+
+
+# Without a header
+
+
+def _find_without_header(
+    columns: Sequence[Column], table: LogTable, options: LogMap, joints: int | None
+) -> TimeColumns | None:
+    is_path = options.source == PATH
+    columns = [column for column in columns if column.header]  # others are an index, or after a last sign
+    pose_clock = _find_before_pose(columns, table, options)
+    if pose_clock is not None or len(columns) in (1, joints):
+        return pose_clock
+    named = chosen_columns(columns, options.joints, parameter="joints")
+    free = [column for column in columns if column not in named and column.index in table.numeric_columns]
+    clock = _find_dates_in_digits(free, table) or _find_unix_time(free, table)
+    if clock is not None:
+        return clock
+    pose_columns = _find_trailing_pose(free, table)
+    free = [column for column in free if column not in pose_columns]
+    for column in free:
+        if (split := _find_rest(column, free, table)) is not None:
+            return split
+    return _find_rising(free, table, joints, is_path=is_path, joints_given=bool(named))
+
+
+def _find_before_pose(columns: Sequence[Column], table: LogTable, options: LogMap) -> TimeColumns | None:
+    """Return the clock of a table of poses without names, which may have none; None for another table."""
+    if options.source == PATH:
+        pose = 3 + (column_count(options.rotation) if options.rotation else 0)
+        if len(columns) == pose:
+            why = f"the {pose} columns are a pose" if options.rotation else "three columns are x, y, z"
+            return TimeColumns((), why)
+        if 3 < pose == len(columns) - 1 and not columns[0].text and _increases(table.numbers(0)):
+            return TimeColumns((columns[0],), f"the {pose} columns behind it are a pose, and it increases")
+    pose_clock = None if options.joints else clock_before_pose(columns, table)
+    return TimeColumns(*pose_clock) if pose_clock is not None else None
+
+
+def _find_trailing_pose(columns: Sequence[Column], table: LogTable) -> tuple[Column, ...]:
+    """Return the last columns that are a transform, or x, y, z and a quaternion, in many rows."""
+    tables = [table] * (max((column.table for column in columns), default=0) + 1)
+    pose = trailing_matrix(columns, tables, some=True)
+    if pose is None and len(columns) >= 7:
+        parts = [table.numbers(column.index) for column in columns[-4:]]
+        rows = np.array(list(zip(*parts, strict=False)))
+        if len(rows) and 2 * np.count_nonzero(have_length_1(rows)) > len(rows):
+            pose = trailing_quaternion(columns, tables, some=True)
+    return (*pose.position, *pose.rotation) if pose else ()
+
+
+def _find_unix_time(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
+    """Return the first column of Unix times of 2000 to 2100, with the rest of its seconds."""
+    for column in columns:
+        numbers = np.array(table.numbers(column.index))
+        if len(numbers) < 2 or len(numbers) != len(table.cells(column.index)) or not np.ptp(numbers):
+            continue
+        steps = np.diff(numbers)
+        usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+        for exponent in EXPONENTS.values():
+            scale = 10.0 ** (exponent - 9)
+            is_epoch = EPOCH[0] <= numbers.min() * scale and numbers.max() * scale <= EPOCH[1]
+            if is_epoch and MIN_PERIOD < usual * scale <= MAX_PAUSE and np.mean(steps < 0) <= MAX_FAULTS:
+                single = TimeColumns((column,), "as Unix times its numbers are of our years")
+                return _find_rest(column, columns, table) or single
+    return None
+
+
+def _find_rising(
+    columns: Sequence[Column],
+    table: LogTable,
+    joints: int | None,
+    *,
+    is_path: bool,
+    joints_given: bool,
+) -> TimeColumns | None:
+    """Return the column that alone increases from the first row to the last; ask if that proves nothing."""
+    increasing = [column for column in columns if _increases(table.numbers(column.index))]
+    if increasing:
+        is_increasing = dict(zip(table.numeric_columns, table.increasing.tolist(), strict=True))
+        increasing = [column for column in increasing if is_increasing[column.index]]
+    values = {column: table.values([column.index])[:, 0] for column in increasing}
+    is_one_more = joints is not None and len(table.names) == joints + 1
+    if increasing and len(values[increasing[0]]) < MIN_ROWS:
+        first = increasing[0]
+        if first.index != 0:
+            return None
+        even = [column for column in columns if runs_evenly(table.numbers(column.index))]
+        if even == [first] and not _counts_rows(values[first]):
+            return TimeColumns((first,), "the first column alone increases in even steps")
+        asked = [first] if is_one_more or (values[first][0] == 0.0 and len(values[first]) > 2) else []
+    else:
+        steps = {column: kind_of_steps(values[column]) for column in increasing}
+        clocks = [c for c in increasing if is_one_more or steps[c] != "smooth" or values[c][0] == 0.0]
+        if len(clocks) == 1:
+            (clock,) = clocks
+            is_first, is_last = clock.index == 0, clock.index == len(table.names) - 1
+            if steps[clock] == "rough" and (is_first or is_last):
+                how = "" if len(increasing) == 1 else " in steps that jitter"
+                return TimeColumns((clock,), f"it alone increases{how} through the whole file")
+            is_even = steps[clock] == "even" and not _counts_rows(values[clock])
+            if is_first and is_even and _others_move(clock, table):
+                return TimeColumns((clock,), "the first column alone increases in even steps")
+        halting = [] if joints_given else _find_halting(columns, table)
+        asked = list({*clocks, *halting}) if clocks or len(halting) == 1 else []
+    if asked and not joints_given:
+        raise _ask_time(sorted(asked, key=lambda column: column.number), increasing, table, is_path=is_path)
+    return None
+
+
+def _counts_rows(values: FloatArray) -> bool:
+    """Return whether numbers, shape (n,), count rows from 0 or 1."""
+    return bool(values[0] in (0, 1) and (np.diff(values) == 1).all())
+
+
+def _others_move(first: Column, table: LogTable) -> bool:
+    """Return whether another column changes, and none falls evenly, as a joint may while another rises."""
+    values = table.values([column for column in table.numeric_columns if column != first.index])
+    steps = np.diff(values, axis=0)
+    falling = values[:, (steps < 0).all(axis=0)]
+    return bool((steps != 0).any()) and not any(kind_of_steps(-column) == "even" for column in falling.T)
+
+
+def _find_halting(columns: Sequence[Column], table: LogTable) -> list[Column]:
+    """Return the first column if it alone increases in almost all rows; else all that rest and never fall."""
+    near = []
+    for column in columns:
+        steps = np.diff(table.numbers(column.index))
+        if np.count_nonzero(steps < 0) <= max(2, MAX_FAULTS * len(steps)) and (steps > 0).any():
+            near.append(column)
+    if not near:
+        return []
+    steps = np.diff(table.values([column.index for column in near]), axis=0)
+    is_few = (np.count_nonzero(~(steps > 0), axis=0) <= max(2, MAX_FAULTS * len(steps))) & (len(steps) > 8)
+    if [column.index for column, few in zip(near, is_few, strict=True) if few] == [0]:
+        return [near[0]]
+    return [column for k, column in enumerate(near) if _is_stair(steps[:, k])]
+
+
+def _is_stair(steps: FloatArray) -> bool:
+    """Return whether numbers with these steps rest between many changes, and never fall: a coarse clock."""
+    if not (steps >= 0).all() or np.mean(steps == 0) < MIN_RESTS:
+        return False
+    changes = np.flatnonzero(steps)
+    rests = np.diff(changes, prepend=-1, append=len(steps))
+    return len(changes) >= MIN_CHANGES and int(rests.max()) * MIN_CHANGES <= max(len(steps), 1)
+
+
+def _ask_time(
+    columns: Sequence[Column], increasing: Sequence[Column], table: LogTable, *, is_path: bool
+) -> LogError:
+    what = "the time or a counter" if is_path else "the time, a counter or a joint"
+    if len(columns) > 1:
+        numbers = ", ".join(str(column.number) for column in columns[:MAX_LISTED])
+        more = f" and {len(columns) - MAX_LISTED} more" if len(columns) > MAX_LISTED else ""
+        message = f"found columns {numbers}{more}, which increase from row to row: each may be {what}"
+    else:
+        how = "increases from row to row" if columns[0] in increasing else "increases or rests in most rows"
+        name = "a first column that" if columns[0].index == 0 else f"column {columns[0].number}, which"
+        joint = ", which may be" if columns[0].index == 0 else " and may be"
+        message = f"found {name} {how}{joint} {what}"
+    choices = [*(str(column.number) for column in columns[:MAX_LISTED]), "none"]
+    hints = [Hint("time", choice, "specifies it") for choice in choices]
+    hints += [] if is_path else [Hint("joints", None, "names the joint columns")]
+    return table.error(message, None, *hints)
+
+
+EVENLY = 0.01  # share by which the steps of an even clock differ
+MAX_GAPS = 0.1  # share of steps that may be longer
+MAX_ROUNDING = 2.5  # last digits; steps that change by no more are rounded: nothing else shows ...
+MIN_UNROUNDED = 0.05  # ... except in this share of them
+MIN_ROUGHNESS = 0.5  # change of steps / their distance from the usual one: 1.4 for noise, 0.1 for a motion
+MAX_STEP_RATIO = 20.0  # mean step / lower quartile; a clock stays below, a joint at rest exceeds it
+MULTIPLE_TOLERANCE = 0.1  # share of a multiple of the last digit
+SIZE_RESOLUTION = 1e-6  # share of the usual step below which sizes are equal
+
+
+def kind_of_steps(values: FloatArray) -> Steps:
+    """Return how ten or more increasing numbers of any unit, shape (n,), step.
+
+    A clock runs evenly, except for gaps and rounding, or it jitters: its steps are rough. The steps of a
+    joint change smoothly; of clocks only that of a solver with variable steps does so, and it begins at 0.
+    Numbers with few digits, or that rest, are unclear.
+    """
+    steps = np.diff(values)
+    usual = float(np.median(steps))
+    distance, change = np.abs(steps - usual), np.abs(np.diff(steps))
+    is_odd = distance > SIZE_RESOLUTION * usual
+    if is_odd.mean() <= MAX_GAPS and (steps[is_odd] > usual).all():
+        return "even"
+    digit = _last_digit(steps / usual) * usual
+    line = np.linspace(values[0], values[-1], len(values))
+    if np.ptp(steps) <= MAX_ROUNDING * digit and np.abs(values - line).max() <= 2 * digit:
+        return "even"
+    if np.mean(change > MAX_ROUNDING * digit) < MIN_UNROUNDED:
+        return "unclear"
+    average = np.mean if np.median(distance) <= EVENLY * usual else np.median  # the mean if a few are late
+    if average(change) <= MIN_ROUGHNESS * average(distance):
+        return "smooth"
+    if distance.max() <= EVENLY * usual:
+        return "even"
+    rests = np.sort(steps)[len(steps) // 4] < steps.mean() / MAX_STEP_RATIO
+    return "unclear" if rests else "rough"
+
+
+def _last_digit(sizes: FloatArray) -> float:
+    """Return the number of which all differences of steps are multiples, or 0; the usual step is 1."""
+    counts = np.rint(np.sort(sizes) / SIZE_RESOLUTION)
+    differences = np.diff(counts)
+    digit = differences[differences > 1].min(initial=np.inf)
+    if not np.isfinite(digit):
+        return 0.0
+    multiples = (counts - counts[0]) / digit
+    is_multiple = np.abs(multiples - np.rint(multiples)).max() < MULTIPLE_TOLERANCE
+    return float(digit * SIZE_RESOLUTION) if is_multiple else 0.0

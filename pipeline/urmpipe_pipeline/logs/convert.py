@@ -27,11 +27,11 @@ from urmpipe_pipeline.joint_log import (
     SourceFile,
     number_rows,
 )
-from urmpipe_pipeline.logs.clock import LONGEST, SHORTEST, even_clock, over_midnight
-from urmpipe_pipeline.logs.clock_columns import like_a_time, summed
-from urmpipe_pipeline.logs.clock_text import EXPONENTS, timed
+from urmpipe_pipeline.logs.clock import even_clock
+from urmpipe_pipeline.logs.clock_columns import MAX_PERIOD, MIN_PERIOD, suggest_time_column
 from urmpipe_pipeline.logs.columns import Column, columns_of
 from urmpipe_pipeline.logs.formats.cells import significant_digits
+from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS
 from urmpipe_pipeline.logs.formats.numbers import Numbers
 from urmpipe_pipeline.logs.formats.opening import PATH, TABLE
 from urmpipe_pipeline.logs.formats.padding import without_padding
@@ -44,15 +44,20 @@ from urmpipe_pipeline.logs.roles import Roles
 from urmpipe_pipeline.logs.rotation import Arm, settle_rotation
 from urmpipe_pipeline.logs.row_checks import (
     MOST_SKIPPED,
-    as_poses,
     find_errors,
     gaps,
     may_skip,
     missing_samples,
-    rebuilt,
     refuse_empty,
     trimmed,
     without_unread,
+)
+from urmpipe_pipeline.logs.timestamps import (
+    continue_over_midnight,
+    detect_static_poses,
+    read_text_times,
+    separate_repeated,
+    sum_durations,
 )
 from urmpipe_pipeline.logs.units import UnitFinder, UnitSources
 from urmpipe_pipeline.logs.vocabulary import Unit
@@ -134,12 +139,12 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
         too_many = Finding(unread, file, parameter="skip_bad", allowed=f"{MOST_SKIPPED:.0%} of them")
     elif may_skip(numbers):
         too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
-    numbers, inferences = trimmed(timed(layout, clock.parts, numbers))
-    numbers = over_midnight(numbers, clock)
+    numbers, inferences = trimmed(read_text_times(layout, clock.parts, numbers))
+    numbers = continue_over_midnight(numbers, clock)
     numbers, padding = without_padding(numbers, lambda: plan.tables.layouts[table].all_rows)
-    if clock.lasts:
-        numbers = summed(numbers, clock.columns[0].name)
-    numbers = rebuilt(as_poses(plan, columns, numbers))
+    if clock.are_durations:
+        numbers = sum_durations(numbers, clock.columns[0].name)
+    numbers = separate_repeated(detect_static_poses(plan, columns, numbers))
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, file))
@@ -414,7 +419,7 @@ def _times(
         return t_ns, 0, said, noticed
     start = int(content.clock[0])
     counted = Inference(
-        "start of the time", plan.clock.shown(start), "the first row; times are counted from it"
+        "start of the time", plan.clock.format(start), "the first row; times are counted from it"
     )
     return content.clock - start, start, (counted,) if start else (), ()
 
@@ -430,7 +435,7 @@ def _by_rates(
     told = [(q.unit, v.unit) for q, v in zip(roles.joints, roles.rates, strict=True)]
     ratio = np.array([v.factor / q.factor if q and v else 1.0 for q, v in told])
     found = period_of(joints, rates * ratio)
-    if found is None or not SHORTEST <= found[0] <= LONGEST:
+    if found is None or not MIN_PERIOD <= found[0] <= MAX_PERIOD:
         return None
     period, varies = rounded_period(found[0]), found[1]
     t_ns, _, _ = even_clock(content.rows, period)
@@ -450,7 +455,7 @@ def _like_a_time(plan: Plan, used: Sequence[Column]) -> Column | None:
     """Return a column of the main table that may be the time though its name does not say so."""
     layout = plan.tables.layouts[plan.main]
     columns = columns_of(plan.tables.layouts, plan.tables.titles) if layout.header else ()
-    return like_a_time([one for one in columns if one.table == plan.main], layout, used)
+    return suggest_time_column([one for one in columns if one.table == plan.main], layout, used)
 
 
 def _corrections(options: LogMap, joints: int) -> tuple[tuple[int, ...], tuple[float, ...]]:

@@ -17,7 +17,7 @@ from typing import Any
 from urmpipe_models.errors import Finding, OptionError, escape_line
 from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, Role
-from urmpipe_pipeline.logs.clock import TIME_FILE, named_file
+from urmpipe_pipeline.logs.clock import TIME_FILE, split_file_column
 from urmpipe_pipeline.logs.formats.opening import TABLE
 from urmpipe_pipeline.logs.formats.table import ROWS_READ
 from urmpipe_pipeline.logs.log_map import READING, Basis, Evidence, LogMap
@@ -114,7 +114,7 @@ def read_map(path: Path) -> LogMap:
     time, file = f"{path.parent / str(result.time)}", result.robot and Path(result.robot)
     return replace(
         result,
-        time=time if result.time and named_file(time) else result.time,
+        time=time if result.time and split_file_column(time) else result.time,
         robot=str(path.parent / file) if file and file.suffix else result.robot,
     )
 
@@ -186,7 +186,7 @@ def _clock_entries(log: JointLog, by_kind: Mapping[str, Inference], options: Log
         return {"time": time, "period": None, "poses": True}
     if not columns:
         return {"time": "none", "period": log.period or None, "poses": False}
-    file = named_file(options.time)
+    file = split_file_column(options.time)
     if len(columns) > 1 or (TIME_FILE in by_kind and not file):
         return {"time": None, "period": None, "poses": False}
     time = f"{file[0].resolve()}:{file[1]}" if file else _name(log, columns[0])
@@ -197,7 +197,7 @@ def _unit_entries(
     log: JointLog, by_kind: Mapping[str, Inference], options: LogMap, time: str | None
 ) -> dict[str, str]:
     """Return the units of the columns; of the clock where it is one column of numbers, or options."""
-    clock, file = _columns(log, "time"), named_file(time)
+    clock, file = _columns(log, "time"), split_file_column(time)
     names = {name for c in clock for name in (c.name, c.header, str(c.number)) if name}
     units = {name: unit for name, unit in options.unit.items() if name in names}
     named = any(vocabulary().unit(split_unit(column.header)[1] or "") for column in clock)

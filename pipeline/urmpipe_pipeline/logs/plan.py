@@ -18,7 +18,14 @@ from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_pipeline.joint_log import Inference, LogWarning
-from urmpipe_pipeline.logs.clock import Clock, by_joints, clocks_apart, find_clocks, time_file, with_time_file
+from urmpipe_pipeline.logs.clock import (
+    Clock,
+    append_time_file,
+    find_clocks,
+    find_clocks_with_file,
+    find_time_file,
+    settle_unit_by_speed,
+)
 from urmpipe_pipeline.logs.columns import (
     Column,
     columns_named,
@@ -109,7 +116,7 @@ def make_plan(
         LogError: If clock or joints cannot be told.
         OptionError: If an option's value makes no sense.
     """
-    tables, apart = with_time_file(tables, options)
+    tables, apart = append_time_file(tables, options)
     columns = columns_of(tables.layouts, tables.titles)
     units = given_units(columns, options)
     beside = columns_named(columns, tables.layouts, further or {})
@@ -120,12 +127,12 @@ def make_plan(
         chosen, applied = topic or columns, applied | ({"topic"} if topic else set())
     has_time = any(column.is_time for column in chosen)
     own_side = without_other_side(chosen if has_time else columns, options)
-    apart = apart if options.time else time_file(tables, own_side)
+    apart = apart if options.time else find_time_file(tables, own_side)
     if apart is None:
         joints = len(robot.coordinates) if robot else None
         clocks = find_clocks(tables, own_side, options, units, joints)
     else:
-        clocks = clocks_apart(tables, own_side, apart, options, units)
+        clocks = find_clocks_with_file(tables, own_side, apart, options, units)
     for i, clock in enumerate(() if options.time or apart is not None else clocks):
         own = [column for column in own_side if column.table == i]
         refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "selects one: give its number"))
@@ -137,7 +144,7 @@ def make_plan(
     roles = replace(roles, further=beside)
     _refuse_many(roles, tables)
     if not options.poses:
-        clocks = tuple(by_joints(clock, tables, roles.joints, units) for clock in clocks)
+        clocks = tuple(settle_unit_by_speed(clock, tables, roles.joints, units) for clock in clocks)
     for table in {column.table for column in roles.joints}:
         own = [column for column in rest if column.table == table]
         refuse_long_form(roles.joints, own, clocks[table].columns, tables.layouts[table])

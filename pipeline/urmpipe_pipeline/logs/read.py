@@ -20,7 +20,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, map_collecting_errors
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, SourceFile
-from urmpipe_pipeline.logs.clock import even_clock, find_clocks, named_file
+from urmpipe_pipeline.logs.clock import even_clock, find_clocks, split_file_column
 from urmpipe_pipeline.logs.columns import Column, columns_of, find_column, given_units, lacks_columns
 from urmpipe_pipeline.logs.convert import Content, assemble, read_content, recorded
 from urmpipe_pipeline.logs.formats.files import unchanged
@@ -75,7 +75,7 @@ def read_numbers(
         episode_file(file, options.episode) if isinstance(file, Path) and is_data_set(file) else file
         for file in files
     ]
-    named = named_file(options.time)
+    named = split_file_column(options.time)
     used = [*files, named[0]] if named else files
     with unchanged(used), ThreadPoolExecutor(max_workers=1) as beside:
         tables = open_tables(files, options)
@@ -156,7 +156,7 @@ def _without_foreign(tables: Tables, options: LogMap) -> LogMap:
     foreign = [name for name in fields if getattr(options, name) and is_foreign(getattr(options, name))]
     foreign += ["names", "signs", "offsets"] if "joints" in foreign else []
     time = options.time
-    if time not in (None, "none") and not named_file(time) and is_foreign([time]):
+    if time not in (None, "none") and not split_file_column(time) and is_foreign([time]):
         options = replace(options, time=None)
     changes: dict[str, Any] = dict.fromkeys(foreign, ())
     return replace(options, **changes)

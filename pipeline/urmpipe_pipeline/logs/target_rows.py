@@ -18,16 +18,17 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.math3d import RotationForm, is_angular, to_matrices, to_quaternions
 from urmpipe_pipeline.joint_log import Inference, LogWarning
-from urmpipe_pipeline.logs.clock import PAPER_PERIOD, Clock
-from urmpipe_pipeline.logs.clock_text import timed
+from urmpipe_pipeline.logs.clock import DEFAULT_PERIOD, Clock
 from urmpipe_pipeline.logs.columns import Column, listed, unit_hints
+from urmpipe_pipeline.logs.formats.clock_forms import UNREADABLE
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import UNREADABLE, Numbers, RowFault
+from urmpipe_pipeline.logs.formats.numbers import Numbers, RowFault
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.pose_columns import ORTHOGONAL
 from urmpipe_pipeline.logs.roles import Roles
 from urmpipe_pipeline.logs.rotation import PURE
-from urmpipe_pipeline.logs.row_checks import find_errors, rebuilt, unknown_times
+from urmpipe_pipeline.logs.row_checks import find_errors, unknown_times
+from urmpipe_pipeline.logs.timestamps import read_text_times, separate_repeated
 from urmpipe_pipeline.logs.vocabulary import Patterns, Unit, vocabulary
 
 ALLOWED = "a finite number"
@@ -92,7 +93,7 @@ def read_rows(plan: Plan, further: Mapping[str, ExtraColumn]) -> Rows:
     read = layout.read(places, clock.parts, allowed)
     if read.lasting:
         raise LogError(*read.lasting)
-    numbers = _without_blank_end(layout, timed(layout, clock.parts, read))
+    numbers = _without_blank_end(layout, read_text_times(layout, clock.parts, read))
     if not len(numbers.values):
         raise LogError(Finding("found no row with a number, allowed: at least one", layout.file))
     faults = _faults(numbers, plan.roles, further, clock)
@@ -155,7 +156,7 @@ def _whole_clock(layout: LogTable, numbers: Numbers, clock: Clock) -> tuple[IntA
         hints = (Hint("time", "none", "leaves the column out"),)
         raise LogError(Finding(said, layout.file, column=clock.columns[0].header, hints=hints))
     timed_rows = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=(), wrong=0).at(known)
-    told = rebuilt(replace(timed_rows, rows=known + 1))
+    told = separate_repeated(replace(timed_rows, rows=known + 1))
     findings = find_errors(layout, told, (), clock)
     if findings:
         raise LogError(*findings)
@@ -167,7 +168,7 @@ def _between(known: IntArray, times: IntArray, rows: int) -> IntArray:
     """Return a time for each row: known ones as they are, others in even steps between and around them."""
     if len(known) == rows:
         return times
-    step = int(np.median(np.diff(times) // np.diff(known))) if len(known) > 1 else int(PAPER_PERIOD * 1e9)
+    step = int(np.median(np.diff(times) // np.diff(known))) if len(known) > 1 else int(DEFAULT_PERIOD * 1e9)
     row = np.arange(rows)
     before, after = times[0] + (row - known[0]) * step, times[-1] + (row - known[-1]) * step
     inside = times[0] + np.rint(np.interp(row, known, times - times[0])).astype(np.int64)

@@ -19,7 +19,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_models.math3d import FORMS, RotationForm, column_count
 from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
-from urmpipe_pipeline.logs.clock import named_file
+from urmpipe_pipeline.logs.clock import split_file_column
 from urmpipe_pipeline.logs.columns import Column, columns_of, listed, unit_inference
 from urmpipe_pipeline.logs.formats.cells import DECIMALS, DELIMITERS, count_up, is_number, split_line
 from urmpipe_pipeline.logs.formats.files import unchanged
@@ -239,7 +239,7 @@ def read_pose_table(
         OptionError: If an option's value makes no sense.
     """
     further = further or {}
-    if named_file(options.time):
+    if split_file_column(options.time):
         allowed = "a column of the table of targets"
         raise OptionError(Finding(parameter="time", found=format_value(options.time or ""), allowed=allowed))
     with unchanged([file]):

@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.planning.path import PROPER, PathRows
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.logs.clock_columns import time_columns
+from urmpipe_pipeline.logs.clock_columns import find_time_columns
 from urmpipe_pipeline.logs.columns import Column, listed
 from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.text import fingerprint
@@ -143,4 +143,4 @@ def _times(table: PoseTable) -> tuple[Column, ...]:
     layout, unused = table.plan.tables.layouts[table.plan.main], table.unused
     if layout.header is None or not unused:
         return ()
-    return time_columns(unused, layout, LogMap(), None)[0]
+    return find_time_columns(unused, layout, LogMap(), None)[0]

@@ -15,8 +15,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
-from urmpipe_pipeline.logs.clock_text import ZONED
-from urmpipe_pipeline.logs.row_checks import REBUILT
+from urmpipe_pipeline.logs.timestamps import REBUILT, ZONED
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
 from urmpipe_pipeline.text import drop_surrogates

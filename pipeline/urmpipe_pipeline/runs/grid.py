@@ -17,7 +17,7 @@ import numpy as np
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, is_inside_gap
-from urmpipe_pipeline.logs.row_checks import Regular, behind_rounded
+from urmpipe_pipeline.logs.timestamps import Regular, fit_rounded
 
 REGULAR = 0.01  # share of the period: no sample of a regular log is further from its place on the grid
 ROUNDING_NS = 1000  # clocks are printed to the microsecond or finer: a time this far outside is at the end
@@ -150,7 +150,7 @@ def row_clock(t_ns: IntArray) -> RowClock:
     ideal = t_ns[0] + np.arange(len(t_ns)) * mean
     if np.max(np.abs(t_ns - ideal)) <= REGULAR * mean:
         return RowClock(t_ns, mean, True)
-    if quantised := behind_rounded(t_ns):
+    if quantised := fit_rounded(t_ns):
         return RowClock(quantised.t_ns - quantised.t_ns[0] + t_ns[0], quantised.period, True, quantised)
     return RowClock(t_ns, float(np.median(np.diff(t_ns))), False)
 

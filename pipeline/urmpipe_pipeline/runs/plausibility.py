@@ -22,7 +22,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_bloc
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.logs.row_checks import FASTEST
+from urmpipe_pipeline.logs.timestamps import MAX_JOINT_SPEED
 from urmpipe_pipeline.repolarization.interval import fold_rows
 
 JOINT_LIMIT = "joint-limit"
@@ -280,9 +280,9 @@ def _limit_warnings(motion: JointMotion, robot: Chain) -> list[LogWarning]:
 def speed_limits(robot: Chain | None, revolute: BoolArray) -> FloatArray:
     """Return the speed limit of each joint in [rad/s] or [m/s], shape (joints,).
 
-    It is that of the robot, else `FASTEST` for revolute joints, shape (joints,), else inf.
+    It is that of the robot, else `MAX_JOINT_SPEED` for revolute joints, shape (joints,), else inf.
     """
-    fallback = np.where(revolute, FASTEST, np.inf)
+    fallback = np.where(revolute, MAX_JOINT_SPEED, np.inf)
     if robot is None:
         return fallback
     limits = np.array([joint.velocity for joint in robot.moving])

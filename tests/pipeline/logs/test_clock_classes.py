@@ -120,7 +120,7 @@ def test_a_counter_is_asked_about(wrong: Wrong, clock: range) -> None:
         (np.diff(np.round(np.arange(61) / 300.0, 3)), "even"),  # rounded times of a regular clock
         (0.005 + 0.001 * np.random.default_rng(1).standard_normal(60), "rough"),
         (np.sin(np.linspace(0.1, 3.0, 60)), "smooth"),  # a joint from rest to rest
-        (np.diff(np.round(np.sin(np.linspace(0.0, 1.2, 61)), 3)), "rounded"),  # a joint in three decimals
+        (np.diff(np.round(np.sin(np.linspace(0.0, 1.2, 61)), 3)), "unclear"),  # a joint in three decimals
     ],
 )
 def test_the_steps_of_clocks_and_joints(steps: FloatArray, kind: str) -> None:

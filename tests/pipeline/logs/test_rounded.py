@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_pipeline.logs.row_checks import behind_repeated, behind_rounded
+from urmpipe_pipeline.logs.timestamps import fit_repeated, fit_rounded
 
 MS = 1_000_000
 SECOND = 1_000_000_000
@@ -30,7 +30,7 @@ def test_a_regular_clock_is_found_behind_coarse_stamps(
 ) -> None:
     period = share * resolution
     stamps = stamped(period, resolution, int(ticks / share), phase, cut=cut)
-    found = behind_repeated(stamps)
+    found = fit_repeated(stamps)
     assert found is not None
     assert found.resolution == resolution
     # changes are seen up to one period late, at either end
@@ -45,7 +45,7 @@ def test_a_regular_clock_is_found_behind_stamps_of_a_millisecond(
     period: float, count: int, phase: float, cut: bool
 ) -> None:
     stamps = stamped(period * MS, MS, count, phase, cut=cut)
-    found = behind_rounded(stamps)
+    found = fit_rounded(stamps)
     if np.ptp(np.diff(stamps)) == 0:
         return  # a clock that shows no rounding is regular by itself
     assert found is not None
@@ -66,7 +66,7 @@ def test_a_regular_clock_is_found_behind_stamps_of_a_millisecond(
     ],
 )
 def test_no_regular_clock_is_made_up(steps: list[int]) -> None:
-    assert behind_repeated(np.cumsum([0, *steps]) * MS) is None
+    assert fit_repeated(np.cumsum([0, *steps]) * MS) is None
 
 
 @pytest.mark.parametrize(
@@ -79,4 +79,4 @@ def test_no_regular_clock_is_made_up(steps: list[int]) -> None:
     ],
 )
 def test_lost_samples_and_jitter_are_no_rounding(steps: list[int]) -> None:
-    assert behind_rounded(np.cumsum([0, *steps]) * MS) is None
+    assert fit_rounded(np.cumsum([0, *steps]) * MS) is None

@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from asserting import INCREASE, OTHER_TIME
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import read_log
-from urmpipe_pipeline.logs.clock_text import known_forms, timed
+from urmpipe_pipeline.logs.formats.clock_forms import find_forms
 from urmpipe_pipeline.logs.formats.numbers import ClockColumn
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import open_text
 from urmpipe_pipeline.logs.formats.text_table import RowReader, clock_scales, parse_block, row_blocks
+from urmpipe_pipeline.logs.timestamps import read_text_times
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -298,12 +299,12 @@ def test_dates_are_exact_parsed_and_by_row(start: datetime, steps: list[int], wr
         layout = sniff(open_text(path))
         # which of several forms it is may stay open: here the writer is known
         key = {"us": "mdy", "german": "dmy", "counted": "us"}.get(writer, "")
-        forms = known_forms(layout.cells(0))
+        forms = find_forms(layout.cells(0))
         clock = (ClockColumn(0, forms=tuple(f for f in forms if key in f.keys) or forms),)
         parsed = parse_block(layout, [1], clock, b"".join(row_blocks(layout)), clock_scales(layout, clock))
         by_row = RowReader(layout, [1], clock).read(text.splitlines()[1:])
         assert parsed is not None
-        read = [timed(layout, clock, numbers).clock for numbers in (parsed, by_row)]
+        read = [read_text_times(layout, clock, numbers).clock for numbers in (parsed, by_row)]
     wanted = [(time - datetime(1970, 1, 1)) // timedelta(microseconds=1) * 1000 for time in exact]
     assert [times.tolist() for times in read if times is not None] == [wanted, wanted]
 

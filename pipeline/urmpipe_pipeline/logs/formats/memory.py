@@ -23,12 +23,11 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_float,
     to_nanoseconds,
 )
+from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, UNREADABLE
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import (
-    NO_TIME,
     SHOWN_FINDINGS,
     UNIT,
-    UNREADABLE,
     ClockColumn,
     Numbers,
     RowFault,

@@ -17,7 +17,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.logs.formats.cells import TextCells
-from urmpipe_pipeline.logs.formats.clock_forms import Form
+from urmpipe_pipeline.logs.formats.clock_forms import ClockForm
 
 UNIT, ROLE = b"unit", b"role"
 """The keys of its unit, and of what it holds with its place among those of this role."""
@@ -52,13 +52,6 @@ def arrow_column(values: npt.NDArray[Any]) -> pa.Array:
 SHOWN_FINDINGS = 20
 """Findings that are told one by one; the others are counted."""
 
-NO_TIME = np.iinfo(np.int64).min
-"""Stands where a row has no time."""
-REPORTED = NO_TIME + 1
-"""Stands where a row has no time because of a finding that is reported already."""
-UNREADABLE = NO_TIME + 2
-"""Stands where the text of a row's time is none."""
-
 
 def capped(findings: Sequence[Finding], file: str) -> list[Finding]:
     """Return the first of many findings about a file, and one that counts the others."""
@@ -78,7 +71,7 @@ class ClockColumn:
 
     column: int
     exponent: int = 0
-    forms: tuple[Form, ...] = ()
+    forms: tuple[ClockForm, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

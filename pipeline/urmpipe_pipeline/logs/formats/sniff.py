@@ -25,7 +25,7 @@ from urmpipe_pipeline.logs.formats.cells import (
     only_count,
     split_line,
 )
-from urmpipe_pipeline.logs.formats.clock_forms import looks_like_a_clock
+from urmpipe_pipeline.logs.formats.clock_forms import is_clock_text
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.text import FEWEST_LINES, HeadLine, Segment, head_lines
@@ -196,7 +196,7 @@ def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
     """
     full = [row for row in rows if len(row) == width and count_numbers(row, decimal)]
     cells = [cell for row in full for cell in row if not is_missing(cell)]
-    numbers = sum(len(cell) for cell in cells if is_number(cell, decimal) or looks_like_a_clock(cell))
+    numbers = sum(len(cell) for cell in cells if is_number(cell, decimal) or is_clock_text(cell))
     return len(full) / len(rows) * numbers / sum(map(len, cells)) if full else 0.0
 
 

@@ -37,11 +37,10 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_float,
     to_nanoseconds,
 )
+from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, REPORTED
 from urmpipe_pipeline.logs.formats.form import Form, RowError, UnfitError, Value
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import (
-    NO_TIME,
-    REPORTED,
     SHOWN_FINDINGS,
     ClockColumn,
     Numbers,
