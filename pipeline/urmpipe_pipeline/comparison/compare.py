@@ -55,7 +55,7 @@ from urmpipe_pipeline.comparison.warnings import (
 )
 from urmpipe_pipeline.diagnosis.diagnose import Compared, Limit, diagnose
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
-from urmpipe_pipeline.logs.roles import TCP_NOT_READ
+from urmpipe_pipeline.logs.coverage import TCP_NOT_READ
 from urmpipe_pipeline.presentation.meshes import mesh_warnings
 from urmpipe_pipeline.provenance import build_provenance
 from urmpipe_pipeline.runs.recorded_tcp import missing_tool_warning

@@ -291,7 +291,7 @@ def _without_number(free: Sequence[Column], file: str, count: int | None, *, hal
     words = vocabulary()
     about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
     every = [c for c in free if not c.words & about_else and not (c.unit and c.unit.order)]
-    still = _of_first_kind(every)
+    still = of_first_kind(every)
     family = _sharing_a_mark(_not_commanded(still))
     if family and count in (None, len(family)):
         _refuse_half(family, free, _not_commanded(still), file, count)
@@ -311,7 +311,7 @@ def _without_number(free: Sequence[Column], file: str, count: int | None, *, hal
     return NamedJoints(())
 
 
-def _of_first_kind(columns: Sequence[Column]) -> list[Column]:
+def of_first_kind(columns: Sequence[Column]) -> list[Column]:
     """Return of columns whose names differ only by words for measured and commanded those to read first."""
     first: dict[str, Kind] = {}
     for column in columns:
@@ -361,7 +361,7 @@ def _refuse_half(
     limbs = frozenset(word for order in words.orders for name in order for word in name.split("_"))
     own = frozenset(word for column in family for word in column.words) | limbs
     moving = words.joint_words["rate"] | words.joint_words["acceleration"] | words.grippers
-    columns = _not_commanded(_of_first_kind([column for column in free if not column.words & moving]))
+    columns = _not_commanded(of_first_kind([column for column in free if not column.words & moving]))
     same = _sharing_a_mark(columns, family)
     others = [c for c in free if c not in family and (c in same or (c in still and c.words & own))]
     if not others or len(family) == count:

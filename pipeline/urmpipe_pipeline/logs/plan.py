@@ -46,7 +46,6 @@ from urmpipe_pipeline.logs.roles import (
     Roles,
     assign,
     joint_inference,
-    joints_of_blocks,
     own_joints,
     refuse_long_form,
     written_roles,
@@ -208,8 +207,6 @@ def _roles(
         and (written := written_roles(columns, main, robot)) is not None
     ):
         return written
-    if not given and (signals := joints_of_blocks(columns, main, robot)) is not None:
-        return signals
     if main.header is None and not several:
         return without_header(columns, tables.layouts, options, robot, path=options.source == PATH)
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
@@ -238,7 +235,7 @@ def _by_names(
     """Return the roles of columns with names, each there once; a log of our own without joints is a path."""
     path = options.source == PATH or own == ()
     layouts, written = tables.layouts, () if path else own or ()
-    roles = assign(columns, layouts, options, robot, tables.layouts, path=path, written=written)
+    roles = assign(columns, layouts, options, robot, path=path, written=written)
     if not options.joints:
         refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "selects them: give their numbers"))
     refuse_twins(

@@ -345,7 +345,7 @@ def _groups(free: Sequence[Column], unlike: BoolArray, count: int | None) -> lis
         for size in USUAL_COUNTS
         for k in (range(0, len(free), size) if len(free) % size == 0 else (0,))
     ]
-    return [*near[:2], *tiles, free] if unlike.any() else [*tiles, free]
+    return [*tiles, *near[:1], free]
 
 
 # 4. Plots
