@@ -109,32 +109,44 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
 def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     """Return the time between rows with which joints step as their rates say, and how much it varies.
 
-    It is the sum of steps over that of mean rates, of the steps that move clearly and whose ratio is near its
+    It is the sum of steps over that of mean rates, of the steps that move clearly and whose ratio is near the
     median: in [s] if the joints are in [rad] or [m] and the rates in [rad/s] or [m/s], both of shape
-    (n, joints). It varies by the median of the relative deviations [-]. None where nothing moves, or joints
-    and rates do not agree.
+    (n, joints). It varies by the median of the relative deviations [-]. None if nothing moves, or if joints
+    and rates do not agree. With the rows h apart, the mean rate between rows k and k + 1 is
+
+        (13 (v[k] + v[k + 1]) - v[k - 1] - v[k + 2]) / 24 + O(h^4),
+
+    and (v[k] + v[k + 1]) / 2 + O(h^2) next to rows without a value.
     """
     joints = q.shape[1]
-    both, means = _steps_and_means(np.hstack([q, rates]))
-    steps, means = both[:, :joints], means[:, joints:]
+    steps, means = _steps_and_mean_rates(q, rates)
     size = np.abs(steps * means)
     if len(steps) < LEAST_ROWS or not size.any():
         return None
-    clear = size > CLEAR * np.sort(size, axis=None)[int(0.9 * (size.size - 1))]
-    each = [
-        steps[at, j] / means[at, j] for j, at in enumerate(clear.T) if np.count_nonzero(at) >= LEAST_CLEAR
-    ]
-    if len(each) < min(2, joints):
+    is_clear = size > CLEAR * np.sort(size, axis=None)[int(0.9 * (size.size - 1))]
+    columns = [(steps[rows, j], means[rows, j]) for j, rows in enumerate(is_clear.T)]
+    ratios = [step / mean for step, mean in columns if len(step) >= LEAST_CLEAR]
+    if len(ratios) < min(2, joints):
         return None
-    period = float(np.median(np.concatenate(each)))
-    varies = float(np.median(np.abs(np.concatenate(each) / period - 1))) if period > 0 else np.inf
-    off = np.array([abs(np.median(one) / period - 1) * np.sqrt(len(one)) for one in each])
-    near = np.maximum(ONE_PERIOD * np.sqrt([len(one) for one in each]), 4 * varies)  # 2.2 standard errors
-    if varies >= MOST_VARIED or (off > near).any():
-        return None
+    period = float(np.median(np.concatenate(ratios)))
+    variation = float(np.median(np.abs(np.concatenate(ratios) / period - 1))) if period > 0 else np.inf
+    counts = np.array([len(ratio) for ratio in ratios])
+    errors = np.array([abs(np.median(ratio) / period - 1) for ratio in ratios])
+    if variation >= MOST_VARIED or (errors > np.maximum(ONE_PERIOD, 4 * variation / np.sqrt(counts))).any():
+        return None  # 2.2 standard errors of a median
     with np.errstate(divide="ignore", invalid="ignore"):
-        usual = clear & (np.abs(steps / means / period - 1) <= 4 * varies + 1e-9)
-    return float(np.abs(steps[usual]).sum() / np.abs(means[usual]).sum()), varies
+        is_usual = is_clear & (np.abs(steps / means / period - 1) <= 4 * variation + 1e-9)
+    return float(np.abs(steps[is_usual]).sum() / np.abs(means[is_usual]).sum()), variation
+
+
+def _steps_and_mean_rates(q: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+    rows = np.linspace(0, len(q) - 2, min(MOST_ROWS, max(len(q) - 1, 0))).astype(np.int64)
+    steps, means = q[rows + 1] - q[rows], (rates[rows] + rates[rows + 1]) / 2
+    outer = rates[np.maximum(rows - 1, 0)] + rates[np.minimum(rows + 2, len(q) - 1)]
+    has_outer = np.isfinite(outer).all(axis=1) & (rows > 0) & (rows < len(q) - 2)
+    means = np.where(has_outer[:, np.newaxis], (26 * means - outer) / 24, means)
+    is_known = np.isfinite(steps).all(axis=1) & np.isfinite(means).all(axis=1)
+    return steps[is_known], means[is_known]
 
 
 def rounded_period(period: float) -> float:
