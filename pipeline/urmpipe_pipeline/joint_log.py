@@ -44,6 +44,7 @@ def ns_to_seconds(nanoseconds: IntArray) -> FloatArray:
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)
 
 
+Basis = Literal["given", "named", "proved", "assumed"]
 Role = Literal["time", "joint", "rate", "acceleration", "position", "rotation"]
 ROLES: tuple[Role, ...] = get_args(Role)
 
@@ -74,6 +75,7 @@ class Inference:
         kind: A word to filter by, such as "unit" or "form"; by default the property.
         columns: Names of the columns or joints that it is about; empty for the file.
         hints: Options that change it.
+        basis: How it is known: by the user, by a name of the file, by its numbers, or not at all.
     """
 
     what: str
@@ -82,6 +84,7 @@ class Inference:
     kind: str = ""
     columns: tuple[str, ...] = ()
     hints: tuple[Hint, ...] = ()
+    basis: Basis = "proved"
 
     def __post_init__(self) -> None:
         """Set the kind to the property by default."""

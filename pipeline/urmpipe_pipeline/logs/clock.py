@@ -24,7 +24,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_models.wraps import FULL_TURN
-from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, PASSED_OVER, Inference, LogWarning
+from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, PASSED_OVER, Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.clock_columns import (
     EPOCH,
     MAX_PERIOD,
@@ -181,9 +181,14 @@ def make_clock(
     """
     columns = time.columns
     if not columns:
-        return Clock(inferences=(Inference("time column", "none", time.evidence, hints=OTHER_TIME),))
+        inference = Inference("time column", "none", time.evidence, hints=OTHER_TIME, basis="assumed")
+        return Clock(inferences=(inference,))
     names, first = tuple(column.name for column in columns), columns[0]
-    inference = Inference("time column", " and ".join(names), time.evidence, columns=names, hints=OTHER_TIME)
+    is_labelled = any(each.kind == "labels" for each in table.inferences)
+    basis: Basis = (
+        "named" if is_labelled or any(is_named_time(column.key) for column in columns) else "proved"
+    )
+    inference = Inference("time column", " and ".join(names), time.evidence, "", names, OTHER_TIME, basis)
     if is_label:
         return Clock(columns, inferences=(inference,))
     forms = time.forms or _find_form_of_numbers(first, table, source, units)
@@ -264,7 +269,10 @@ class UnitChoice(NamedTuple):
 def _with_unit(clock: Clock, choice: UnitChoice) -> Clock:
     (time,), unit = clock.columns, choice.unit
     other = (Hint("unit", {time.called: "s" if unit != "s" else "ms"}),)
-    inference = Inference("unit of the time", unit, choice.evidence, columns=(time.name,), hints=other)
+    is_assumed = any(warning.assumption for warning in choice.warnings)
+    is_named = time.unit is not None or choice.is_stated or choice.by_source
+    basis: Basis = "assumed" if is_assumed else "named" if is_named else "proved"
+    inference = Inference("unit of the time", unit, choice.evidence, "", (time.name,), other, basis)
     return clock._replace(
         parts=(ClockColumn(time.index, EXPONENTS[unit]),),
         unit=unit,
@@ -475,8 +483,9 @@ def even_clock(
         allowed = f"less than {LONGEST_NS / 1e9 / rows:g} s for {rows} rows"
         raise OptionError(Finding(parameter=given_by, found=f"{step:g} s", allowed=allowed))
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
+    basis: Basis = "assumed" if period is None else "given"
     evidence = "assumed" if period is None else "given as an option"
-    inferences = (Inference("period", f"{step:g} s", evidence, hints=(Hint("period"),)),)
+    inferences = (Inference("period", f"{step:g} s", evidence, hints=(Hint("period"),), basis=basis),)
     if period is not None:
         return times, inferences, []
     rising = Hint("time", like, "takes this column as the time: it always increases")

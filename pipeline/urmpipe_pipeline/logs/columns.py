@@ -15,7 +15,7 @@ from enum import IntEnum
 from itertools import combinations
 
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
-from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.joint_log import Basis, Inference
 from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
@@ -589,7 +589,9 @@ def which_unit(columns: Sequence[Column], unit: str, *, every: bool) -> tuple[Hi
     return tuple(Hint("unit", one, "specifies it") for one in given)
 
 
-def unit_inference(columns: Sequence[Column], unit: str, evidence: str, *, every: bool) -> Inference:
+def unit_inference(
+    columns: Sequence[Column], unit: str, evidence: str, basis: Basis, *, every: bool
+) -> Inference:
     """Return what is said of the unit of some columns, and why; with the other unit that it may be.
 
     What is given for every angle reaches some columns, and others are given one by one, as the first is.
@@ -597,4 +599,4 @@ def unit_inference(columns: Sequence[Column], unit: str, evidence: str, *, every
     names, other = tuple(column.name for column in columns), OTHER_UNIT.get(unit)
     every = every and len(columns) > 1 and unit in ("rad", "deg")
     hints = (Hint("unit", {"" if every else columns[0].called: other}),) if other else ()
-    return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints)
+    return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints, basis)

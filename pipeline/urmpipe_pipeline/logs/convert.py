@@ -20,6 +20,7 @@ from urmpipe_pipeline.joint_log import (
     ASSUMED_PERIOD,
     ROLES,
     ROW_NS,
+    Basis,
     Inference,
     JointLog,
     LogColumn,
@@ -440,8 +441,9 @@ def _by_rates(
     period, varies = rounded_period(found[0]), found[1]
     t_ns, _, _ = even_clock(content.rows, period)
     evidence = f"steps over recorded rates; half of the steps are within {100 * varies:.2g} % of it"
-    said = Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),))
-    if varies <= SURE_VARIED:
+    basis: Basis = "proved" if varies <= SURE_VARIED else "assumed"
+    said = Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),), basis=basis)
+    if basis == "proved":
         return t_ns, 0, (said,), ()
     apart = f"the rows are {1e3 * period:g} ms apart"
     warning = LogWarning(

@@ -11,11 +11,12 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.math3d import FORMS, RotationForm
 from urmpipe_models.measure_units import compatible_units, quantity_to_si
+from urmpipe_pipeline.joint_log import Basis
 
 COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
 UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
@@ -26,10 +27,6 @@ INTERVALS = "two ends for all revolute joints, or ends by joint, such as q1=-180
 
 GivenInterval: TypeAlias = tuple[float | str, float | str]
 """LOW and HIGH of a joint: numbers in the file's own unit, or both angles as texts with units."""
-
-
-Basis: TypeAlias = Literal["given", "named", "proved", "assumed"]
-"""How an entry of a map is known: by the user, by a name of the file, by its numbers, or not at all."""
 
 
 class Evidence(NamedTuple):

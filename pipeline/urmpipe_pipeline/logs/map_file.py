@@ -16,14 +16,12 @@ from typing import Any
 
 from urmpipe_models.errors import Finding, OptionError, escape_line
 from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
-from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, Role
+from urmpipe_pipeline.joint_log import Basis, Inference, JointLog, LogColumn, Role
 from urmpipe_pipeline.logs.clock import TIME_FILE, split_file_column
 from urmpipe_pipeline.logs.formats.opening import TABLE
 from urmpipe_pipeline.logs.formats.table import ROWS_READ
-from urmpipe_pipeline.logs.log_map import READING, Basis, Evidence, LogMap
+from urmpipe_pipeline.logs.log_map import READING, Evidence, LogMap
 from urmpipe_pipeline.logs.rotation import PURE
-from urmpipe_pipeline.logs.unnamed import ASSUMED_JOINTS
-from urmpipe_pipeline.logs.vocabulary import key as compared
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
 from urmpipe_pipeline.outputs import MAP_HEADER
 
@@ -74,13 +72,16 @@ NOTES = (
 """Kinds of inferences that are no entries of a map."""
 
 
-THEIR_NAMES = "their names"
-"""Evidence of a form of orientation that the names of its columns state."""
-
 UNITS = ("unit", "form", "unit of the time")
 """Kinds of inferences about units."""
 
-QUANTITIES = {"rad": "angle", "deg": "angle", "": "angle"}
+ENTRIES = {
+    **{"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout", "source": "source"},
+    **{"time": "time column", "period": "period", "poses": "rows", "joints": "joint columns"},
+    **{"position": "{tcp} TCP", "measured": "{tcp} TCP", "orientation": "{tcp} orientation"},
+    **{"rotation": "form", "robot": "robot"},
+}
+"""Entries, and the kinds of inferences that state their evidence."""
 
 
 def read_map(path: Path) -> LogMap:
@@ -211,53 +212,25 @@ def _evidence(
     log: JointLog, by_kind: Mapping[str, Inference], options: LogMap
 ) -> Iterator[tuple[str, Evidence]]:
     """Yield the evidence of the entries, by field or "unit.COLUMN"."""
-    whose = "measured" if log.externally_measured else "recorded"
-    kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout", "source": "source"}
-    kinds |= {"time": "time column", "period": "period", "poses": "rows", "joints": "joint columns"}
-    kinds |= {"position": f"{whose} TCP", "measured": f"{whose} TCP", "orientation": f"{whose} orientation"}
-    kinds |= {"rotation": "form", "robot": "robot"}
-    words = (*vocabulary().time, *vocabulary().dates)
-    clock = [compared(split_unit(column.header)[0]) for column in _columns(log, "time")]
-    named = {"source", "delimiter", "decimal"}
-    named |= {"time"} if any(word.search(name) for name in clock for word in words) else set()
-    labelled = "labels" in by_kind  # names stand before the values of each row
-    named |= {"joints"} if labelled or all(column.header for column in _columns(log, "joint")) else set()
-    named |= {"time"} if labelled and clock else set()
-    named |= {"position", "orientation"} if all(c.header for c in _columns(log, "position")) else set()
-    named |= {"rotation"} if "form" in by_kind and by_kind["form"].evidence == THEIR_NAMES else set()
-    robot = by_kind["robot"].value if "robot" in by_kind else ""
-    named |= {"robot"} if all(robot in column.header for column in _columns(log, "joint")) else set()
-    assumed_joints = any(one.kind == ASSUMED_JOINTS for one in log.warnings)
-    for field, kind in kinds.items():
-        if kind in by_kind:
-            basis: Basis = "given" if getattr(options, field) else "named" if field in named else "proved"
-            is_assumed = {
-                "period": log.period_assumed,
-                "joints": assumed_joints,
-                "time": not by_kind[kind].columns,
-            }
-            if basis != "given" and is_assumed.get(field):
-                basis = "assumed"
-            yield field, Evidence(basis, by_kind[kind].evidence)
-    source = vocabulary().source(log.source)
-    assumed_time = [one.message for one in log.warnings if one.assumption and one.role == "time"]
-    why = {name: one.evidence for one in log.inferences if one.kind in UNITS for name in one.columns}
+    tcp = "measured" if log.externally_measured else "recorded"
+    for field, kind in ENTRIES.items():
+        if inference := by_kind.get(kind.format(tcp=tcp)):
+            basis: Basis = "given" if getattr(options, field) else inference.basis
+            yield field, Evidence(basis, inference.evidence)
+    units = {name: each for each in log.inferences if each.kind in UNITS for name in each.columns}
+    assumed_time = [
+        warning.message for warning in log.warnings if warning.assumption and warning.role == "time"
+    ]
     for column in log.columns:
-        quantity = column.role if column.role == "time" else QUANTITIES.get(column.unit, "length")
-        reason = why.get(column.name, "its name")
-        names = {column.name, column.header, str(column.number)} - {""}
-        by_source = source is not None and quantity in source.units
-        is_named = split_unit(column.header)[1] or by_source or reason.startswith("as ")  # as the others
-        basis = "named" if is_named else "proved"
-        if names & options.unit.keys() or (
-            quantity == "angle" and "" in options.unit and not split_unit(column.header)[1]
-        ):
+        unit = units.get(column.name)
+        basis, why = (unit.basis, unit.evidence) if unit else ("named", "its name")
+        if {column.name, column.header, str(column.number)} & (options.unit.keys() - {""}):
             basis = "given"
         if column.role == "time" and assumed_time:
-            basis, reason = "assumed", assumed_time[0]
+            basis, why = "assumed", assumed_time[0]
         elif column.uncertainty:
-            basis, reason = "assumed", column.uncertainty
-        yield f"unit.{_name(log, column)}", Evidence(basis, reason)
+            basis, why = "assumed", column.uncertainty
+        yield f"unit.{_name(log, column)}", Evidence(basis, why)
 
 
 def _columns(log: JointLog, role: Role) -> list[LogColumn]:

@@ -19,7 +19,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, Hint, LogError, python_command
 from urmpipe_models.math3d import COLUMN_NAMES, FORMS, RotationForm, column_count
-from urmpipe_pipeline.joint_log import ROLES, Inference, LogWarning
+from urmpipe_pipeline.joint_log import ROLES, Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.columns import (
     NAME_JOINTS,
     OTHER_ROBOT,
@@ -265,11 +265,11 @@ def _derivative(role: str, numeric: Sequence[Column], joints: NamedJoints) -> tu
     return tuple(best[0].columns[n] for n in joints.numbers) if len(best) == 1 else ()
 
 
-def joint_inference(joints: Sequence[Column], evidence: str) -> Inference:
+def joint_inference(joints: Sequence[Column], evidence: str, basis: Basis = "named") -> Inference:
     """Return the inference of the joint columns, with its evidence."""
     names = tuple(column.name for column in joints)
     hints = (Hint("joints", None, "in the robot's order"),)
-    return Inference("joint columns", ", ".join(names), evidence, columns=names, hints=hints)
+    return Inference("joint columns", ", ".join(names), evidence, "", names, hints, basis)
 
 
 def path_inference(names: str, evidence: str) -> Inference:
@@ -277,7 +277,7 @@ def path_inference(names: str, evidence: str) -> Inference:
     return Inference("path", names, evidence, hints=(Hint("joints", None, "for a log of joints"),))
 
 
-def about_pose(pose: Pose) -> list[Inference]:
+def about_pose(pose: Pose, basis: Basis = "named") -> list[Inference]:
     """Return the inferences of the columns of the recorded tool centre point."""
     whose = "measured" if pose.measured else "recorded"
     groups = {"TCP": ("position", pose.position), "orientation": ("orientation", pose.rotation)}
@@ -286,7 +286,8 @@ def about_pose(pose: Pose) -> list[Inference]:
         names = tuple(column.name for column in group)
         hints = (Hint("measured" if pose.measured else parameter),)
         if names:
-            inferences.append(Inference(f"{whose} {what}", ", ".join(names), pose.evidence, "", names, hints))
+            value = ", ".join(names)
+            inferences.append(Inference(f"{whose} {what}", value, pose.evidence, "", names, hints, basis))
     return inferences
 
 

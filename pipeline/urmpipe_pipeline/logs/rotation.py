@@ -241,15 +241,17 @@ def settle_rotation(
         doubts = (*doubts, *contradicted)
     assumed = [warning.message for warning in doubts if warning.assumption and basis != "given"]
     evidence = Evidence("assumed", assumed[0]) if assumed else Evidence(basis, why)
-    inference = form_inference([column.name for column in columns], choice.form, choice.units[0], why)
+    inference = form_inference([column.name for column in columns], choice.form, choice.units[0], why, basis)
     units = tuple(choice.units[k] for k in choice.order)
     return SettledRotation(choice.form, ordered, units, values, (inference,), (*warnings, *doubts), evidence)
 
 
-def form_inference(names: Sequence[str], form: RotationForm, unit: Unit, evidence: str) -> Inference:
+def form_inference(
+    names: Sequence[str], form: RotationForm, unit: Unit, evidence: str, basis: Basis = "named"
+) -> Inference:
     """Return the inference of the form of an orientation: of columns with some names, in a unit, and why."""
     what, shown = f"form of {', '.join(names)}", f"{form}{'' if unit == PURE else f' in {unit.name}'}"
-    return Inference(what, shown, evidence, "form", tuple(names), (Hint("rotation"),))
+    return Inference(what, shown, evidence, "form", tuple(names), (Hint("rotation"),), basis)
 
 
 def _has_unit_length(values: FloatArray, form: RotationForm) -> bool:

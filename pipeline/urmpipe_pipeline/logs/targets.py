@@ -356,7 +356,7 @@ def _further(
             factor = finder.settle_positions([column], np.zeros((1, 1)))[0].factor
         elif further[name].length:
             factor = lengths[0].factor
-            said.append(unit_inference([column], lengths[0].name, "as x, y, z", every=False))
+            said.append(unit_inference([column], lengths[0].name, "as x, y, z", "named", every=False))
         found[name] = np.where(np.isnan(cells), further[name].empty, cells * factor)
     return found, said
 

@@ -278,13 +278,15 @@ class UnitFinder:
     warnings: list[LogWarning] = field(default_factory=list)
     evidence: dict[int, Evidence] = field(default_factory=dict)
     uses_source: bool = False
-    _notes: dict[tuple[str, str, bool], list[Column]] = field(default_factory=dict)
+    _notes: dict[tuple[str, str, Basis, bool], list[Column]] = field(default_factory=dict)
 
     @property
     def inferences(self) -> list[Inference]:
         """The units, columns of one unit and evidence together."""
-        notes = self._notes.items()
-        return [unit_inference(columns, unit, why, every=every) for (unit, why, every), columns in notes]
+        return [
+            unit_inference(columns, unit, why, basis, every=every)
+            for (unit, why, basis, every), columns in self._notes.items()
+        ]
 
     def settle_joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -570,7 +572,7 @@ class UnitFinder:
         self, columns: Sequence[Column], unit: Unit, basis: Basis, why: str, *, every: bool = False
     ) -> None:
         """Keep the evidence of a unit, and whether a unit given for every angle would reach its columns."""
-        self._notes.setdefault((unit.name, why, every), []).extend(columns)
+        self._notes.setdefault((unit.name, why, basis, every), []).extend(columns)
         self.evidence |= {column.number: Evidence(basis, why) for column in columns}
 
     def _warn(self, columns: Sequence[Column], warning: LogWarning, *, given: bool = False) -> None:

@@ -131,7 +131,8 @@ def without_header(
     hints = (take(joints, "confirms it"), Hint("joints", None, "names others"))
     message = f"no header names the columns: {assumption}, in order"
     warning = LogWarning(ASSUMED_JOINTS, message, hints=hints, assumption=assumption, role="joint")
-    return replace(roles, warnings=(*roles.warnings, warning))
+    inferences = (replace(roles.inferences[0], basis="assumed"), *roles.inferences[1:])
+    return replace(roles, inferences=inferences, warnings=(*roles.warnings, warning))
 
 
 def _by_place(
@@ -145,7 +146,11 @@ def _by_place(
     """Return joints that are called as the robot's, or q1, q2, ..., their rates, and the pose beside them."""
     pose = pose or Pose()
     rest = [column for column in columns if column not in (*joints, *rates, *pose.position, *pose.rotation)]
-    inferences = [joint_inference(joints, evidence), *about_pose(pose), *not_used(rest, NO_HEADER)]
+    inferences = [
+        joint_inference(joints, evidence, "proved"),
+        *about_pose(pose, "proved"),
+        *not_used(rest, NO_HEADER),
+    ]
     names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
     renamed = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
     place = pose.position, pose.rotation, pose.forms
@@ -240,7 +245,7 @@ def _path_by_place(
 
 def _path_roles(pose: Pose, columns: Sequence[Column], why_not_used: str) -> Roles:
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
-    inferences = [path_inference(listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
+    inferences = [path_inference(listed(pose.position), pose.evidence), *about_pose(pose, "proved")[1:]]
     inferences += not_used(rest, why_not_used)
     place = pose.position, pose.rotation, pose.forms
     return Roles((), (), (), *place, tuple(inferences), measured=pose.measured)

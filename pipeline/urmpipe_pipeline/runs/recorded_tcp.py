@@ -545,7 +545,7 @@ def infer_robot(recorded: Recorded) -> tuple[Chain, Inference] | None:
     named = [robot for robot in robots if robot.name in common]
     if len(named) == 1:
         evidence = "its name in the names of the joint columns"
-        return named[0], Inference("robot", named[0].name, evidence, hints=(Hint("robot"),))
+        return named[0], Inference("robot", named[0].name, evidence, hints=(Hint("robot"),), basis="named")
     return _infer_by_kinematics(recorded, named or robots)
 
 

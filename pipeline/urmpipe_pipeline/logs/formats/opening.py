@@ -114,7 +114,7 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
     if known is None and options.source is None and all(map(in_si, layouts)):
         known, why = vocabulary().source(URMPIPE_SOURCE), "what its columns are called, and their units"
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
-    said = Inference("source", name, why, hints=(Hint("source"),))
+    said = Inference("source", name, why, hints=(Hint("source"),), basis="named")
     foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
     foreign = foreign and options.source != stated
     foreign = not graphs if options.source == COPPELIASIM else foreign

@@ -211,8 +211,8 @@ def _style_inferences(
     parts = "the first line says so" if told else f"it makes rows of {style.width} cells"
     parts, reads = given if delimiter else parts, given if decimal else "with it most cells are numbers"
     return [
-        Inference("delimiter", _NAMES[style.delimiter], parts, hints=(Hint("delimiter"),)),
-        Inference("decimal sign", _NAMES[style.decimal], reads, hints=(Hint("decimal"),)),
+        Inference("delimiter", _NAMES[style.delimiter], parts, hints=(Hint("delimiter"),), basis="named"),
+        Inference("decimal sign", _NAMES[style.decimal], reads, hints=(Hint("decimal"),), basis="named"),
     ]
 
 
