@@ -1,8 +1,18 @@
-"""Sources: log files in, a `JointLog` out. Only this package knows who wrote a file.
+"""Logs: files become a `JointLog` in SI. Only this package knows formats, and the programs that write them.
 
-A file goes through `text` (is it text?), `sniff` (how is it written?), `clock` and `roles` (what are its
-columns?), `table` (its numbers, and where it is wrong, with line and column), `units` and `assemble` (SI).
-The words by which columns, units and sources are known are in `vocabulary.toml`.
+    files -> formats: LogTable -> plan: Plan -> convert: numbers, units -> JointLog -> map_file: LogMap
+
+1. Table (`formats.opening` selects the format): columns with names, units and cells; no joints yet.
+2. Columns: joints and rates by their names (`columns`, `names`, `roles`) or by numbers (`unnamed`, `rates`),
+   the recorded tool (`pose_columns`), the clock (`clock`, `clock_columns`). `plan` joins them.
+3. Numbers (`convert`): times in ns (`timestamps`), values in the file's own units, checked (`row_checks`).
+4. Units (`units`) and the form of orientations (`rotation`): stated, proved by the numbers (`proofs`),
+   assumed with a warning, or asked.
+5. Log (`read_log`): joints in rad or m, recorded tool, warnings, and each decision with its evidence.
+6. Map (`log_map`, `map_file`): the same decisions as options, keywords and TOML, which read the next log.
+
+What is not known is a question: a `LogError` whose hints are the options that answer it. The words of names,
+units and programs are in `vocabulary.toml`. `targets` reads the target poses of `ik` by the same tables.
 """
 
 from urmpipe_pipeline.logs.formats.arrays import arrays_to_table
