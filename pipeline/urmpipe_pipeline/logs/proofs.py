@@ -21,7 +21,7 @@ Elimination is no proof: values that are not in rad may be ticks.
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Container, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -248,13 +248,13 @@ class Recorded:
     @cached_property
     def stated(self) -> frozenset[Reading]:
         """The readings that contradict no stated unit."""
-        return frozenset(product(_filled(self.joints, "angle"), _filled(self.lengths, "length")))
+        return frozenset(product(_complete(self.joints, "angle"), _complete(self.lengths, "length")))
 
     @cached_property
     def usual(self) -> tuple[Reading, ...]:
         """Those, and the readings in which all joints, or all of x, y, z, have one unit."""
-        joints = [*_filled(self.joints, "angle"), *_uniform(len(self.joints), "angle")]
-        lengths = [*_filled(self.lengths, "length"), *_uniform(len(self.lengths), "length")]
+        joints = [*_complete(self.joints, "angle"), *_complete((None,) * len(self.joints), "angle")]
+        lengths = [*_complete(self.lengths, "length"), *_complete((None,) * len(self.lengths), "length")]
         return tuple(dict.fromkeys(product(joints, lengths)))
 
     @cached_property
@@ -274,11 +274,10 @@ def fit_readings(
 ) -> dict[Reading, Fit]:
     """Return how near a robot comes to the recorded points with each of some readings."""
     q, position = recorded.rows
-    poses = {
-        units: poses_over_log(robot, q * _factors(units)) for units in {joints for joints, _ in readings}
-    }
+    factors = {units: np.array([unit.factor for unit in units]) for reading in readings for units in reading}
+    poses = {units: poses_over_log(robot, q * factors[units]) for units in {joints for joints, _ in readings}}
     return {
-        (joints, lengths): fit_recorded(*poses[joints], position * _factors(lengths), max_freedom=max_freedom)
+        (joints, lengths): fit_recorded(*poses[joints], position * factors[lengths], max_freedom=max_freedom)
         for joints, lengths in readings
     }
 
@@ -292,48 +291,42 @@ class KinematicUnits:
         lengths: Unit of x, y, z.
         freedom: The fit that shows it: 0 as they are, to 3 with a free tool and base.
         proved: Of each joint, whether in its other unit they would not follow.
-        base: Rotation M of the base [-], shape (3, 3); the identity without one.
-        robot: The arm.
-        recorded: The joints and the points.
+        fits: Of these and of other units.
     """
 
     joints: Units
     lengths: Units
     freedom: int
     proved: tuple[bool, ...]
-    base: FloatArray
-    robot: Chain
-    recorded: Recorded
+    fits: Mapping[Reading, Fit]
+
+    @property
+    def base(self) -> FloatArray:
+        """Rotation M of the base [-], shape (3, 3); the identity without one."""
+        return self.fits[self.joints, self.lengths].base if self.freedom == FREE_BASE else np.eye(3)
 
     def of(self, quantity: Quantity) -> Units:
         """Return the units of the joints (angle) or of x, y, z (length)."""
         return self.joints if quantity == "angle" else self.lengths
 
-    def format_evidence(self, quantity: Quantity, others: Sequence[Unit | None] | None = None) -> str:
-        """Return by how much these units beat others of some columns; the best other ones by default.
-
-        Args:
-            quantity: The columns: the joints (angle), or x, y, z (length).
-            others: The other unit of each column, None for its own.
-        """
-        own, reading = self.of(quantity), (self.joints, self.lengths)
-        changed = [tuple(new or old for new, old in zip(others, own, strict=True))] if others else None
-        rivals = [
-            (units, self.lengths) if quantity == "angle" else (self.joints, units)
-            for units in changed or _uniform(len(own), quantity)
-        ]
-        rivals = [rival for rival in rivals if rival != reading]
-        fits = fit_readings(self.robot, self.recorded, [reading, *rivals])
-        share = {key: float(fit.shares[self.freedom]) for key, fit in fits.items()}
-        second = min(rivals, key=share.__getitem__)
-        units = second[quantity == "length"]
-        name = next(new.name for new, old in zip(units, own, strict=True) if new != old)
-        tool = ",".join(f"{x:.3f}" for x in fits[reading].tool) + " m"
-        size = "distance" if self.freedom == 0 else "motion"
+    def format_evidence(self, quantity: Quantity, stated: Units = ()) -> str:
+        """Return by how much these units of joints (angle) or x, y, z (length) beat stated or other ones."""
+        k, best = int(quantity == "length"), (self.joints, self.lengths)
+        best_share = float(self.fits[best].shares[self.freedom])
+        share = {
+            units[k]: float(fit.shares[self.freedom])
+            for units, fit in self.fits.items()
+            if units[k] != best[k] and units[1 - k] == best[1 - k]
+        }
+        worse = [units for units in share if is_clearly_worse(share[units], best_share)] or [*share]
+        second = stated if stated in share else min(worse, key=share.__getitem__)
+        name = next(other.name for other, unit in zip(second, best[k], strict=True) if other != unit)
+        fit, size = self.fits[best], "distance" if self.freedom == 0 else "motion"
+        tool = ",".join(f"{x:.3f}" for x in fit.tool) + " m"
         off = f"{100 * share[second]:.3g} %" if np.isfinite(share[second]) else "no base"
         return (
             f"with it the kinematics{_FREED[self.freedom].format(tool)} follow the recorded TCP within"
-            f" {1e3 * fits[reading].distances[self.freedom]:.2f} mm (median), {100 * share[reading]:.2f} % of"
+            f" {1e3 * fit.distances[self.freedom]:.2f} mm (median), {100 * best_share:.2f} % of"
             f" its {size}, as {name} within {off}"
         )
 
@@ -344,62 +337,42 @@ def prove_by_kinematics(robot: Chain | None, recorded: Recorded) -> KinematicUni
     They are those that are stated, or one for all joints and one for x, y, z; else one joint, which must
     turn, has the other unit. An arm with a prismatic joint is not judged.
     """
-    if robot is None or not recorded.judges(robot):
+    if robot is None or any(joint.kind != "revolute" for joint in robot.moving) or not recorded.judges(robot):
         return None
-    if any(joint.kind != "revolute" for joint in robot.moving):
-        return None
-    best = find_best_fit(fit_readings(robot, recorded, recorded.usual), recorded.stated)
+    fits = fit_readings(robot, recorded, recorded.usual)
+    best = find_best_fit(fits, recorded.stated)
     if best is None:  # a free base would explain another robot, or order of the joints
-        readings = (*recorded.usual, *_with_another(recorded))
-        fits = fit_readings(robot, recorded, readings, max_freedom=1)
+        turns = np.flatnonzero(recorded.rows[0].std(axis=0) >= MIN_TURN).tolist()
+        flipped = [(_flip(joints, j), lengths) for joints, lengths in recorded.usual for j in turns]
+        fits |= fit_readings(robot, recorded, flipped, max_freedom=1)
         best = find_best_fit(fits, recorded.stated, max_freedom=1)
     if best is None:
         return None
     (joints, lengths), freedom = best
-    decoys = [(_scaled(joints, scale), lengths) for scale in DECOYS]
-    decoys += [(joints, _scaled(lengths, scale)) for scale in DECOYS]
-    flipped = [(_flipped(joints, j), lengths) for j in range(len(joints))]
-    readings = ((joints, lengths), *decoys, *flipped)
-    found = fit_readings(robot, recorded, readings, max_freedom=freedom)
-    own, *apart = (float(found[reading].shares[freedom]) for reading in readings)
-    is_excluded = [is_clearly_worse(share, own) for share in apart]
-    if not all(is_excluded[: len(decoys)]):
+    decoys = [(_scale(joints, scale), lengths) for scale in DECOYS]
+    decoys += [(joints, _scale(lengths, scale)) for scale in DECOYS]
+    flipped = [(_flip(joints, j), lengths) for j in range(len(joints))]
+    others = fit_readings(robot, recorded, [*decoys, *flipped], max_freedom=freedom)
+    share = float(fits[joints, lengths].shares[freedom])
+    is_excluded = {key: is_clearly_worse(float(fit.shares[freedom]), share) for key, fit in others.items()}
+    if not all(is_excluded[decoy] for decoy in decoys):
         return None
-    proved, base = tuple(is_excluded[len(decoys) :]), found[joints, lengths].base
-    return KinematicUnits(joints, lengths, freedom, proved, base, robot, recorded)
+    return KinematicUnits(joints, lengths, freedom, tuple(is_excluded[key] for key in flipped), fits)
 
 
-def _with_another(recorded: Recorded) -> Iterator[Reading]:
-    """Yield the usual readings with one joint in the other unit, if it turns."""
-    turns = np.flatnonzero(recorded.rows[0].std(axis=0) >= MIN_TURN).tolist()
-    for joints, lengths in recorded.usual:
-        yield from ((_flipped(joints, j), lengths) for j in turns)
-
-
-def _flipped(units: Units, j: int) -> Units:
+def _flip(units: Units, j: int) -> Units:
     """Return units with that of one column exchanged for the other angle."""
     return (*units[:j], vocabulary().units[OTHER_UNIT[units[j].name]], *units[j + 1 :])
 
 
-def _scaled(units: Units, scale: float) -> Units:
+def _scale(units: Units, scale: float) -> Units:
     return tuple(replace(unit, factor=scale * unit.factor) for unit in units)
 
 
-def _filled(stated: Sequence[Unit | None], quantity: Quantity) -> list[Units]:
-    """Return the stated units of some columns, the others in each unit of a quantity."""
-    return list(dict.fromkeys(tuple(own or unit for own in stated) for unit in _units(quantity)))
-
-
-def _uniform(count: int, quantity: Quantity) -> list[Units]:
-    return [(unit,) * count for unit in _units(quantity)]
-
-
-def _factors(units: Units) -> FloatArray:
-    return np.array([unit.factor for unit in units])
-
-
-def _units(quantity: Quantity) -> list[Unit]:
-    return [vocabulary().units[name] for name in vocabulary().spelled(quantity)]
+def _complete(stated: Sequence[Unit | None], quantity: Quantity) -> list[Units]:
+    """Return the stated units of columns, those without one in each unit of a quantity."""
+    units = (vocabulary().units[name] for name in vocabulary().spelled(quantity))
+    return list(dict.fromkeys(tuple(column or unit for column in stated) for unit in units))
 
 
 def mean_turn(computed: FloatArray, recorded: FloatArray) -> FloatArray:

@@ -406,8 +406,8 @@ class UnitFinder:
                 contradicted.setdefault(item, []).append(j)
         for item, places in contradicted.items():
             some, better = [columns[j] for j in places], proved[places[0]]
-            rivals = [item.unit if j in places else None for j in range(len(columns))]
-            evidence = self.kinematic.format_evidence(quantity, rivals)
+            rival = tuple(item.unit if j in places else unit for j, unit in enumerate(proved))
+            evidence = self.kinematic.format_evidence(quantity, rival)
             names = ", ".join(column.name for column in some)
             message = f"{names}: {item.unit.name} ({item.why}) contradicts the kinematics: taken as"
             if not item.is_given:
