@@ -362,9 +362,7 @@ def _measured(
     seconds = finder.settle_rates(roles.accelerations, units, 2)
     q = _in_si(q, units)
     lengths = (
-        finder.settle_positions(roles.position, tcp, beside_joints=bool(roles.joints))
-        if roles.position
-        else []
+        finder.settle_positions(roles.position, tcp, has_joints=bool(roles.joints)) if roles.position else []
     )
     tcp = _in_si(tcp, lengths)
     planar = len(roles.position) == 2

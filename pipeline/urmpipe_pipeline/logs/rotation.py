@@ -54,7 +54,7 @@ from urmpipe_pipeline.logs.units import (
     GIVEN,
     UNIT_CONTRADICTION,
     StatedUnit,
-    doubt_warning,
+    uncertain_unit_warning,
 )
 from urmpipe_pipeline.logs.vocabulary import Unit, vocabulary
 
@@ -226,7 +226,7 @@ def settle_rotation(
         every = [c for c in dict.fromkeys((*choices, *others)) if _has_unit_length(values, c.form)]
         fit = _fit_arm(every, choices, values, arm, base)
         if fit is not None and fit.is_proof:
-            unit_given = any(item and item.is_given for item in stated)
+            unit_given = any(item and item.by == "user" for item in stated)
             decision = _decide_by_arm(columns, choices, fit, unit_given=unit_given, form_given=form_given)
         elif fit is not None:
             choices = [fit.choice]
@@ -397,8 +397,8 @@ def _decide_by_values(
     if likely == unit or is_confirmed or not peak(values) > 0:
         return _Decision(choice, why)
     reason = f"values of {size:.6g} {'are more than a turn as rad' if is_large else 'may be rad as well'}"
-    warning = doubt_warning(columns, by, unit, wrapped[1] if wrapped else reason, "rotation")
-    given = by[0].is_given
+    warning = uncertain_unit_warning(columns, by, unit, wrapped[1] if wrapped else reason, "rotation")
+    given = by[0].by == "user"
     is_excluded = bool(wrapped) or size > TWO_TURNS
     warning = replace(warning, blocks_verdict=is_excluded and not given)
     return _Decision(choice, why, (warning,), "given" if given else "named")
