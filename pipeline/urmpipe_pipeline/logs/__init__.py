@@ -1,11 +1,11 @@
 """Logs: files become a `JointLog` in SI. Only this package knows formats, and the programs that write them.
 
-    files -> formats: LogTable -> plan: Plan -> convert: numbers, units -> JointLog -> map_file: LogMap
+    files -> formats: LogTable -> plan: Plan -> rows: Rows -> convert: Proposal, JointLog -> map_file: LogMap
 
 1. Table (`formats.opening` selects the format): columns with names, units and cells; no joints yet.
 2. Columns: joints and rates by their names (`columns`, `names`, `roles`) or by numbers (`unnamed`, `rates`),
    the recorded tool (`pose_columns`), the clock (`clock`, `clock_columns`). `plan` joins them.
-3. Numbers (`convert`): times in ns (`timestamps`), values in the file's own units, checked (`row_checks`).
+3. Rows (`rows`): times in ns (`timestamps`), values in the file's own units, checked and joined.
 4. Units (`units`) and the form of orientations (`rotation`): stated, proved by the numbers (`proofs`),
    assumed with a warning, or asked.
 5. Log (`read_log`): joints in rad or m, recorded tool, warnings, and each decision with its evidence.

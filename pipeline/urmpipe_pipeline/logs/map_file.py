@@ -143,7 +143,7 @@ def map_of(
     }
     values |= {"robot": robot, "base": tuple(base), "tool": tuple(tool)}
     values["source"] = log.source if options.source or log.source != TABLE else None
-    values |= shown_entries(log.inferences)
+    values |= file_entries(log.inferences)
     values |= _clock_entries(log, by_kind, options)
     joints, position, rotation = (_columns(log, role) for role in ("joint", "position", "rotation"))
     signs, offsets = tuple(c.sign for c in joints), tuple(c.offset for c in joints)
@@ -164,7 +164,7 @@ def map_of(
     return LogMap(**values, evidence=dict(_evidence(log, by_kind, options)))
 
 
-def shown_entries(inferences: Sequence[Inference]) -> dict[str, Any]:
+def file_entries(inferences: Sequence[Inference]) -> dict[str, Any]:
     """Return delimiter, decimal sign and layout of the files, and the notes, of what was inferred."""
     by_kind = {inference.kind: inference for inference in inferences}
     kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout"}

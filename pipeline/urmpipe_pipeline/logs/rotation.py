@@ -34,9 +34,9 @@ from urmpipe_models.math3d import (
     to_quaternions,
 )
 from urmpipe_models.wraps import FULL_TURN
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.columns import OTHER_UNIT, Column, unit_hints
-from urmpipe_pipeline.logs.log_map import Basis, Evidence
+from urmpipe_pipeline.logs.log_map import Evidence
 from urmpipe_pipeline.logs.proofs import (
     MARGIN,
     ONE_TURN,

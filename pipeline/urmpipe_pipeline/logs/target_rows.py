@@ -27,7 +27,7 @@ from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.pose_columns import ORTHOGONAL
 from urmpipe_pipeline.logs.roles import Roles
 from urmpipe_pipeline.logs.rotation import PURE
-from urmpipe_pipeline.logs.row_checks import find_errors, unknown_times
+from urmpipe_pipeline.logs.rows import find_row_errors, unknown_times
 from urmpipe_pipeline.logs.timestamps import read_text_times, separate_repeated
 from urmpipe_pipeline.logs.vocabulary import Patterns, Unit, vocabulary
 
@@ -157,7 +157,7 @@ def _whole_clock(layout: LogTable, numbers: Numbers, clock: Clock) -> tuple[IntA
         raise LogError(Finding(said, layout.file, column=clock.columns[0].header, hints=hints))
     timed_rows = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=(), wrong=0).at(known)
     told = separate_repeated(replace(timed_rows, rows=known + 1))
-    findings = find_errors(layout, told, (), clock)
+    findings = find_row_errors(layout, told, (), clock)
     if findings:
         raise LogError(*findings)
     assert told.clock is not None

@@ -27,7 +27,7 @@ from urmpipe_models.arm.chain import Chain, JointKind
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_models.math3d import RotationForm, is_angular
-from urmpipe_pipeline.joint_log import Inference, LogWarning, Role
+from urmpipe_pipeline.joint_log import Basis, Inference, LogWarning, Role
 from urmpipe_pipeline.logs.columns import (
     NAME_JOINTS,
     OTHER_UNIT,
@@ -36,7 +36,7 @@ from urmpipe_pipeline.logs.columns import (
     unit_inference,
     which_unit,
 )
-from urmpipe_pipeline.logs.log_map import Basis, Evidence
+from urmpipe_pipeline.logs.log_map import Evidence
 from urmpipe_pipeline.logs.proofs import (
     MAX_DEGREES,
     ONE_TURN,
