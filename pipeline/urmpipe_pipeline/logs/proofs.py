@@ -53,7 +53,7 @@ Reading: TypeAlias = tuple[Units, Units]
 
 SAMPLES = 400  # rows that decide, spread evenly over a log
 MAX_SHARE = 0.03  # of the motion, within which kinematics agree: calibration and a late clock explain less
-MARGIN = 5.0  # the best of several explanations has so many times smaller residuals than the next one ...
+MARGIN = 5.0  # the best of several explanations over the next one, by their residuals ...
 MIN_SHARE_APART = 0.01  # ... and smaller ones by this share of the motion
 MAX_TOOL = 2.0  # [m], length of a tool; a longer one turns a small rotation into any motion
 MAX_STRETCH = 1.1  # singular values of M are within this factor of 1
@@ -64,16 +64,16 @@ MIN_ROWS = (1, 5, 8, 12)  # of each fit: at least twice as many numbers as unkno
 MAX_COORDINATE = 1e15  # in any unit; a larger one is an error of its file, and its square is infinite
 CELLS = 50  # of the motion of the joint that moves most: rows at rest count as one
 REJECTED = 3.0  # times the median residual, from which a row is left out of a fit
-MIN_TURN = 0.1  # standard deviation as rad, below which a joint is not told apart from another base or tool
+MIN_TURN = 0.1  # standard deviation as rad, below which another base or tool does as much
 TURNS = 60  # rows whose pairs decide on an orientation
 
 TURN = {"rad": math.tau, "deg": 360.0}
 ONE_TURN = math.tau * 1.01  # [rad], of joints that turn once either way, as UR's do: +-363 deg
-TWO_TURNS = 2 * math.tau  # [rad]; joints of arms hardly turn further either way
+TWO_TURNS = 2 * math.tau  # [rad]; joints of arms turn no further either way
 WRAP_SLACK = 20.0 / 360.0  # share of a turn by which a step may differ from it
 FASTEST = 30.0  # [rad/s], a speed that no joint of an arm keeps up
 MAX_DEGREES = 720.0  # [deg], two turns; larger values are ticks or per cent
-_SAMPLED = 10_000  # rows that tell how large values usually are
+_SAMPLED = 10_000  # rows that show the usual size of values
 _WINDOW = 20  # rows over which a clock may hurry, as a recorder that stores late rows at once
 
 
@@ -124,7 +124,7 @@ def moving_rows(q: FloatArray, position: FloatArray) -> IndexArray:
     if not len(rows):
         return rows
     turned, sparse = np.abs(q[rows] - np.median(q[rows], axis=0)), rows
-    for share in (0.99, 0.9):  # of the rows, which tell the size of the motion unless they are bad
+    for share in (0.99, 0.9):  # of the rows, which show the size of the motion unless they are bad
         cell = max(_quantile(joint, share) for joint in turned.T) / CELLS or 1.0
         sparse = rows[np.sort(np.unique(np.rint(q[rows] / cell), axis=0, return_index=True)[1])]
         if len(sparse) >= MIN_ROWS[-1]:
@@ -181,18 +181,18 @@ def _median_norm(vectors: FloatArray) -> float:
     return float(np.median(np.linalg.norm(vectors, axis=1))) if len(vectors) else np.inf
 
 
-def _solve_robustly(a: FloatArray, b: FloatArray) -> tuple[FloatArray, float]:
-    """Return x of a x = b by least squares without the rows that stay far out, and the median residual.
+def _are_near(residual: FloatArray) -> BoolArray:
+    """Return which rows stay in a robust fit, by their residuals, shape (n,)."""
+    return np.asarray(residual <= max(REJECTED * float(np.median(residual)), 1e-9))
 
-    Args:
-        a: Factors of the unknowns, shape (n, 3, k).
-        b: Right-hand sides, shape (n, 3).
-    """
+
+def _solve_robustly(a: FloatArray, b: FloatArray) -> tuple[FloatArray, float]:
+    """Return x of a x = b, shapes (n, 3, k) and (n, 3), without rows far from it; the median residual."""
     kept = np.ones(len(a), dtype=np.bool_)
     for _ in range(6):
         x = np.linalg.lstsq(a[kept].reshape(-1, a.shape[2]), b[kept].ravel(), rcond=1e-9)[0]
         residual = np.linalg.norm(a @ x - b, axis=1)
-        before, kept = kept, residual <= max(REJECTED * float(np.median(residual)), 1e-9)
+        before, kept = kept, _are_near(residual)
         if (kept == before).all():
             break
     return np.asarray(x), float(np.median(residual))
@@ -203,7 +203,7 @@ def find_best_fit(
 ) -> tuple[Key, int] | None:
     """Return the only explanation that agrees with the recorded points, and by which fit, 0 to 3.
 
-    Of several that the points do not tell apart it is the only stated one.
+    Of several that the points do not distinguish it is the only stated one.
 
     Args:
         fits: The explanations.
@@ -352,9 +352,9 @@ def prove_by_kinematics(robot: Chain | None, recorded: Recorded) -> KinematicUni
     decoys = [(_scale(joints, scale), lengths) for scale in DECOYS]
     decoys += [(joints, _scale(lengths, scale)) for scale in DECOYS]
     flipped = [(_flip(joints, j), lengths) for j in range(len(joints))]
-    others = fit_readings(robot, recorded, [*decoys, *flipped], max_freedom=freedom)
+    rivals = fit_readings(robot, recorded, [*decoys, *flipped], max_freedom=freedom)
     share = float(fits[joints, lengths].shares[freedom])
-    is_excluded = {key: is_clearly_worse(float(fit.shares[freedom]), share) for key, fit in others.items()}
+    is_excluded = {key: is_clearly_worse(float(fit.shares[freedom]), share) for key, fit in rivals.items()}
     if not all(is_excluded[decoy] for decoy in decoys):
         return None
     return KinematicUnits(joints, lengths, freedom, tuple(is_excluded[key] for key in flipped), fits)
@@ -406,7 +406,7 @@ def fit_turn(computed: FloatArray, recorded: FloatArray) -> tuple[FloatArray, Fl
     for _ in range(3):
         turn = mean_turn(computed[kept], recorded[kept])
         angles = turned_angles(computed, turn, recorded)
-        kept = angles <= max(REJECTED * float(np.median(angles)), 1e-9)
+        kept = _are_near(angles)
     return turn, angles
 
 
@@ -432,7 +432,7 @@ def _relative_distance(computed: FloatArray, recorded: FloatArray) -> float:
     for _ in range(4):
         turn, _ = fit_rotation(measured[kept].T @ arm[kept])
         residual = np.linalg.norm(measured - arm @ turn.T, axis=1)
-        kept = residual <= max(REJECTED * float(np.median(residual)), 1e-9)
+        kept = _are_near(residual)
     return float(np.median(residual))
 
 
@@ -440,7 +440,7 @@ def _relative_distance(computed: FloatArray, recorded: FloatArray) -> float:
 def wraps_as_degrees(values: FloatArray) -> str | None:
     """Return why values are in deg, wraps by 360; None if there are none.
 
-    Values within one turn in rad are never doubted. They are in the file's own units, shape (n, columns).
+    Values within one turn may be in rad. They are in the file's own units, shape (n, columns).
     """
     count = int(count_wraps(values, "deg").sum()) if peak(values) > math.tau else 0
     return f"{format_count(count, 'step')} of about 360 from one row to the next" if count else None
@@ -460,7 +460,7 @@ def wraps_as_radians(values: FloatArray) -> str | None:
 
 @np.errstate(over="ignore", invalid="ignore")
 def count_wraps(values: FloatArray, unit: str) -> IntArray:
-    """Return how often each column steps by a turn or two and goes on from there, shape (columns,).
+    """Return how often each column steps by a turn or two and continues from there, shape (columns,).
 
     A spike is no wrap: it steps back at once. Nor is a step of values that jump about: those of other rows
     are usually small, and a wrap is no further off whole turns than twice the largest of them.
@@ -479,20 +479,18 @@ def _count_wraps(values: FloatArray, turn: float) -> int:
     off = np.abs(steps[rows] - turn * np.clip(np.rint(steps[rows] / turn), 1, 2))
     rows, off = rows[off <= slack], off[off <= slack]
     steps[rows] = 0.0
-    others = len(steps) - len(rows)
+    rest = len(steps) - len(rows)
     small = np.count_nonzero(steps <= slack) - len(rows)
-    if not len(rows) or not others or small <= int(0.9 * (others - 1)):
+    if not len(rows) or not rest or small <= int(0.9 * (rest - 1)):
         return 0
     rows = rows[off <= 2 * steps.max()]
-    alone, joined = np.ones(len(rows), dtype=np.bool_), np.diff(rows) == 1
-    alone[1:] &= ~joined
-    alone[:-1] &= ~joined
-    return int(np.count_nonzero(alone))
+    gaps = np.diff(rows, prepend=-2, append=len(values) + 1)
+    return int(np.count_nonzero((gaps[:-1] > 1) & (gaps[1:] > 1)))
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def too_fast_as_radians(values: FloatArray, t_ns: IntArray | None) -> str | None:
-    """Return why values are hardly in rad: only in deg are they as slow as a joint; None if they may be.
+    """Return why values are unlikely in rad: only in deg are they as slow as a joint; None if they may be.
 
     They are in the file's own units, shape (n, columns), at times in [ns], shape (n,), or None.
     """

@@ -1,15 +1,15 @@
 """The recorded orientation of the tool: its form and unit, and rows that hold no orientation of the motion.
 
 1. Rows between the ends of a jump (`find_interpolated_rows`). One orientation has several spellings: a
-   rotation vector u a is u (a - 2 pi) as well, an Euler angle goes on from +pi at -pi, and q is -q. Where
+   rotation vector u a is u (a - 2 pi) as well, an Euler angle continues from +pi at -pi, and q is -q. Where
    a log goes from one to the other, its numbers x jump by the length T, 2 pi (360 in deg) of a vector or
-   of angles, 2 of a quaternion, and the orientation hardly changes. A linear resampling puts rows on the
+   of angles, 2 of a quaternion, and the orientation nearly stays. A linear resampling puts rows on the
    straight line between, x = a + s (b - a) with |b - a| = T and 0 < s < 1, which are no orientations:
    they become NaN.
 2. Form and unit (`settle_rotation`): the names allow some choices. With an arm the one counts that turns
    as it does, `MARGIN` times nearer than the others (`proofs.rotation_distances`). Else wraps prove a
    unit, and size is a reason to assume it; several forms are not read.
-3. Rows beside large steps that alone contradict the arm were interpolated as well: they become NaN.
+3. Rows next to large steps that alone contradict the arm were interpolated as well: they become NaN.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ MIN_ROWS = 5  # fewer have no usual step
 MAX_BETWEEN = 8  # rows between two samples: a log of 125 Hz resampled to 1 kHz has 7 or 8
 MAX_JUMP_DEVIATION = 0.1  # share of T: the ends of a jump are samples of a motion near it
 MIN_STEP_RATIO = (
-    3.0  # a step of a jump over those beside it and the usual one; nearer rows are as good as the end
+    3.0  # a step of a jump over those next to it and the usual one; nearer rows are as good as the end
 )
 MIN_CONTRADICTION = 0.17  # [rad] (10 deg), of a row from the arm ...
 MIN_CONTRADICTION_RATIO = 5.0  # ... and times the median of all rows
@@ -83,7 +83,7 @@ BY_COLUMNS = (0, 3, 6, 1, 4, 7, 2, 5, 8)  # entries of a matrix that is written 
 def find_interpolated_rows(values: FloatArray) -> BoolArray:
     """Return which rows of an orientation were interpolated across a jump, shape (n,).
 
-    All steps of a jump are larger than those beside it, and add up to its length: they lie on a line.
+    All steps of a jump are larger than those around it, and add up to its length: they lie on a line.
 
     Args:
         values: In the file's own units, shape (n, 3) of a vector or angles, (n, 4) of a quaternion.
@@ -105,9 +105,9 @@ def find_interpolated_rows(values: FloatArray) -> BoolArray:
             for k in np.flatnonzero(np.abs(lengths - jump) <= MAX_JUMP_DEVIATION * jump).tolist():
                 first, last = int(starts[k]), int(starts[k]) + width
                 within = steps[first:last]
-                beside = [float(steps[i]) for i in (first - 1, last) if 0 <= i < len(steps)]
+                around = [float(steps[i]) for i in (first - 1, last) if 0 <= i < len(steps)]
                 is_straight = within.sum() <= (1 + MAX_JUMP_DEVIATION / 2) * lengths[k]
-                if is_straight and within.min() > MIN_STEP_RATIO * max(usual, *beside):
+                if is_straight and within.min() > MIN_STEP_RATIO * max(usual, *around):
                     is_between[first + 1 : last] = True
     return is_between
 
@@ -222,8 +222,8 @@ def settle_rotation(
     choices = [Choice(form, units) for form in sound for units in _possible_units(form, stated)]
     decision = None
     if arm is not None:
-        others = _other_choices(choices[0].units)
-        every = [c for c in dict.fromkeys((*choices, *others)) if _has_unit_length(values, c.form)]
+        possible = dict.fromkeys((*choices, *_other_choices(choices[0].units)))
+        every = [c for c in possible if _has_unit_length(values, c.form)]
         fit = _fit_arm(every, choices, values, arm, base)
         if fit is not None and fit.is_proof:
             unit_given = any(item and item.by == "user" for item in stated)
@@ -234,16 +234,18 @@ def settle_rotation(
         message = f"{names} may be of several forms: the recorded orientation is not used"
         hints = tuple(Hint("rotation", form, "specifies it") for form in sound)
         return SettledRotation(warnings=(*warnings, LogWarning(ORIENTATION, message, hints=hints)))
-    choice, why, doubts, basis = decision or _decide_by_values(columns, choices, values, stated)
+    choice, why, objections, basis = decision or _decide_by_values(columns, choices, values, stated)
     ordered, values = tuple(columns[k] for k in choice.order), choice.in_si(values)
     if arm is not None and in_base:
         values, contradicted = _drop_contradicted(values, choice.form, arm, names)
-        doubts = (*doubts, *contradicted)
-    assumed = [warning.message for warning in doubts if warning.assumption and basis != "given"]
+        objections = (*objections, *contradicted)
+    assumed = [warning.message for warning in objections if warning.assumption and basis != "given"]
     evidence = Evidence("assumed", assumed[0]) if assumed else Evidence(basis, why)
     inference = form_inference([column.name for column in columns], choice.form, choice.units[0], why, basis)
     units = tuple(choice.units[k] for k in choice.order)
-    return SettledRotation(choice.form, ordered, units, values, (inference,), (*warnings, *doubts), evidence)
+    return SettledRotation(
+        choice.form, ordered, units, values, (inference,), (*warnings, *objections), evidence
+    )
 
 
 def form_inference(
@@ -369,7 +371,7 @@ def _decide_by_values(
     values: FloatArray,
     stated: Sequence[StatedUnit | None],
 ) -> _Decision:
-    """Return one form in its stated unit, doubted if wraps or size contradict it, or by these.
+    """Return one form in its stated unit, with a warning if wraps or size contradict it, or by these.
 
     A controller writes no orientation of two turns. No verdict rests on a unit that they exclude, unless the
     user gave it.
@@ -398,10 +400,10 @@ def _decide_by_values(
         return _Decision(choice, why)
     reason = f"values of {size:.6g} {'are more than a turn as rad' if is_large else 'may be rad as well'}"
     warning = uncertain_unit_warning(columns, by, unit, wrapped[1] if wrapped else reason, "rotation")
-    given = by[0].by == "user"
+    by_user = by[0].by == "user"
     is_excluded = bool(wrapped) or size > TWO_TURNS
-    warning = replace(warning, blocks_verdict=is_excluded and not given)
-    return _Decision(choice, why, (warning,), "given" if given else "named")
+    warning = replace(warning, blocks_verdict=is_excluded and not by_user)
+    return _Decision(choice, why, (warning,), "given" if by_user else "named")
 
 
 def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | None:
@@ -421,7 +423,7 @@ def _drop_contradicted(
 ) -> tuple[FloatArray, list[LogWarning]]:
     """Return an orientation in SI with NaN in the few rows that alone contradict the arm, and the warning.
 
-    Only rows beside large steps may: what goes in small steps, with a turn of the tool that is the same in
+    Only rows next to large steps may: what goes in small steps, with a turn of the tool that is the same in
     all rows, is an orientation of the arm.
     """
     if len(values) < MIN_ROWS:
@@ -429,9 +431,12 @@ def _drop_contradicted(
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
         is_large = steps > max(MIN_STEP_RATIO * float(np.nanmedian(steps)), MAX_ANGLE)
-    is_beside = np.append(is_large, False) | np.append(False, is_large)
+    is_near_step = np.append(is_large, False) | np.append(False, is_large)
     is_known = np.isfinite(arm.q).all(axis=1) & np.isfinite(values).all(axis=1)
-    rows, usual = np.flatnonzero(is_beside & is_known), np.flatnonzero(is_known)[spread(int(is_known.sum()))]
+    rows, usual = (
+        np.flatnonzero(is_near_step & is_known),
+        np.flatnonzero(is_known)[spread(int(is_known.sum()))],
+    )
     if not len(rows) or not len(usual):
         return values, []
 

@@ -389,7 +389,7 @@ class UnitFinder:
         units = list(proved)
         for item, places in contradicted.items():
             some, better, unit = [columns[j] for j in places], proved[places[0]], item.unit
-            rival = tuple(unit if j in places else own for j, own in enumerate(proved))
+            rival = tuple(unit if j in places else other for j, other in enumerate(proved))
             evidence = self.kinematic.format_evidence(quantity, rival)
             message = f"{_list_names(some)}: {unit.name} ({item.why}) contradicts the kinematics: taken as"
             if item.by == "user":
