@@ -131,10 +131,10 @@ def _is_like_tcp(column: Column) -> bool:
     others = words.other - _TOOL | words.joint_words["rate"] | words.joint_words["acceleration"]
     if column.words & (others | _BESIDE_TOOL) or (column.unit and column.unit.quantity != "length"):
         return False
-    if any(pattern.search(column.key) for pattern in words.tcp_position):
-        return not _TORQUES.fullmatch(column.key)
+    if any(pattern.search(column.plain) for pattern in words.tcp_position):
+        return not _TORQUES.fullmatch(column.plain)
     of_rotation = (pattern for rotation in words.tcp_rotations for pattern in rotation.patterns)
-    near = bool(_NEAR_TOOL.search(column.key) and re.search(r"[xyz\d]$", column.key))
+    near = bool(_NEAR_TOOL.search(column.plain) and re.search(r"[xyz\d]$", column.plain))
     return near and not any(pattern.search(column.plain) for pattern in of_rotation)
 
 

@@ -1,15 +1,19 @@
-"""Families of columns: those that share a name but for a number or an axis.
+"""Joints by their names: families of columns that share a name but for a number or an axis.
 
-Joints by their names: those of the arm, of known arms, with numbers, or in families that share a word.
+1. `find_families`: the columns that match patterns of the vocabulary, without words for measured, commanded.
+2. `find_joints`: by the names of the robot's joints or of a known arm; by a word and a number; by a word for
+   positions that all share; by their units. Of several groups those measured are read; else it is a question.
+3. `named_after`, `family_of`: names and numbers of joints, which their rates share.
+4. `proved_by_rates`: families without known words, one of which steps as another one says.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import permutations
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, Hint, LogError
@@ -27,14 +31,14 @@ from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.rates import period_of
 from urmpipe_pipeline.logs.vocabulary import Patterns, key, vocabulary
 
+MAX_LENGTH = 200  # letters of a name in a family: no recorder writes longer ones
+
 _AXES = {name: k for names in ("xyzw", "abc", ("roll", "pitch", "yaw")) for k, name in enumerate(names)}
+_LETTER = re.compile(r"[^\W\d_]")  # without one, the rest of a name is no name: sensor_1 is no joint 1
+FIRST_NUMBER, _LAST_NUMBER = re.compile(r"\d+"), re.compile(r"\d+(?=\D*$)")
 
-_BESIDE = re.compile(r"_?#_?")
-_LETTER = re.compile(r"[^\W\d_]")
-"""Without one, what is left of a name is no name: sensor_1 is no joint 1."""
 
-LONGEST = 200
-"""Letters of a name that may be one of a family: no recorder writes longer ones."""
+# 1. Families
 
 
 @dataclass(slots=True)
@@ -42,10 +46,10 @@ class Family:
     """Columns whose names differ only by a number.
 
     Attributes:
-        rank: Index of the pattern that found them: the lower, the surer.
+        rank: Index of the pattern that matches them: the lower, the surer.
         name: Their name with # in the number's place, without words for measured and commanded.
         kind: What these words say.
-        known: Whether a pattern has their whole name, with these words; else only without them.
+        known: Whether a pattern has their complete name, with these words; else only without them.
         columns: The columns by their number.
         twins: Columns that share a number with one of them.
     """
@@ -64,8 +68,7 @@ class Family:
 
     def shares_name(self, other: Family) -> bool:
         """Return whether the names are the same, with or without a sign beside the number."""
-        one, two = (_BESIDE.sub("#", family.name) for family in (self, other))
-        return one == two
+        return re.sub("_?#_?", "#", self.name) == re.sub("_?#_?", "#", other.name)
 
     def ordered(self) -> tuple[Column, ...]:
         """Return the columns in the order of their numbers."""
@@ -81,50 +84,22 @@ def find_families(columns: Iterable[Column], patterns: Patterns, order: int) -> 
             i and j (row and column of a matrix).
         order: Derivative in time that their units may not contradict: 0 for positions.
     """
-    found: dict[tuple[object, ...], Family] = {}
+    families: dict[tuple[object, ...], Family] = {}
     for column in columns:
         matched = _match(column, patterns, order)
         if matched is None or column.moves_nothing or (column.unit and column.unit.order != order):
             continue
         number, identity = matched
         shape = tuple(tuple(vocabulary().marked.findall(word)) for word in column.plain.split("_"))
-        family = found.setdefault((*identity, shape, None), Family(*identity))
+        family = families.setdefault((*identity, shape, None), Family(*identity))
         if number in family.columns:
             family.twins.append(column)
             if column.unit_text == family.columns[number].unit_text:
                 continue
-            family = found.setdefault((*identity, shape, column.unit_text), Family(*identity))
+            family = families.setdefault((*identity, shape, column.unit_text), Family(*identity))
         family.columns.setdefault(number, column)
-    whole = [family for (*_, unit), family in found.items() if unit is None or len(family.columns) > 1]
-    return sorted(whole, key=lambda family: family.rank)
-
-
-def prefer_measured(found: Sequence[Family]) -> list[Family]:
-    """Return the families to read: of each quantity those measured, else plain; commands if all are."""
-    best = [family for family in found if not any(_stands_for(other, family) for other in found)]
-    return [family for family in best if family.kind != Kind.COMMANDED] or best
-
-
-def _stands_for(other: Family, family: Family) -> bool:
-    """Return whether another family is the same quantity, of a kind that is read first.
-
-    One that is known only without its words has to have the same name.
-    """
-    same = other.shares_name(family) or (other.known and other.kind == Kind.MEASURED)
-    return other.kind < family.kind and len(other.columns) == len(family.columns) and same
-
-
-def drop_unknown(found: Sequence[Family], *, lone: bool) -> list[Family]:
-    """Return the families that are known or measured, and the others that share a name with one of them.
-
-    Args:
-        found: The families.
-        lone: Whether all count if none is known.
-    """
-    kept = [
-        f for f in found if f.known or f.is_measured or any(o is not f and o.shares_name(f) for o in found)
-    ]
-    return kept or (list(found) if lone else [])
+    valid = [family for (*_, unit), family in families.items() if unit is None or len(family.columns) > 1]
+    return sorted(valid, key=lambda family: family.rank)
 
 
 def _match(column: Column, patterns: Patterns, order: int) -> tuple[int, tuple[int, str, Kind, bool]] | None:
@@ -133,43 +108,81 @@ def _match(column: Column, patterns: Patterns, order: int) -> tuple[int, tuple[i
     if order and plain.startswith("d_"):  # the d of a derivative, which also stands for desired
         bare = f"d_{bare}"
         kind = kind_of(column.marked.measured, column.marked.commanded - {"d"})
-    if len(plain) > LONGEST or ("n" in patterns[0].groupindex and column.words & vocabulary().other):
+    if len(plain) > MAX_LENGTH or ("n" in patterns[0].groupindex and column.words & vocabulary().other):
         return None
-    known = _first(plain, patterns)
-    found = (_first(bare, patterns) if _LETTER.search(bare) else None) or known
-    if found is None:
+    known, short = (
+        next(
+            ((rank, match) for rank, pattern in enumerate(patterns) if (match := pattern.search(text))), None
+        )
+        for text in (plain, bare)
+    )
+    best = (short if _LETTER.search(bare) else None) or known
+    if best is None:
         return None
-    rank, match = found
-    number, start, end = _number(match)
+    rank, match = best
+    groups = match.groupdict()
+    if "i" in groups:
+        number, start, end = 10 * int(groups["i"]) + int(groups["j"]), match.start("i"), match.end("j")
+    else:
+        group = next(name for name in ("n", "axis", "k", "wpr") if name in groups)
+        text, (start, end) = groups[group], match.span(group)
+        number = _AXES[text] if group == "axis" else "wpr".index(text) if group == "wpr" else int(text or 0)
     name = f"{match.string[:start]}#{match.string[end:]}"
     return number, (min(rank, known[0]) if known else rank, name, kind, known is not None)
 
 
-def _first(text: str, patterns: Patterns) -> tuple[int, re.Match[str]] | None:
-    for rank, pattern in enumerate(patterns):
-        match = pattern.search(text)
-        if match:
-            return rank, match
-    return None
+def prefer_measured(families: Sequence[Family]) -> list[Family]:
+    """Return the families to read: of each quantity those measured, else plain; commands if all are.
+
+    A family that is known only without the words for measured needs the same name to stand for another.
+    """
+
+    def is_replaced(family: Family) -> bool:
+        return any(
+            other.kind < family.kind
+            and len(other.columns) == len(family.columns)
+            and (other.shares_name(family) or (other.known and other.kind == Kind.MEASURED))
+            for other in families
+        )
+
+    best = [family for family in families if not is_replaced(family)]
+    return [family for family in best if family.kind != Kind.COMMANDED] or best
 
 
-def _number(match: re.Match[str]) -> tuple[int, int, int]:
-    """Return the number that a match tells, and where it stands."""
-    groups = match.groupdict()
-    if "i" in groups:
-        return 10 * int(groups["i"]) + int(groups["j"]), match.start("i"), match.end("j")
-    group = next(name for name in ("n", "axis", "k", "wpr") if name in groups)
-    text = groups[group]
-    number = _AXES[text] if group == "axis" else "wpr".index(text) if group == "wpr" else int(text or 0)
-    return number, match.start(group), match.end(group)
+def drop_unknown(families: Sequence[Family], *, lone: bool) -> list[Family]:
+    """Return the families that are known or measured, and the others that share a name with one of them.
+
+    Args:
+        families: The families.
+        lone: Whether all count if none is known.
+    """
+    known = [
+        family
+        for family in families
+        if family.known
+        or family.is_measured
+        or any(other is not family and other.shares_name(family) for other in families)
+    ]
+    return known or (list(families) if lone else [])
 
 
-_LAST_NUMBER = re.compile(r"\d+(?=\D*$)")
+def numbered_alike(
+    columns: Sequence[Column], number: re.Pattern[str] = _LAST_NUMBER
+) -> list[tuple[Column, ...]]:
+    """Return families of two columns or more of one table whose names differ by a number, their last one."""
+    alike: dict[tuple[str, int], list[Column]] = {}
+    for column in columns:
+        stem = number.sub("#", column.key, count=1)
+        if stem != column.key:
+            alike.setdefault((stem, column.table), []).append(column)
+    return [tuple(family) for family in alike.values() if len(family) > 1]
 
 
-@dataclass(frozen=True, slots=True)
-class NamedJoints:
-    """Joint columns, why they are, the names and numbers that their rates share, and these if proved.
+# 2. Joints
+
+
+class NamedJoints(NamedTuple):
+    """Joint columns, why they are, the numbers or names that their rates share, and these if proved.
 
     `alternatives` are groups of columns that would have been the joints without these.
     """
@@ -180,52 +193,6 @@ class NamedJoints:
     names: tuple[str, ...] = ()
     rates: tuple[Column, ...] = ()
     alternatives: tuple[tuple[Column, ...], ...] = ()
-
-
-def numbered_alike(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
-    """Return families of two columns or more of one table whose names differ by their last number."""
-    alike: dict[tuple[str, int], list[Column]] = {}
-    for column in columns:
-        stem = _LAST_NUMBER.sub("#", column.key)
-        if stem != column.key:
-            alike.setdefault((stem, column.table), []).append(column)
-    return [tuple(family) for family in alike.values() if len(family) > 1]
-
-
-def proved_by_rates(families: Sequence[tuple[Column, ...]], whole: Sequence[LogTable]) -> NamedJoints:
-    """Return the family whose rates are another one, by their numbers; nothing unless there is one."""
-    pairs = []
-    for joints, rates in permutations(families, 2):
-        values = [whole[some[0].table].values([column.index for column in some]) for some in (joints, rates)]
-        if 2 < len(joints) == len(rates) and len(values[0]) == len(values[1]) and period_of(*values):
-            pairs.append((joints, rates))
-    first = [pair for pair in pairs if pair[0] not in [rates for _, rates in pairs]]
-    if len(first) != 1:
-        return NamedJoints(())
-    joints, rates = first[0]
-    return NamedJoints(joints, f"{listed(rates)} are their rates, by steps and rates", rates=rates)
-
-
-def family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Return the numbers, or else the names, that chosen joints share with their rates, in their order."""
-    for family in find_families(joints, vocabulary().joint["position"], order=0):
-        if len(family.columns) == len(joints):
-            number_of = {column: n for n, column in family.columns.items()}
-            return tuple(number_of[column] for column in joints), ()
-    for names in vocabulary().orders:
-        of_joint = [[name for name in names if _role_beside(c, name) == "position"] for c in joints]
-        if all(len(matching) == 1 for matching in of_joint):
-            return (), tuple(matching[0] for matching in of_joint)
-    return (), ()
-
-
-def called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
-    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
-    if robot is None:
-        return ()
-    found = named_after(numeric, robot.coordinates, "position")
-    names = [key(name) for name in robot.coordinates]
-    return found if all(name in (c.key, c.bare) for name, c in zip(names, found, strict=False)) else ()
 
 
 def find_joints(
@@ -243,72 +210,175 @@ def find_joints(
     Raises:
         LogError: With the question which they are.
     """
-    numbered = _find_numbered(free, lone=not path)
-    found = _find_joints(free, numbered, file, robot, half_pose=half_pose)
-    kinds = {column.kind for column in found.columns}
-    same = same_quantities(found.columns, free) if len(kinds) > 1 else ()
+    count = len(robot.coordinates) if robot else None
+    families = find_families(
+        [c for c in free if not c.words & _moving()], vocabulary().joint["position"], order=0
+    )
+    known = drop_unknown(families, lone=not path)
+    sizes = {len(family.columns) for family in known} - {1}
+    families = [family for family in families if family in known or len(family.columns) in sizes]
+    joints = (
+        _by_order(free, file, robot)
+        or _by_number(free, families, file, count)
+        or _by_word(free, file, count)
+        or _by_unit(free, file, count, half_pose=half_pose)
+        or NamedJoints(())
+    )
+    kinds = {column.kind for column in joints.columns}
+    same = same_quantities(joints.columns, free) if len(kinds) > 1 else ()
     alike = [
         family.ordered()
-        for family in numbered
-        if len(family.columns) == len(found.columns) and not {*family.ordered()} & {*found.columns}
+        for family in families
+        if len(family.columns) == len(joints.columns) and not {*family.ordered()} & {*joints.columns}
     ]
     surer = [group for group in alike if kinds and group[0].kind == Kind.MEASURED < min(kinds)]
     if same or surer:
-        _refuse_groups([found.columns, *surer, *same], file)
-    return replace(found, alternatives=tuple(dict.fromkeys((*found.alternatives, *alike))))
+        _ask_groups([joints.columns, *surer, *same], file)
+    return joints._replace(alternatives=tuple(dict.fromkeys((*joints.alternatives, *alike))))
 
 
-def _find_numbered(free: Sequence[Column], *, lone: bool) -> list[Family]:
-    """Return the families of joints by numbers; if no whole name is known, only if they are alone."""
-    words = vocabulary()
-    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
-    found = find_families([c for c in free if not c.words & moving], words.joint["position"], order=0)
-    kept = drop_unknown(found, lone=lone)
-    sizes = {len(family.columns) for family in kept} - {1}
-    return [family for family in found if family in kept or len(family.columns) in sizes]
+def _moving() -> frozenset[str]:
+    words = vocabulary().joint_words
+    return words["rate"] | words["acceleration"]
 
 
-def _find_joints(
-    free: Sequence[Column], numbered: Sequence[Family], file: str, robot: Chain | None, *, half_pose: bool
-) -> NamedJoints:
-    """Return the joints by the names of an arm's joints, by numbers, or by what else their names share."""
+def _ask_groups(groups: Sequence[Sequence[Column]], file: str) -> NoReturn:
+    found = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
+    raise which_joints(file, found, groups, "one", by_side=True)
+
+
+def _by_order(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJoints | None:
+    """Return the joints that have the names of the robot's joints, or of an arm that is known."""
     count = len(robot.coordinates) if robot else None
-    orders = [*((robot.coordinates,) if robot else ()), *vocabulary().orders]
-    for names in orders:
-        by_name = named_after(free, names, "position")
-        if by_name and count in (None, len(by_name)):
+    for names in _orders(robot):
+        columns = named_after(free, names, "position")
+        arms = _arms(free, names) if columns or count in (None, len(names)) else []
+        if columns and count in (None, len(columns)):
             whose = "the robot's" if robot and names == robot.coordinates else "known"
-            alternatives = tuple(arm for arm in _arms(free, names) if not {*arm} & {*by_name})
-            return NamedJoints(by_name, f"{whose} joint names", names=tuple(names), alternatives=alternatives)
-        if count in (None, len(names)):
-            _refuse_several_arms(free, names, file)
-    by_number = _numbered(free, numbered, file, count)
-    return by_number or _without_number(free, file, count, half_pose=half_pose)
+            others = tuple(arm for arm in arms if not {*arm} & {*columns})
+            return NamedJoints(columns, f"{whose} joint names", names=tuple(names), alternatives=others)
+        first = [arm for arm in arms if arm[0].kind == min(other[0].kind for other in arms)]
+        if count in (None, len(names)) and len(first) > 1:
+            _ask_groups(first, file)
+    return None
 
 
-def _without_number(free: Sequence[Column], file: str, count: int | None, *, half_pose: bool) -> NamedJoints:
-    """Return joints without numbers: by a word that they share, by their units, or as all that is left."""
-    words = vocabulary()
-    about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
-    every = [c for c in free if not c.words & about_else and not (c.unit and c.unit.order)]
-    still = of_first_kind(every)
-    family = _sharing_a_mark(_not_commanded(still))
-    if family and count in (None, len(family)):
-        _refuse_half(family, free, _not_commanded(still), file, count)
-        names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in family)
-        evidence = "the word position or angle in their names; the order is the file's"
-        return NamedJoints(family, evidence, names=names, alternatives=same_quantities(family, every))
-    sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
-    turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
-    several = [family for family in numbered_alike(sized) if len(family) > 1]
-    if turning and count is None and len(several) > 1:  # each number several times: no single arm
-        shown = "; ".join(f"{family[0].header} to {family[-1].header}" for family in several)
-        raise which_joints(file, f"several groups of numbered columns: {shown}", several, "one")
-    if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
-        return NamedJoints(
-            sized, "their units; the order is the file's", alternatives=same_quantities(sized, every)
-        )
-    return NamedJoints(())
+def _orders(robot: Chain | None) -> list[tuple[str, ...]]:
+    return [*((tuple(robot.coordinates),) if robot else ()), *vocabulary().orders]
+
+
+def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column, ...]]:
+    """Return the groups of columns that have the names of all joints, and else the same words."""
+    arms: dict[frozenset[str] | None, dict[str, Column]] = {}
+    for name in names:
+        for column in columns:
+            if _role_beside(column, name) == "position":
+                arms.setdefault(_words_around(column, name), {}).setdefault(name, column)
+    return [tuple(arm[name] for name in names) for arm in arms.values() if len(arm) == len(names)]
+
+
+def _by_number(
+    free: Sequence[Column], families: Sequence[Family], file: str, count: int | None
+) -> NamedJoints | None:
+    """Return the joints by a word and a number: q1, J1_Angle, actual_q_0, ..."""
+    if not families:
+        return None
+    preferred = prefer_measured(families)
+    fitting = [family for family in preferred if len(family.columns) == count] or preferred
+    size = len(fitting[0].columns)
+    best = [f for f in fitting if f.rank == fitting[0].rank or len(f.columns) == size > 1]
+    surer = [family for family in families if family.kind == Kind.MEASURED < best[0].kind]
+    if len(best) + len(surer) > 1 and any(len(family.columns) > 1 for family in (*best, *surer)):
+        _ask_groups([family.ordered() for family in (*best, *surer)], file)
+    if len(best) > 1:  # one plot a joint, each with a number of its own
+        columns = tuple(column for family in best for column in family.ordered())
+        return NamedJoints(columns, "their names; the order is the file's")
+    family = best[0]
+    columns = family.ordered()
+    alternatives = tuple(f.ordered() for f in families if f is not family and f.shares_name(family))
+    passed = {column for group in alternatives for column in group}
+    still = [column for column in free if not column.words & _moving() and column not in passed]
+    lowest = min(family.columns)
+    first = lowest if len(columns) == 1 else min(lowest, 1)
+    gaps = [n for n in range(first, first + len(columns)) if n not in family.columns]
+    if gaps and not family.twins:  # twins are another error
+        missing = ", ".join(map(str, gaps))
+        allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
+        message = f"found joint columns {listed(columns)} and none with number {missing}, allowed: {allowed}"
+        spare = [c for c in still if c not in columns and not c.words & vocabulary().other]
+        raise LogError(Finding(message, file=file, hints=cure(len(gaps), spare, count)))
+    if larger := _sharing_a_mark(still, columns):
+        _ask_if_partial(columns, larger, larger, file, count)
+    evidence = "their names, in the order of their numbers"
+    return NamedJoints(columns, evidence, tuple(sorted(family.columns)), alternatives=alternatives)
+
+
+def _by_word(free: Sequence[Column], file: str, count: int | None) -> NamedJoints | None:
+    """Return the joints by a word for positions at the same place of their names."""
+    candidates = _candidates(free)
+    still = _not_commanded(of_first_kind(candidates))
+    family = _sharing_a_mark(still)
+    if not family or count not in (None, len(family)):
+        return None
+    _ask_if_several(family, file, count)
+    _ask_if_partial(family, free, still, file, count)
+    names = tuple("_".join(w for w in c.key.split("_") if w not in vocabulary().marks) for c in family)
+    evidence = "the word position or angle in their names; the order is the file's"
+    return NamedJoints(family, evidence, names=names, alternatives=same_quantities(family, candidates))
+
+
+def _by_unit(free: Sequence[Column], file: str, count: int | None, *, half_pose: bool) -> NamedJoints | None:
+    """Return the columns with units of joints, one of which is an angle."""
+    candidates = _candidates(free)
+    sized = tuple(c for c in of_first_kind(candidates) if c.unit and c.unit.quantity in ("angle", "length"))
+    if not any(column.unit and column.unit.quantity == "angle" for column in sized):
+        return None
+    _ask_if_several(sized, file, count)
+    if count not in (None, len(sized)) or (half_pose and count is None and len(sized) == 3):
+        return None
+    evidence = "their units; the order is the file's"
+    return NamedJoints(sized, evidence, alternatives=same_quantities(sized, candidates))
+
+
+def _candidates(free: Sequence[Column]) -> list[Column]:
+    others = vocabulary().other | _moving()
+    return [
+        column for column in free if not column.words & others and not (column.unit and column.unit.order)
+    ]
+
+
+def _ask_if_several(columns: Sequence[Column], file: str, count: int | None) -> None:
+    """Raise the question which are the joints if each number is there several times: as of no single arm."""
+    if count is not None:
+        return
+    groups = max(numbered_alike(columns), numbered_alike(columns, FIRST_NUMBER), key=_min_size)
+    if len(groups) > 1:
+        names = "; ".join(f"{group[0].header} to {group[-1].header}" for group in groups)
+        raise which_joints(file, f"several groups of numbered columns: {names}", groups, "one")
+
+
+def _min_size(groups: Sequence[Sequence[Column]]) -> int:
+    return min(map(len, groups), default=0)
+
+
+def _ask_if_partial(
+    family: Sequence[Column], free: Sequence[Column], still: Sequence[Column], file: str, count: int | None
+) -> None:
+    """Raise the question which are the joints if other columns may belong to a family.
+
+    Their names have the family's mark at the same place, as that of a tool may, or a word that the family's
+    have, or one of a limb.
+    """
+    limbs = frozenset(word for order in vocabulary().orders for name in order for word in name.split("_"))
+    words = frozenset(word for column in family for word in column.words) | limbs
+    moving = _moving() | vocabulary().grippers
+    columns = _not_commanded(of_first_kind([column for column in free if not column.words & moving]))
+    same = _sharing_a_mark(columns, family)
+    others = [c for c in free if c not in family and (c in same or (c in still and c.words & words))]
+    if others and len(family) != count:
+        together = [column for column in free if column in family or column in others]
+        found = f"{listed(family)}, whose names say that they are positions, beside {listed(others)}"
+        raise which_joints(file, found, [together, family])
 
 
 def of_first_kind(columns: Sequence[Column]) -> list[Column]:
@@ -333,66 +403,28 @@ def same_quantities(chosen: Sequence[Column], columns: Sequence[Column]) -> tupl
     return tuple(tuple(group) for group in groups.values())
 
 
-def _sharing_a_mark(still: Sequence[Column], having: Sequence[Column] = ()) -> tuple[Column, ...]:
+def _sharing_a_mark(columns: Sequence[Column], required: Sequence[Column] = ()) -> tuple[Column, ...]:
     """Return the most columns whose names have a word for positions at the same place, from front or back.
 
-    In wrist_angle_pos and elbow_pos that is the last one. They hold all columns that they are to have.
+    In wrist_angle_pos and elbow_pos that is the last one. They include all columns that are required.
     """
     alike: dict[tuple[str, int], list[Column]] = {}
-    for column in still:
+    for column in columns:
         words = column.key.split("_")
         for place, word in enumerate(words):
             if word in vocabulary().marks:
-                for key_of in ((word, place), (word, place - len(words))):
-                    alike.setdefault(key_of, []).append(column)
-    whole = [some for some in alike.values() if {*having} <= {*some}]
-    return tuple(sorted(whole, key=len)[-1]) if whole else ()
+                for at in (place, place - len(words)):
+                    alike.setdefault((word, at), []).append(column)
+    complete = [group for group in alike.values() if {*required} <= {*group}]
+    return tuple(sorted(complete, key=len)[-1]) if complete else ()
 
 
-def _refuse_half(
-    family: Sequence[Column], free: Sequence[Column], still: Sequence[Column], file: str, count: int | None
-) -> None:
-    """Raise a `LogError` where other columns may belong to a family of joints: a family is taken whole.
-
-    Their names have the family's mark at the same place, as that of a tool may, or a word that the family's
-    have, or one of a limb.
-    """
-    words = vocabulary()
-    limbs = frozenset(word for order in words.orders for name in order for word in name.split("_"))
-    own = frozenset(word for column in family for word in column.words) | limbs
-    moving = words.joint_words["rate"] | words.joint_words["acceleration"] | words.grippers
-    columns = _not_commanded(of_first_kind([column for column in free if not column.words & moving]))
-    same = _sharing_a_mark(columns, family)
-    others = [c for c in free if c not in family and (c in same or (c in still and c.words & own))]
-    if not others or len(family) == count:
-        return
-    whole = [column for column in free if column in family or column in others]
-    found = f"{listed(family)}, whose names say that they are positions, beside {listed(others)}"
-    raise which_joints(file, found, [whole, family])
+def cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:
+    """Return what helps where joints are missing: naming them only where columns remain for a robot's."""
+    return RECORD, OTHER_ROBOT if count is not None and len(spare) < missing else NAME_JOINTS
 
 
-def _refuse_several_arms(free: Sequence[Column], names: Sequence[str], file: str) -> None:
-    """Raise a `LogError` where columns have the names of all joints more than once, as those of two arms."""
-    arms = _arms(free, names)
-    first = [arm for arm in arms if arm[0].kind == min(other[0].kind for other in arms)]
-    if len(first) > 1:
-        _refuse_groups(first, file)
-
-
-def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column, ...]]:
-    """Return the groups of columns that have the names of all joints, and else the same words."""
-    arms: dict[frozenset[str] | None, dict[str, Column]] = {}
-    for name in names:
-        for column in columns:
-            if _role_beside(column, name) == "position":
-                arms.setdefault(_words_around(column, name), {}).setdefault(name, column)
-    return [tuple(arm[name] for name in names) for arm in arms.values() if len(arm) == len(names)]
-
-
-def _refuse_groups(groups: Sequence[Sequence[Column]], file: str) -> NoReturn:
-    """Raise the question which of several groups are the joints."""
-    found = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
-    raise which_joints(file, found, groups, "one", by_side=True)
+# 3. Names and numbers
 
 
 def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> tuple[Column, ...]:
@@ -407,13 +439,25 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     for name in names:
         matches = [column for column in columns if _role_beside(column, name) == role]
         matches = [c for c in matches if c.kind == min(other.kind for other in matches)]
-        own = frozenset(key(name).split("_"))
-        exact = [c for c in matches if c.words - own <= vocabulary().joint_words["position"]]
+        words = frozenset(key(name).split("_"))
+        exact = [c for c in matches if c.words - words <= vocabulary().joint_words["position"]]
         matches = exact if len(exact) == 1 else matches
         if len(matches) != 1:
             return ()
         result.append(matches[0])
     return tuple(result) if len(set(result)) == len(result) else ()
+
+
+def _role_beside(column: Column, name: str) -> str | None:
+    """Return what a column says about a joint: by the words beside the joint's name in its name."""
+    around, words = _words_around(column, name), vocabulary().joint_words
+    if around is None or around & vocabulary().other or column.moves_nothing:
+        return None
+    order = column.unit.order if column.unit else 0
+    for role, its_order in (("acceleration", 2), ("rate", 1)):
+        if around & words[role] or order == its_order:
+            return role
+    return "position"
 
 
 def _words_around(column: Column, name: str) -> frozenset[str] | None:
@@ -426,66 +470,56 @@ def _words_around(column: Column, name: str) -> frozenset[str] | None:
     return None
 
 
-def _role_beside(column: Column, name: str) -> str | None:
-    """Return what a column says about a joint: by the words beside the joint's name in its own."""
-    around, words = _words_around(column, name), vocabulary().joint_words
-    if around is None or around & vocabulary().other or column.moves_nothing:
-        return None
-    order = column.unit.order if column.unit else 0
-    for role, its_order in (("acceleration", 2), ("rate", 1)):
-        if around & words[role] or order == its_order:
-            return role
-    return "position"
-
-
-def _numbered(
-    free: Sequence[Column], found: Sequence[Family], file: str, count: int | None
-) -> NamedJoints | None:
-    """Return the joints by a word and a number: q1, J1_Angle, actual_q_0, ..."""
-    if not found:
-        return None
-    words, preferred = vocabulary(), prefer_measured(found)
-    fitting = [family for family in preferred if len(family.columns) == count] or preferred
-    size = len(fitting[0].columns)
-    best = [f for f in fitting if f.rank == fitting[0].rank or len(f.columns) == size > 1]
-    surer = [f for f in found if f.kind == Kind.MEASURED < best[0].kind]
-    if len(best) + len(surer) > 1 and not all(len(family.columns) == 1 for family in (*best, *surer)):
-        _refuse_groups([family.ordered() for family in (*best, *surer)], file)
-    if len(best) > 1:  # one plot a joint, each with a number of its own
-        columns = tuple(column for family in best for column in family.ordered())
-        return NamedJoints(columns, "their names; the order is the file's")
-    family = best[0]
-    alternatives = tuple(f.ordered() for f in found if f is not family and f.shares_name(family))
-    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
-    passed = {column for group in alternatives for column in group}
-    still = [column for column in free if not column.words & moving and column not in passed]
-    lowest = min(family.columns)
-    first = lowest if len(family.columns) == 1 else min(lowest, 1)
-    gaps = [n for n in range(first, first + len(family.columns)) if n not in family.columns]
-    if gaps and not family.twins:  # a number that is there twice is told as such
-        missing = ", ".join(map(str, gaps))
-        said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
-        allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
-        spare = [c for c in still if c not in family.columns.values() and not c.words & words.other]
-        hints = cure(len(gaps), spare, count)
-        raise LogError(Finding(f"{said}, allowed: {allowed}", file=file, hints=hints))
-    if larger := _sharing_a_mark(still, family.ordered()):
-        _refuse_half(family.ordered(), larger, larger, file, count)
-    evidence = "their names, in the order of their numbers"
-    return NamedJoints(family.ordered(), evidence, tuple(sorted(family.columns)), alternatives=alternatives)
-
-
-def cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:
-    """Return what helps where joints are missing: naming them only where columns are left for a robot's."""
-    return RECORD, OTHER_ROBOT if count is not None and len(spare) < missing else NAME_JOINTS
+def called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
+    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
+    if robot is None:
+        return ()
+    columns = named_after(numeric, robot.coordinates, "position")
+    is_exact = all(
+        key(name) in (column.key, column.bare)
+        for name, column in zip(robot.coordinates, columns, strict=False)
+    )
+    return columns if is_exact else ()
 
 
 def some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[Column, ...], list[str]]:
     """Return the columns of most joints with known names, and the names that have none; nothing of fewer."""
-    for names in [*((robot.coordinates,) if robot else ()), *vocabulary().orders]:
-        own = {name: named_after(numeric, [name], "position") for name in names}
-        found = tuple(dict.fromkeys(column for columns in own.values() for column in columns))
-        missing = [name for name, columns in own.items() if not columns]
-        if len(names) / 2 < len(found) == len(names) - len(missing) < len(names):
-            return found, missing
+    for names in _orders(robot):
+        by_name = {name: named_after(numeric, [name], "position") for name in names}
+        columns = tuple(dict.fromkeys(column for group in by_name.values() for column in group))
+        missing = [name for name, group in by_name.items() if not group]
+        if len(names) / 2 < len(columns) == len(names) - len(missing) < len(names):
+            return columns, missing
     return (), []
+
+
+def family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Return the numbers, or else the names, that chosen joints share with their rates, in their order."""
+    for family in find_families(joints, vocabulary().joint["position"], order=0):
+        if len(family.columns) == len(joints):
+            number_of = {column: n for n, column in family.columns.items()}
+            return tuple(number_of[column] for column in joints), ()
+    for names in vocabulary().orders:
+        of_joint = [[name for name in names if _role_beside(c, name) == "position"] for c in joints]
+        if all(len(matching) == 1 for matching in of_joint):
+            return (), tuple(matching[0] for matching in of_joint)
+    return (), ()
+
+
+# 4. Proof
+
+
+def proved_by_rates(families: Sequence[tuple[Column, ...]], tables: Sequence[LogTable]) -> NamedJoints:
+    """Return the family whose rates are another one, by their numbers; nothing unless there is one."""
+    pairs = []
+    for joints, rates in permutations(families, 2):
+        values = [
+            tables[group[0].table].values([column.index for column in group]) for group in (joints, rates)
+        ]
+        if 2 < len(joints) == len(rates) and len(values[0]) == len(values[1]) and period_of(*values):
+            pairs.append((joints, rates))
+    first = [pair for pair in pairs if pair[0] not in [rates for _, rates in pairs]]
+    if len(first) != 1:
+        return NamedJoints(())
+    joints, rates = first[0]
+    return NamedJoints(joints, f"{listed(rates)} are their rates, by steps and rates", rates=rates)

@@ -86,7 +86,8 @@ def find_pose(
     vectors = prefer_measured(every)
     if len(vectors) == 1:
         ordered = vectors[0].ordered()
-        return Pose(ordered[:3], ordered[3:], ("vector",), alternatives=_alternatives(vectors[0], every))
+        forms: tuple[RotationForm, ...] = ("vector",) if vectors[0].rank == 0 else ("vector", "rpy", "xyz")
+        return Pose(ordered[:3], ordered[3:], forms, alternatives=_alternatives(vectors[0], every))
     every = find_families(numeric, vocabulary().tcp_matrix, 0)
     for family in prefer_measured(every):
         pose = matrix_pose(family.ordered(), layouts, some=some)

@@ -48,6 +48,7 @@ from urmpipe_pipeline.logs.formats.own import GIVEN as GIVEN_KEY
 from urmpipe_pipeline.logs.formats.own import RECORDED, form_of, roles_of, stated_joints
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.names import (
+    FIRST_NUMBER,
     NamedJoints,
     called_as_joints,
     cure,
@@ -392,7 +393,8 @@ def _may_be(
     candidates = [column for column in candidates if len(rising) != 1 or column is not rising[0]]
     counts = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
     candidates = of_first_kind(candidates)
-    groups = sorted([*by_arm(candidates), *numbered_alike(candidates)], key=len, reverse=True)
+    groups = [*by_arm(candidates), *numbered_alike(candidates), *numbered_alike(candidates, FIRST_NUMBER)]
+    groups.sort(key=len, reverse=True)
     return [group for group in groups if len(group) in counts]
 
 
