@@ -600,3 +600,12 @@ def unit_inference(
     every = every and len(columns) > 1 and unit in ("rad", "deg")
     hints = (Hint("unit", {"" if every else columns[0].called: other}),) if other else ()
     return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints, basis)
+
+
+def find_numbers(names: Sequence[str]) -> list[int] | None:
+    """Return the last number in each name, if the names are the same without it and the numbers differ."""
+    matches = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
+    parts = [match.groups() for match in matches if match]
+    numbers = [int(number) for _, number, _ in parts]
+    same = len({(before, after) for before, _, after in parts}) == 1
+    return numbers if same and len(set(numbers)) == len(names) else None

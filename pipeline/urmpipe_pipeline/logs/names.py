@@ -23,6 +23,7 @@ from urmpipe_pipeline.logs.columns import (
     RECORD,
     Column,
     Kind,
+    find_numbers,
     kind_of,
     listed,
     which_joints,
@@ -322,8 +323,11 @@ def _by_word(free: Sequence[Column], file: str, count: int | None) -> NamedJoint
         return None
     _ask_if_several(family, file, count)
     _ask_if_partial(family, free, still, file, count)
-    names = tuple("_".join(w for w in c.key.split("_") if w not in vocabulary().marks) for c in family)
     evidence = "the word position or angle in their names; the order is the file's"
+    if numbers := find_numbers([column.key for column in family]):
+        family = tuple(column for _, column in sorted(zip(numbers, family, strict=True)))
+        evidence = "the word position or angle in their names, in the order of their numbers"
+    names = tuple("_".join(w for w in c.key.split("_") if w not in vocabulary().marks) for c in family)
     return NamedJoints(family, evidence, names=names, alternatives=same_quantities(family, candidates))
 
 

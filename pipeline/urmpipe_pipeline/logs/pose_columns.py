@@ -11,9 +11,9 @@ import numpy as np
 
 from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.math3d import FORMS, RotationForm, column_count
-from urmpipe_pipeline.logs.columns import Column, find_column, listed
+from urmpipe_pipeline.logs.columns import Column, chosen_columns, listed
 from urmpipe_pipeline.logs.formats.cells import to_float
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.sniff import FEW
@@ -139,10 +139,12 @@ def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
         return _measured_pose(columns, options)
     if not options.position:
         if options.orientation:
-            raise OptionError("orientation: found without a position, allowed: beside x, y, z")
+            hint = Hint("position", None, "names x, y, z")
+            message = "found without a position, allowed: beside x, y, z"
+            raise OptionError(Finding(message, parameter="orientation", hints=(hint,)))
         return None
-    position = tuple(find_column(columns, text, about="position") for text in options.position)
-    rotation = tuple(find_column(columns, text, about="orientation") for text in options.orientation)
+    position = chosen_columns(columns, options.position, about="position")
+    rotation = chosen_columns(columns, options.orientation, about="orientation")
     if len(position) not in (2, 3):
         allowed = "x, y, z, or x, y of a planar arm"
         raise OptionError(f"position: found {format_count(len(position), 'column')}, allowed: {allowed}")
@@ -159,7 +161,7 @@ def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
 
 def _measured_pose(columns: Sequence[Column], options: LogMap) -> Pose:
     """Return the pose that the user names as measured from outside."""
-    named = tuple(find_column(columns, text, parameter="measured") for text in options.measured)
+    named = chosen_columns(columns, options.measured, parameter="measured")
     position, rotation = named[:3], named[3:]
     forms = _forms_of(rotation, options)
     if len(position) != 3 or (rotation and not forms):

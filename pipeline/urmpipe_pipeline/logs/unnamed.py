@@ -11,7 +11,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -31,6 +30,7 @@ from urmpipe_pipeline.logs.columns import (
     UNKNOWN,
     Column,
     chosen_columns,
+    find_numbers,
     listed,
     take,
     which_joints,
@@ -122,6 +122,8 @@ def without_header(
     used = (*pose.position, *pose.rotation)
     start = min(map(columns.index, used)) if behind else len(columns)
     free = [column for column in columns[:start] if column not in used]
+    if not free and pose.position:
+        return _path_roles(pose, columns, NO_HEADER)
     joints, rates, evidence = _joints_among(free, table, robot)
     check_count(joints, table.file, robot)
     roles = _by_place(joints, columns, robot, evidence, pose, rates)
@@ -373,8 +375,8 @@ def one_plot_a_file(
         return None
     if robot is not None and len(numeric) != len(robot.coordinates):
         return None
-    by_name = _only_numbers_differ([split_unit(column.header)[0] for column in numeric])
-    by_file = _only_numbers_differ([path.stem for path in paths])
+    by_name = find_numbers([split_unit(column.header)[0] for column in numeric])
+    by_file = find_numbers([path.stem for path in paths])
     numbers = by_name or by_file
     if numbers is None:
         return tuple(numeric), ()
@@ -396,12 +398,3 @@ def one_plot_a_file(
     return in_order, (
         LogWarning("plot-order", message, hints=(Hint("joints", None, "gives another order"),)),
     )
-
-
-def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
-    """Return the last number in each name, if the names are the same without it and the numbers differ."""
-    matches = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
-    parts = [match.groups() for match in matches if match]
-    numbers = [int(number) for _, number, _ in parts]
-    same = len({(before, after) for before, _, after in parts}) == 1
-    return numbers if same and len(set(numbers)) == len(names) else None

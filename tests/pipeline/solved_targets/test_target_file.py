@@ -220,7 +220,8 @@ def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
         f" them; {NAMED}"
     ]
     assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", orientation=("u", "v", "w")) == [
-        "orientation: found without a position, allowed: beside x, y, z"
+        "orientation (--orientation): found without a position, allowed: beside x, y, z; --position X,Y,Z"
+        " names x, y, z"
     ]
 
 
