@@ -69,6 +69,7 @@ class Column:
         text: Whether it holds text instead of numbers.
         matched: Its name without the words of the side that the user chose, where it has them.
         side: These words, where `side` chose them.
+        shares_name: Whether another column of its table has the same name.
     """
 
     number: int
@@ -81,6 +82,7 @@ class Column:
     text: bool
     matched: str = ""
     side: frozenset[str] = frozenset()
+    shares_name: bool = False
 
     @property
     def unit(self) -> Unit | None:
@@ -144,8 +146,9 @@ class Column:
 
     @property
     def called(self) -> str:
-        """What a reading option calls it: its number where it has no name."""
-        return self.name if self.header and not self.header.isdigit() else str(self.number)
+        """What a reading option calls it: its number where it has no name, or shares it."""
+        has_name = self.header and not self.header.isdigit() and not self.shares_name
+        return self.name if has_name else str(self.number)
 
 
 def columns_of(layouts: Sequence[LogTable], titles: Sequence[str]) -> tuple[Column, ...]:
@@ -169,7 +172,10 @@ def columns_of(layouts: Sequence[LogTable], titles: Sequence[str]) -> tuple[Colu
             text = _holds_text(layout.cells(index), layout.decimal)
             number = len(result) + 1
             name = name or f"column {number}"
-            result.append(Column(number, table, index, header, name, key(label), unit, text))
+            shares_name = layout.names.count(header) > 1
+            result.append(
+                Column(number, table, index, header, name, key(label), unit, text, shares_name=shares_name)
+            )
     return _named_in_cells(result, layouts)
 
 
