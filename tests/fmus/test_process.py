@@ -129,11 +129,12 @@ def test_a_process_that_an_fmu_started_ends_with_it() -> None:
 
 CALLS_OF_FMUS = ["check_fmu(path)", "simulate(prepare(system, lambda block: path))"]
 PROGRAM = """
-import sys
+import signal, sys
 from pathlib import Path
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.cosim import Block, System, prepare, simulate
 path = Path(sys.argv[1])
+signal.signal(signal.SIGINT, signal.default_int_handler)  # also below a shell that ignores it
 blocks = (Block(name="bad", fmu=path, start={"u": 0.0}),)
 system = System(name="test", path=Path("test.toml"), step=0.1, duration=1.0, blocks=blocks)
 """

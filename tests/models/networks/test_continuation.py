@@ -116,11 +116,11 @@ SWEEP = 3.8  # rad: through the flat pose at 0 or pi from any start
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_perturbed_change_points_keep_the_branch_of_their_start(seed: int) -> None:
-    """Fifty four-bars each, next to those whose branches meet where all links are in line."""
+    """Twenty four-bars each, next to those whose branches meet where all links are in line."""
     rng = np.random.default_rng(seed)
-    for _ in range(50):
+    for _ in range(20):
         kind = rng.integers(3)
         short, long = rng.uniform(0.3, 0.9), rng.uniform(1.0, 1.6)
         kinds = [(short, long, short, long), (short, short, long, long), (short, 0.7, 0.9, 1.6 - short)]
@@ -289,18 +289,18 @@ def five_bar_at(left: FloatArray, right: FloatArray) -> FloatArray:
     ],
 )
 def test_a_log_around_singular_poses_stays_on_its_branch(center: tuple[float, float], radius: float) -> None:
-    turn = np.linspace(0, TURN, 401)
+    turn = np.linspace(0, TURN, 201)
     left, right = center[0] + radius * np.cos(turn), center[1] + radius * np.sin(turn)
     tables, found = five_bar(float(left[0]), float(right[0]))
-    log = pd.DataFrame({"t": 0.005 * np.arange(401), "left [rad]": left, "right [rad]": right})
+    log = pd.DataFrame({"t": 0.005 * np.arange(201), "left [rad]": left, "right [rad]": right})
     moved = network_drive(tables, log=log)
-    assert (len(moved), moved.events) == (401, ())
+    assert (len(moved), moved.events) == (201, ())
     by_names = np.array([column(moved, name) for name in "PCQ"])
     assert np.abs(apart(by_names[:, 0], found)).max() < ANSWER
     expected = five_bar_at(left, right)
     assert_close(by_names - by_names[:, :1], expected - expected[:, :1], ANSWER)
     here = {name: float(column(moved, name)[0]) for name in "PCQ"}
-    for row in range(0, 400, 25):  # one after another, each from the last configuration
+    for row in range(0, 200, 25):  # one after another, each from the last configuration
         drives = {"left": left[[row, row + 25]].tolist(), "right": right[[row, row + 25]].tolist()}
         step = network_drive(tables, drives, steps=1, start=here)
         here = {name: float(column(step, name)[-1]) for name in "PCQ"}
@@ -322,12 +322,13 @@ def assert_rates(parts: tuple[FloatArray, ...], rows: FloatArray) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["uniform", "quintic", "trapezoid"])
 @pytest.mark.parametrize(
-    ("name", "ends"),
+    ("name", "ends", "law"),
     [
-        ("four-bar", (0, TURN)), ("slider-crank", (0.3, 5.0)), ("rssr", (0, TURN)), ("bennett", (0.5, 5.5)),
-        ("rccc", (0, TURN)), ("geared-five-bar", (0, 360)), ("rack-and-pinion", (-300, 300)),
+        ("four-bar", (0, TURN), "uniform"), ("four-bar", (0, TURN), "trapezoid"),
+        ("rssr", (0, TURN), "quintic"), ("slider-crank", (0.3, 5.0), "quintic"),
+        ("bennett", (0.5, 5.5), "trapezoid"), ("rccc", (0, TURN), "quintic"),
+        ("geared-five-bar", (0, 360), "uniform"), ("rack-and-pinion", (-300, 300), "quintic"),
     ],
 )  # fmt: skip
 def test_rates_are_derivatives(name: str, ends: tuple[float, float], law: Any) -> None:

@@ -1,4 +1,4 @@
-"""Zeros that alone break the tolerance are in the sentence: 100 random sets of five."""
+"""Zeros that alone break the tolerance are in the sentence: 26 random sets of five."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def drawn(seed: int) -> tuple[np.random.Generator, FloatArray, FloatArray, Float
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", range(0, 50, 4))
 def test_of_joints_on_both_sides(seed: int) -> None:
     rng, t, q, off = drawn(seed)
     reference = q + off + rng.normal(0.0, np.radians(0.01), q.shape)
@@ -40,7 +40,7 @@ def test_of_joints_on_both_sides(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(50, 100))
+@pytest.mark.parametrize("seed", range(50, 100, 4))
 def test_of_a_path_against_joints(seed: int) -> None:
     rng, t, q, off = drawn(seed)
     path = poses_over_log(ARM, q + off)[0] + rng.normal(0.0, 1e-4, (len(t), 3))

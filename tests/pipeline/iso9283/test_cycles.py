@@ -94,7 +94,7 @@ def way(first: FloatArray, last: FloatArray) -> FloatArray:
 
 @pytest.mark.slow
 @pytest.mark.hypothesis
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     kinds=st.lists(st.sampled_from([None, None, *DISTURBANCES]), min_size=2, max_size=7).filter(
         lambda kinds: None in kinds

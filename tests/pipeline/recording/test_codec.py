@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
@@ -151,6 +151,7 @@ def round_trip(value: Any) -> Any:
 
 
 @pytest.mark.slow
+@settings(max_examples=40, deadline=None)
 @given(TOY)
 def test_whatever_its_fields_hold_comes_back(toy: Toy) -> None:
     assert_same(round_trip(toy), toy)

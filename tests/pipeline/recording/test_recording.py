@@ -377,7 +377,7 @@ def simulations(draw: st.DrawFn) -> Simulation:
 
 
 @pytest.mark.slow
-@settings(max_examples=45, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(result=runs() | simulations())
 def test_any_run_and_any_simulation_comes_back_as_it_was(result: Result, tmp_path: Path) -> None:
     assert_same(read_recording(write_recording(result, tmp_path / "any.rrd")), result)

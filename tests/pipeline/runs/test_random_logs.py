@@ -159,13 +159,13 @@ def clear_of_wraps(motion: FloatArray) -> NDArray[np.bool_]:
 
 
 @pytest.mark.slow
-def test_no_turn_of_a_thousand_random_logs_goes_wrong_in_silence() -> None:
+def test_no_turn_of_300_random_logs_goes_wrong_in_silence() -> None:
     """Every other log with a robot that tells how fast its joint is."""
-    cases = [random_case(seed) for seed in range(1000)]
+    cases = [random_case(seed) for seed in range(300)]
     results = [audited(case, known=seed % 2 == 0) for seed, case in enumerate(cases)]
     undecidable = sum(hold(case, found) for case, found in zip(cases, results, strict=True))
     told = [entry.kind for found in results for entry in found.entries]
     assert {"wrap", "in-between", "unexplained", "ambiguous"} == set(told)
-    assert undecidable > 100
-    assert sum(len(case.on_jump) for case in cases) > 500
-    assert told.count("wrap") > 1000
+    assert undecidable > 30
+    assert sum(len(case.on_jump) for case in cases) > 150
+    assert told.count("wrap") > 300

@@ -102,7 +102,7 @@ def specimens(draw: st.DrawFn) -> Specimen:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(specimens())
 def test_what_was_read_leaves_as_it_was(specimen: Specimen) -> None:
     with tempfile.TemporaryDirectory() as name:

@@ -32,7 +32,7 @@ from stranger import (
     unit_clock,
 )
 
-TABLES = 60
+TABLES = 30
 
 
 @st.composite
@@ -200,7 +200,7 @@ def padded(draw: st.DrawFn) -> Stranger:
 drawn = st.one_of(tables(), tables(), tables(), mixed_columns(), two_lines(), laid_out(), padded())
 
 
-@pytest.mark.slow  # sixty tables, each with its answers
+@pytest.mark.slow  # thirty tables, each with its answers
 @settings(
     max_examples=TABLES, derandomize=True, database=None, deadline=None, phases=[Phase.generate],
     suppress_health_check=list(HealthCheck),
