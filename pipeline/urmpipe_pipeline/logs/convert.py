@@ -40,7 +40,7 @@ from urmpipe_pipeline.logs.log_map import Evidence, LogMap
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.proofs import Recorded, prove_by_kinematics
 from urmpipe_pipeline.logs.rates import SURE_VARIED, period_of, rounded_period
-from urmpipe_pipeline.logs.rotation import Arm, settle_rotation
+from urmpipe_pipeline.logs.rotation import settle_rotation
 from urmpipe_pipeline.logs.rows import Rows, check_not_empty, gap_warnings, missing_warnings
 from urmpipe_pipeline.logs.units import UnitFinder, UnitSources
 from urmpipe_pipeline.logs.vocabulary import Unit
@@ -178,10 +178,9 @@ def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Prop
         roles.forms,
         rotation,
         stated := sources.of_rotation(roles.rotation, roles.forms),
-        Arm(robot, q) if robot and roles.joints else None,
+        (robot, q) if robot and roles.joints else None,
         finder.kinematic.base if finder.kinematic else None,
         form_given=reading.options.rotation is not None,
-        in_base=not (roles.measured or rows.are_poses),
     )
     if turned.form:
         finder.warn_not_reached(roles.rotation, stated, turned.units, "rotation")

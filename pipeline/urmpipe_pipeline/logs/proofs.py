@@ -396,24 +396,13 @@ def rotation_distances(computed: FloatArray, recorded: FloatArray) -> tuple[floa
         computed: R_k, unit quaternions x, y, z, w [-], shape (n, 4).
         recorded: S_k, likewise.
     """
-    direct = float(np.median(rotation_angle(computed, recorded)))
-    return direct, float(np.median(fit_turn(computed, recorded)[1])), _relative_distance(computed, recorded)
-
-
-def fit_turn(computed: FloatArray, recorded: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return `mean_turn` without the rows far from it, and the angles after it in [rad], shape (n,)."""
-    kept = np.ones(len(computed), dtype=np.bool_)
+    angles, kept = rotation_angle(computed, recorded), np.ones(len(computed), dtype=np.bool_)
+    direct = float(np.median(angles))
     for _ in range(3):
-        turn = mean_turn(computed[kept], recorded[kept])
-        angles = turned_angles(computed, turn, recorded)
+        turn = np.broadcast_to(mean_turn(computed[kept], recorded[kept]), computed.shape)
+        angles = rotation_angle(quaternion_product(computed, turn), recorded)
         kept = _are_near(angles)
-    return turn, angles
-
-
-def turned_angles(computed: FloatArray, turn: FloatArray, recorded: FloatArray) -> FloatArray:
-    """Return the angles between orientations in [rad], the computed ones turned, shape (n,)."""
-    turned = quaternion_product(computed, np.broadcast_to(turn, computed.shape))
-    return rotation_angle(turned, recorded)
+    return direct, float(np.median(angles)), _relative_distance(computed, recorded)
 
 
 def _relative_distance(computed: FloatArray, recorded: FloatArray) -> float:

@@ -9,7 +9,6 @@
 2. Form and unit (`settle_rotation`): the names allow some choices. With an arm the one counts that turns
    as it does, `MARGIN` times nearer than the others (`proofs.rotation_distances`). Else wraps prove a
    unit, and size is a reason to assume it; several forms are not read.
-3. Rows next to large steps that alone contradict the arm were interpolated as well: they become NaN.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count
-from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
+from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import (
@@ -30,7 +29,6 @@ from urmpipe_models.math3d import (
     RotationForm,
     column_count,
     is_angular,
-    rotation_angle,
     to_quaternions,
 )
 from urmpipe_models.wraps import FULL_TURN
@@ -42,11 +40,9 @@ from urmpipe_pipeline.logs.proofs import (
     ONE_TURN,
     TWO_TURNS,
     count_wraps,
-    fit_turn,
     peak,
     rotation_distances,
     spread,
-    turned_angles,
     usual_peak,
 )
 from urmpipe_pipeline.logs.units import (
@@ -62,17 +58,11 @@ ORIENTATION = "orientation"  # of several forms, or no quaternions: not used
 INTERPOLATED = "interpolated-orientation"  # rows that hold no orientation of the motion
 
 MIN_ROWS = 5  # fewer have no usual step
-MAX_BETWEEN = 8  # rows between two samples: a log of 125 Hz resampled to 1 kHz has 7 or 8
+MAX_BETWEEN = 24  # rows between two samples: a log of 50 Hz resampled to 1 kHz has 19 or 20
 MAX_JUMP_DEVIATION = 0.1  # share of T: the ends of a jump are samples of a motion near it
 MIN_STEP_RATIO = (
     3.0  # a step of a jump over those next to it and the usual one; nearer rows are as good as the end
 )
-MIN_CONTRADICTION = 0.17  # [rad] (10 deg), of a row from the arm ...
-MIN_CONTRADICTION_RATIO = 5.0  # ... and times the median of all rows
-MAX_DELAY = (
-    3.0  # rows by which a controller records an orientation late: it is off by as many steps of the arm
-)
-MAX_CONTRADICTING = 0.1  # share of rows; more are no fault of single rows
 MAX_ANGLE = 0.03  # [rad] (1.7 deg), median within which orientations agree with the arm
 MAX_LENGTH_DEVIATION = 0.02  # of a quaternion from 1: they are printed with two digits or more
 
@@ -110,17 +100,6 @@ def find_interpolated_rows(values: FloatArray) -> BoolArray:
                 if is_straight and within.min() > MIN_STEP_RATIO * max(usual, *around):
                     is_between[first + 1 : last] = True
     return is_between
-
-
-class Arm(NamedTuple):
-    """A robot, and its joint values over a log in SI, shape (n, joints)."""
-
-    robot: Chain
-    q: FloatArray
-
-    def orientations(self, rows: IndexArray) -> FloatArray:
-        """Return those of the tip in some rows, unit quaternions x, y, z, w [-], shape (k, 4)."""
-        return to_quaternions(poses_over_log(self.robot, self.q[rows])[1].reshape(-1, 9), "matrix")
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,11 +161,10 @@ def settle_rotation(
     forms: Sequence[RotationForm],
     values: FloatArray,
     stated: Sequence[StatedUnit | None],
-    arm: Arm | None,
+    arm: tuple[Chain, FloatArray] | None,
     base: FloatArray | None = None,
     *,
     form_given: bool = False,
-    in_base: bool = True,
 ) -> SettledRotation:
     """Return form and units of a recorded orientation, and its values in SI.
 
@@ -198,10 +176,9 @@ def settle_rotation(
         forms: The forms that their names allow, or the one that the user gave.
         values: Their values in the file's own units, shape (n, columns).
         stated: The stated unit of each column, if there is one.
-        arm: The robot and the joint values; None without a robot.
+        arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
         base: Rotation from the recorded frame to the robot's [-], shape (3, 3); None for the same frame.
         form_given: Whether the user gave the form.
-        in_base: Whether the rows are of a motion in the frame of the arm, which contradicts single ones.
     """
     if not columns:
         return SettledRotation()
@@ -235,16 +212,12 @@ def settle_rotation(
         hints = tuple(Hint("rotation", form, "specifies it") for form in sound)
         return SettledRotation(warnings=(*warnings, LogWarning(ORIENTATION, message, hints=hints)))
     choice, why, objections, basis = decision or _decide_by_values(columns, choices, values, stated)
-    ordered, values = tuple(columns[k] for k in choice.order), choice.in_si(values)
-    if arm is not None and in_base:
-        values, contradicted = _drop_contradicted(values, choice.form, arm, names)
-        objections = (*objections, *contradicted)
     assumed = [warning.message for warning in objections if warning.assumption and basis != "given"]
     evidence = Evidence("assumed", assumed[0]) if assumed else Evidence(basis, why)
     inference = form_inference([column.name for column in columns], choice.form, choice.units[0], why, basis)
-    units = tuple(choice.units[k] for k in choice.order)
+    ordered, warnings = tuple(columns[k] for k in choice.order), [*warnings, *objections]
     return SettledRotation(
-        choice.form, ordered, units, values, (inference,), (*warnings, *objections), evidence
+        choice.form, ordered, choice.units, choice.in_si(values), (inference,), tuple(warnings), evidence
     )
 
 
@@ -304,19 +277,23 @@ class _ArmFit(NamedTuple):
 
 
 def _fit_arm(
-    every: Sequence[Choice], stated: Sequence[Choice], values: FloatArray, arm: Arm, base: FloatArray | None
+    every: Sequence[Choice],
+    stated: Sequence[Choice],
+    values: FloatArray,
+    arm: tuple[Chain, FloatArray],
+    base: FloatArray | None,
 ) -> _ArmFit | None:
     """Return the choice with which the arm agrees; None if none stands out.
 
     As it is, else with a turned tool, else with a turned base as well. Of several that agree it is the only
     stated one. Every choice begins with the stated ones.
     """
-    rows = spread(len(arm.q))
-    arm, values = arm._replace(q=arm.q[rows]), values[rows]
-    known = np.isfinite(arm.q).all(axis=1) & np.isfinite((values**2).sum(axis=1))  # huge ones: no direction
+    (robot, q), rows = arm, spread(len(values))
+    q, values = q[rows], values[rows]
+    known = np.isfinite(q).all(axis=1) & np.isfinite((values**2).sum(axis=1))  # huge ones have no direction
     if not known.any() or len(every) < 2:
         return None
-    rotation = poses_over_log(arm.robot, arm.q[known])[1]
+    rotation = poses_over_log(robot, q[known])[1]
     rotation = rotation if base is None else base.T @ rotation
     computed = to_quaternions(rotation.reshape(-1, 9), "matrix")
     recorded = [to_quaternions(choice.in_si(values[known]), choice.form) for choice in every]
@@ -416,43 +393,3 @@ def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | 
     count = int(count_wraps(known, likely).sum())
     why = f"{format_count(count, 'step')} of about {turn} from one row to the next"
     return (likely, why) if count else None
-
-
-def _drop_contradicted(
-    values: FloatArray, form: RotationForm, arm: Arm, names: str
-) -> tuple[FloatArray, list[LogWarning]]:
-    """Return an orientation in SI with NaN in the few rows that alone contradict the arm, and the warning.
-
-    Only rows next to large steps may: what goes in small steps, with a turn of the tool that is the same in
-    all rows, is an orientation of the arm.
-    """
-    if len(values) < MIN_ROWS:
-        return values, []
-    with np.errstate(over="ignore", invalid="ignore"):
-        steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
-        is_large = steps > max(MIN_STEP_RATIO * float(np.nanmedian(steps)), MAX_ANGLE)
-    is_near_step = np.append(is_large, False) | np.append(False, is_large)
-    is_known = np.isfinite(arm.q).all(axis=1) & np.isfinite(values).all(axis=1)
-    rows, usual = (
-        np.flatnonzero(is_near_step & is_known),
-        np.flatnonzero(is_known)[spread(int(is_known.sum()))],
-    )
-    if not len(rows) or not len(usual):
-        return values, []
-
-    turn, angles = fit_turn(arm.orientations(usual), to_quaternions(values[usual], form))
-    distance = turned_angles(arm.orientations(rows), turn, to_quaternions(values[rows], form))
-    before, here, after = (
-        arm.orientations(np.clip(rows + shift, 0, len(values) - 1)) for shift in (-1, 0, 1)
-    )
-    turned, typical = np.fmax(rotation_angle(before, here), rotation_angle(here, after)), np.median(angles)
-    limit = max(MIN_CONTRADICTION, MIN_CONTRADICTION_RATIO * typical)
-    rows = rows[distance > np.maximum(limit, MAX_DELAY * turned)]
-    if typical > MAX_ANGLE or not 0 < len(rows) <= MAX_CONTRADICTING * len(values):
-        return values, []
-    values = values.copy()
-    values[rows] = np.nan
-    message = f"{names} contradict the kinematics by up to {np.degrees(distance.max()):.0f} deg in"
-    message += f" {format_count(len(rows), 'row')} of {len(values)}, first in this one, and agree elsewhere"
-    message += ", as where an orientation is interpolated across a jump: it is not used there"
-    return values, [LogWarning(INTERPOLATED, message, int(rows[0]) + 1)]

@@ -244,6 +244,22 @@ def _find_common(units: Sequence[Unit | None], quantity: Quantity) -> Unit | Non
     return common.pop() if len(common) == 1 else None
 
 
+class _Joints(NamedTuple):
+    """Joint columns, their stated units, values, shape (n, columns), and recorded times in [ns] or None."""
+
+    columns: Sequence[Column]
+    stated: Sequence[StatedUnit | None]
+    values: FloatArray
+    t_ns: IntArray | None
+
+    def select(self, places: Sequence[int]) -> _Joints:
+        """Return some of them, without a copy if they are all."""
+        if len(places) == len(self.columns):
+            return self
+        columns, stated = [self.columns[j] for j in places], [self.stated[j] for j in places]
+        return _Joints(columns, stated, self.values[:, places], self.t_ns)
+
+
 @dataclass(slots=True)
 class UnitFinder:
     """Settles the units of the columns of one log, and keeps the evidence.
@@ -287,37 +303,28 @@ class UnitFinder:
             OptionError: If one that the user gave does not fit the robot.
         """
         stated, proved = self.sources.of_joints(columns, robot), (False,) * len(columns)
+        joints = _Joints(columns, stated, values, t_ns)
         if self.kinematic is not None:
             units, proved = self._overrule(columns, stated, "angle"), self.kinematic.proved
         else:
-            units = self._complete_joints(columns, stated, values, t_ns, robot)
-        groups: dict[tuple[bool, str], dict[int, StatedUnit]] = {}
+            units = self._complete_joints(joints, robot)
+        groups: dict[tuple[bool, str], list[int]] = {}
         for j, item in enumerate(stated):
             if item is not None and item.by != "urmpipe" and units[j].quantity == "angle":
-                groups.setdefault((item.by == "user", units[j].name), {})[j] = item
+                groups.setdefault((item.by == "user", units[j].name), []).append(j)
         for (by_user, unit), group in groups.items():
-            unproved = {j: item for j, item in group.items() if not proved[j]}
-            if unproved:
+            if unproved := [j for j in group if not proved[j]]:
                 is_open = len(unproved) == len(group) and (by_user or 0 not in self.sources.options)
-                self._compare_stated(columns, unproved, unit, values, t_ns, is_open=is_open)
+                are_all = len(unproved) == len(columns)
+                self._compare_stated(joints.select(unproved), unit, is_open=is_open, are_all=are_all)
         self.warn_not_reached(columns, stated, units, "joint")
         return units
 
-    def _compare_stated(
-        self,
-        columns: Sequence[Column],
-        stated: Mapping[int, StatedUnit],
-        unit: str,
-        values: FloatArray,
-        t_ns: IntArray | None,
-        *,
-        is_open: bool,
-    ) -> None:
+    def _compare_stated(self, joints: _Joints, unit: str, *, is_open: bool, are_all: bool) -> None:
         """Compare a stated unit with the values: ask if they contradict it, warn if they are unlikely."""
-        are_all, by = len(stated) == len(columns), stated.values()
-        columns, values = [columns[j] for j in stated], values if are_all else values[:, list(stated)]
+        columns, by = joints.columns, [item for item in joints.stated if item]
         by_user = all(item.by == "user" for item in by)
-        objection = find_objection(unit, values, t_ns, TWO_TURNS if by_user else ONE_TURN)
+        objection = find_objection(unit, joints.values, joints.t_ns, TWO_TURNS if by_user else ONE_TURN)
         if objection is None:
             return
         if objection.columns and not by_user:
@@ -408,46 +415,38 @@ class UnitFinder:
             self.warnings.append(warning)
         return units
 
-    def _complete_joints(
-        self,
-        columns: Sequence[Column],
-        stated: Sequence[StatedUnit | None],
-        values: FloatArray,
-        t_ns: IntArray | None,
-        robot: Chain | None,
-    ) -> list[Unit]:
+    def _complete_joints(self, joints: _Joints, robot: Chain | None) -> list[Unit]:
         """Return the stated units of joints, and without the kinematics those of the others."""
-        self._note_stated(columns, stated)
-        units: list[Unit | None] = [item.unit if item else None for item in stated]
-        unknown = [j for j, unit in enumerate(units) if unit is None]
+        self._note_stated(joints.columns, joints.stated)
+        units = {j: item.unit for j, item in enumerate(joints.stated) if item}
+        unknown = [j for j in range(len(joints.columns)) if j not in units]
         slides = [j for j in unknown if robot and robot.moving[j].kind == "prismatic"]
         turns = [j for j in unknown if j not in slides]
         if slides:
-            sliding, size = [columns[j] for j in slides], usual_peak(values[:, slides])
-            unit = vocabulary().units["mm" if size > MAX_METRES else "m"]
-            why = f", as values of {size:.6g} are beyond any arm in m" if size > MAX_METRES else ""
-            hints = unit_hints(sliding, OTHER_UNIT[unit.name])
-            self._assume(sliding, unit, "the prismatic joints are", "joint", hints, why)
-            units = [unit if j in slides else other for j, other in enumerate(units)]
+            sliding = joints.select(slides)
+            size, why = usual_peak(sliding.values), ""
+            if size > MAX_METRES:
+                why = f", as values of {size:.6g} are beyond any arm in m"
+            unit = vocabulary().units["mm" if why else "m"]
+            hints = unit_hints(sliding.columns, OTHER_UNIT[unit.name])
+            self._assume(sliding.columns, unit, "the prismatic joints are", "joint", hints, why)
+            units |= dict.fromkeys(slides, unit)
         if turns:
-            turning = [columns[j] for j in turns]
-            angle = _find_common(units, "angle")
+            turning, angle = joints.select(turns), _find_common(list(units.values()), "angle")
             if angle is not None:
-                self._note(turning, angle, "named", "as the other joint columns")
+                self._note(turning.columns, angle, "named", "as the other joint columns")
             else:
-                some = values if len(turns) == len(columns) else values[:, turns]
-                angle = self._settle_angles(turning, some, t_ns, may_slide=robot is None and not any(stated))
-            units = [angle if j in turns else other for j, other in enumerate(units)]
-        return [unit for unit in units if unit is not None]
+                angle = self._settle_angles(turning, may_slide=robot is None and not any(joints.stated))
+            units |= dict.fromkeys(turns, angle)
+        return [units[j] for j in range(len(joints.columns))]
 
-    def _settle_angles(
-        self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, *, may_slide: bool
-    ) -> Unit:
+    def _settle_angles(self, joints: _Joints, *, may_slide: bool) -> Unit:
         """Return the unit of joints that nothing states: proved by wraps, or assumed.
 
         Raises:
             LogError: If it is to be asked.
         """
+        columns, values = joints.columns, joints.values
         rad, deg = (vocabulary().units[name] for name in ("rad", "deg"))
         each = [(column, x[:, np.newaxis]) for column, x in zip(columns, values.T, strict=True)]
         for unit, proof in ((deg, wraps_as_degrees(values)), (rad, wraps_as_radians(values))):
@@ -470,7 +469,7 @@ class UnitFinder:
         is_only = len(large) == 1 and sum(peak(x) > ONE_TURN for _, x in each) == 1
         if may_slide and len(columns) > 2 and is_only:
             raise LogError(self._ask_slides(large, peak(values)))
-        fast = too_fast_as_radians(values, t_ns) if peak(values) <= MAX_DEGREES else None
+        fast = too_fast_as_radians(values, joints.t_ns) if peak(values) <= MAX_DEGREES else None
         if not fast and usual_peak(values) > TWO_TURNS:
             raise LogError(self._ask_angle(columns, peak(values)))
         unit, why = (deg, f": {fast}") if fast else (rad, "")

@@ -106,7 +106,7 @@ def test_jumps_without_a_row_between_are_none(form: RotationForm, read: Read) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["vector", "rpy"])
-def test_many_rows_between_contradict_the_kinematics(form: RotationForm, read: Read) -> None:
+def test_many_rows_between_the_ends_of_a_jump_are_not_used(form: RotationForm, read: Read) -> None:
     robot = load_robot("ur5e")
     content, q = text(form, 20.0)
     log = read(content, robot, rotation=form)

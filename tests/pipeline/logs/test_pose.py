@@ -16,7 +16,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs.columns import Column
 from urmpipe_pipeline.logs.proofs import SAMPLES
-from urmpipe_pipeline.logs.rotation import Arm, settle_rotation
+from urmpipe_pipeline.logs.rotation import settle_rotation
 from urmpipe_pipeline.logs.units import StatedUnit
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
@@ -118,7 +118,7 @@ def test_rows_spread_over_a_long_log_tell_the_unit_of_its_orientation() -> None:
     columns = [Column(k + 1, 0, k, name, name, name, None, text=False) for k, name in enumerate("abc")]
     rad = vocabulary().units["rad"]
     told = (StatedUnit(rad, "name", "its name"),) * 3
-    settled = settle_rotation(columns, ("vector",), turned, told, Arm(UR5E, Q[rows]))
+    settled = settle_rotation(columns, ("vector",), turned, told, (UR5E, Q[rows]))
     assert [unit.name for unit in settled.units] == ["deg"] * 3
 
 
