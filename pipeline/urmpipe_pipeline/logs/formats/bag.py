@@ -1,8 +1,11 @@
 """Recordings of messages: MCAP, ROS 2 (SQLite, MCAP, their folders) and ROS 1 bags.
 
-- `is_bag_folder`, `open_bag`: the files of a recording, in order, and its topics with types and counts.
-- `Bag.read`: the messages of a topic with their log times, until the recording ends or is damaged.
-- `decoder`: the function that decodes the messages of a topic.
+1. `open_bag`: the files of a recording in order, and its topics with types and counts.
+2. `Bag.read`: the messages of a topic with their log times, until the recording ends or is damaged.
+3. `make_decoder`: the function that decodes the messages of a topic.
+
+Libraries' own readers need the index at the end of a file, which a recording that was cut does not have; and
+messages are unpacked here, as pyarrow does, since a damaged size would take all memory.
 
 Sources: the MCAP specification, the ROS bag format 2.0, rosbag2_storage_sqlite3 (tables `topics`, `messages`,
 `message_definitions`), rosbag2_storage (`metadata.yaml`).
@@ -17,8 +20,8 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, suppress
-from dataclasses import dataclass, replace
+from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
 from io import BytesIO
 from os.path import isdir  # Path raises for a name that no file can have
 from pathlib import Path
@@ -29,17 +32,17 @@ from urllib.parse import quote
 import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError, format_value
-from urmpipe_pipeline.logs.formats.text import RATIO, UNPACKED, refuse_unpacked
+from urmpipe_pipeline.logs.formats.text import refuse_unpacked, unpacked_limit
 
-SUFFIXES = (".mcap", ".db3", ".bag")
 MAGIC = {b"\x89MCAP": ".mcap", b"SQLite format 3\0": ".db3", b"#ROSBAG V": ".bag"}
 METADATA = "metadata.yaml"
+MAX_HEADER = 1 << 20  # bytes of a header of ROS 1, which holds a topic and a few numbers
 
 _PACKED = (".mcap.zstd", ".db3.zstd")  # as a whole, by `ros2 bag record --compression-mode file`
+_SUFFIXES = (*MAGIC.values(), *_PACKED)
 _ZSTD = b"\x28\xb5\x2f\xfd"  # begins a packed message; one of ROS 2 begins with 0
 _SPLIT = re.compile(r"[-_]?\d+(?=\.[^.]+(\.zstd)?$)")  # what names of the parts of a recording differ by
 _CODECS = {"zstd": "zstd", "lz4": "lz4", "bz2": "bz2"}  # of MCAP and ROS 1, as pyarrow calls them
-_MAX_HEADER = 1 << 20  # bytes of a header of ROS 1, which holds a topic and a few numbers
 
 
 class Topic(NamedTuple):
@@ -68,18 +71,13 @@ class Message(NamedTuple):
     data: bytes
 
 
-class _DamageError(Exception):
-    """The recording cannot be read from here on."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bag:
+class Bag(NamedTuple):
     """A recording.
 
     Attributes:
         path: Its file or folder.
         files: Its files in the order of their names, or of its metadata.
-        topics: Its topics with the number of their messages, by name.
+        topics: Its topics with the number of their messages.
     """
 
     path: Path
@@ -91,7 +89,7 @@ class Bag:
         messages, damage = list[Message](), list[str]()
         for file in self.files:
             try:
-                messages += _messages(file, name)
+                messages += (message for message in _iter_messages(file) if message.topic.name == name)
             except _DamageError as error:
                 damage.append(f"{file.name}: {error}")
         stated = sum(count for topic, count in self.topics.items() if topic.name == name)
@@ -100,9 +98,13 @@ class Bag:
         return sorted(messages, key=lambda message: message.log_ns), damage
 
 
+class _DamageError(Exception):
+    """The recording cannot be read from here on."""
+
+
 def is_bag_folder(path: Path) -> bool:
     """Return whether a path is a folder with a recording: its metadata, or files of messages."""
-    return isdir(path) and ((path / METADATA).is_file() or bool(_files_in(path)))  # noqa: PTH112
+    return isdir(path) and ((path / METADATA).is_file() or bool(_list_files(path)))  # noqa: PTH112
 
 
 def is_packed(path: Path) -> bool:
@@ -116,131 +118,106 @@ def open_bag(path: Path) -> Bag:
     Raises:
         LogError: If a file is missing or is no recording, or several recordings lie in one folder.
     """
-    files = _files(path) if path.is_dir() else (path,)
+    files = _find_parts(path) if path.is_dir() else (path,)
     topics, damage = Counter[Topic](), list[str]()
     for file in files:
         try:
-            topics.update(_topics(file))
+            topics.update(_count_messages(file))
         except _DamageError as error:
             damage.append(f"{file.name}: {error}")
-    topics = Counter({topic: count for topic, count in topics.items() if count})
-    if not topics:
+    if not +topics:
         reason = f" ({'; '.join(damage)})" if damage else ""
         raise LogError(Finding(f"found no message{reason}, allowed: a recording of messages", str(path)))
-    return Bag(path, files, topics)
+    return Bag(path, files, +topics)
 
 
-def _files_in(folder: Path) -> list[Path]:
+def _list_files(folder: Path) -> list[Path]:
     """Return the files of messages in a folder, in the order of their numbers."""
-    ends = (*SUFFIXES, *_PACKED)
-    files = (path for path in folder.iterdir() if path.name.lower().endswith(ends) and path.is_file())
-    return sorted(
-        files, key=lambda path: [int(n) if n.isdigit() else 0 for n in re.split(r"(\d+)", path.name)]
-    )
+    files = (path for path in folder.iterdir() if path.name.lower().endswith(_SUFFIXES) and path.is_file())
+    return sorted(files, key=lambda path: [int(number) for number in re.findall(r"\d+", path.name)])
 
 
-def _files(folder: Path) -> tuple[Path, ...]:
+def _find_parts(folder: Path) -> tuple[Path, ...]:
     """Return the files of a recording in a folder."""
-    files = _files_in(folder)
+    files = _list_files(folder)
     if not (folder / METADATA).is_file():
         if len({_SPLIT.sub("", path.name) for path in files}) > 1:
             names = ", ".join(path.name for path in files[:6])
             message = f"found several recordings ({names}), allowed: one, or its parts NAME_0, NAME_1, ..."
             raise LogError(Finding(f"{message}; give one of the files", str(folder)))
         return tuple(files)
-    about = _metadata(folder / METADATA)
-    named = [folder / Path(name).name for name in about.get("relative_file_paths") or ()]
-    if missing := [path.name for path in named if not path.is_file()]:
-        message = f"found no {', '.join(missing)}, allowed: every file that {METADATA} names"
-        raise LogError(Finding(message, str(folder)))
-    return tuple(named or files)
-
-
-def _metadata(path: Path) -> Mapping[str, Any]:
-    """Return what the metadata of a recording of ROS 2 state."""
     from ruamel.yaml import YAML  # rosbags depends on it
     from ruamel.yaml.error import YAMLError
 
     try:
-        about = YAML(typ="safe").load(path.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
-    except (YAMLError, OSError, ValueError, KeyError, TypeError):
-        about = None
-    if not isinstance(about, dict):
-        raise LogError(Finding("found no metadata of a recording of ROS 2", str(path)))
-    return about
+        text = (folder / METADATA).read_text(encoding="utf-8")
+        names = YAML(typ="safe").load(text)["rosbag2_bagfile_information"].get("relative_file_paths")
+        parts = [folder / Path(name).name for name in names or ()]
+    except (YAMLError, OSError, ValueError, KeyError, TypeError, AttributeError):
+        raise LogError(Finding("found no metadata of a recording of ROS 2", str(folder / METADATA))) from None
+    if missing := [path.name for path in parts if not path.is_file()]:
+        message = f"found no {', '.join(missing)}, allowed: every file that {METADATA} names"
+        raise LogError(Finding(message, str(folder)))
+    return tuple(parts or files)
 
 
-def _topics(file: Path) -> Mapping[Topic, int]:
+@contextmanager
+def _opened(file: Path) -> Iterator[tuple[Path, str]]:
+    """Provide a file, unpacked if it was packed as a whole, and the suffix that it has by its first bytes."""
+    with TemporaryDirectory() as folder:
+        if is_packed(file):
+            size, most, packed, file = 0, unpacked_limit(file.stat().st_size), file, Path(folder) / file.stem
+            try:
+                with pa.input_stream(str(packed), compression="zstd") as stream, file.open("wb") as target:
+                    while size <= most and (block := stream.read(1 << 20)):
+                        size += target.write(block)
+            except (pa.ArrowException, OSError) as error:
+                raise _DamageError(f"cannot be unpacked ({_reason(error)})") from error
+            refuse_unpacked(packed, size)
+        with file.open("rb") as stream:
+            head = stream.read(16)
+        kind = next((suffix for magic, suffix in MAGIC.items() if head.startswith(magic)), None)
+        if kind is None:
+            raise _DamageError("is no file of messages")
+        yield file, kind
+
+
+def _count_messages(file: Path) -> Mapping[Topic, int]:
     """Return the topics of a file with the number of their messages, by its index if it has one."""
-    with TemporaryDirectory() as folder:
-        file = _unpacked_file(file, Path(folder))
-        kind = _kind(file)
+    with _opened(file) as (unpacked, kind):
         if kind == ".db3":
-            return _sqlite_topics(file)
-        if kind == ".mcap" and (indexed := _indexed(file)) is not None:
+            return _sqlite_topics(unpacked)
+        if kind == ".mcap" and (indexed := _mcap_index(unpacked)) is not None:
             return indexed
-        counts = Counter[Topic]()
-        try:
-            counts.update(message.topic for message in _messages(file))
-        except _DamageError:
-            if not counts:
-                raise
-        return counts
+    counts = Counter[Topic]()
+    try:
+        counts.update(message.topic for message in _iter_messages(file))
+    except _DamageError:
+        if not counts:
+            raise
+    return counts
 
 
-def _messages(file: Path, name: str | None = None) -> Iterator[Message]:
-    """Yield the messages of a file, or those of one topic."""
-    with TemporaryDirectory() as folder:
-        file = _unpacked_file(file, Path(folder))
-        kind = _kind(file)
+def _iter_messages(file: Path) -> Iterator[Message]:
+    """Yield the messages of a file."""
+    with _opened(file) as (unpacked, kind):
         read = {".db3": _sqlite_messages, ".mcap": _mcap_messages, ".bag": _ros1_messages}[kind]
+        most = unpacked_limit(unpacked.stat().st_size)
         try:
-            for message in read(file):
-                if name not in (None, message.topic.name):
-                    continue
-                if message.data.startswith(_ZSTD) and message.topic.encoding == "cdr":
-                    yield message._replace(data=_unpack(message.data, "zstd", _most(file)))
-                else:
-                    yield message
+            for message in read(unpacked):
+                is_message_packed = message.data.startswith(_ZSTD) and message.topic.encoding == "cdr"
+                data = _unpack(message.data, "zstd", most) if is_message_packed else message.data
+                yield message._replace(data=data)
         except (KeyError, ValueError, struct.error) as error:
             raise _DamageError(f"holds a damaged record ({_reason(error)})") from error
 
 
-def _kind(file: Path) -> str:
-    """Return the suffix that a file should have by its first bytes."""
-    with file.open("rb") as stream:
-        head = stream.read(16)
-    kind = next((suffix for magic, suffix in MAGIC.items() if head.startswith(magic)), None)
-    if kind is None:
-        raise _DamageError("is no file of messages")
-    return kind
-
-
-def _most(file: Path) -> int:
-    return max(UNPACKED, RATIO * file.stat().st_size)
-
-
-def _unpacked_file(file: Path, folder: Path) -> Path:
-    """Return a file that was packed as a whole unpacked in a folder, any other one as it is."""
-    if not file.name.lower().endswith(".zstd"):
-        return file
-    size, most, unpacked = 0, _most(file), folder / file.stem
-    try:
-        with pa.input_stream(str(file), compression="zstd") as stream, unpacked.open("wb") as target:
-            while block := stream.read(1 << 20):
-                size += target.write(block)
-                if size > most:
-                    break
-    except (pa.ArrowException, OSError) as error:
-        raise _DamageError(f"cannot be unpacked ({_reason(error)})") from error
-    refuse_unpacked(file, size)
-    return unpacked
-
-
 def _unpack(data: bytes, codec: str, most: int) -> bytes:
     """Return packed bytes unpacked; a `_DamageError` if they are damaged or larger than allowed."""
+    if codec not in _CODECS:
+        raise _DamageError(f"messages are packed by {format_value(codec)}, which is not known")
     try:
-        with pa.CompressedInputStream(pa.BufferReader(data), codec) as stream:
+        with pa.CompressedInputStream(pa.BufferReader(data), _CODECS[codec]) as stream:
             unpacked: bytes = stream.read(most + 1)
     except (pa.ArrowException, OSError) as error:
         raise _DamageError(f"packed messages are damaged ({_reason(error)})") from error
@@ -269,7 +246,7 @@ class _ExactStream:
 # MCAP
 
 
-def _indexed(file: Path) -> Mapping[Topic, int] | None:
+def _mcap_index(file: Path) -> Mapping[Topic, int] | None:
     """Return the topics of an MCAP file by its summary; None without one."""
     from mcap.exceptions import McapError
     from mcap.reader import SeekingReader
@@ -315,7 +292,7 @@ def _mcap_records(file: Path) -> Iterator[Any]:
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader, breakup_chunk
 
-    most = _most(file)
+    most = unpacked_limit(file.stat().st_size)
     with file.open("rb") as stream:
         exact: Any = _ExactStream(stream)
         records = StreamReader(exact, emit_chunks=True, record_size_limit=file.stat().st_size).records
@@ -326,8 +303,7 @@ def _mcap_records(file: Path) -> Iterator[Any]:
                 if isinstance(record, Chunk):
                     data = record.data
                     if record.compression:
-                        codec = _codec(record.compression)
-                        data = _unpack(data, codec, min(most, record.uncompressed_size))
+                        data = _unpack(data, record.compression, min(most, record.uncompressed_size))
                     if record.uncompressed_crc and zlib.crc32(data) != record.uncompressed_crc:
                         raise _DamageError("a checksum does not fit the messages")
                     inner = [*breakup_chunk(replace(record, compression="", data=data))]
@@ -336,12 +312,6 @@ def _mcap_records(file: Path) -> Iterator[Any]:
             if record is None:
                 return
             yield from inner
-
-
-def _codec(name: str) -> str:
-    if name not in _CODECS:
-        raise _DamageError(f"messages are packed by {format_value(name)}, which is not known")
-    return _CODECS[name]
 
 
 # ROS 2 in SQLite
@@ -363,10 +333,10 @@ def _sqlite_topics(file: Path) -> Mapping[Topic, int]:
         raise _DamageError("is a database without messages of ROS 2")
     definitions = {}
     if "message_definitions" in tables:
-        rows = _query(
-            file, "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        )
-        definitions = {name: (form, text) for name, form, text in rows}
+        fields = "topic_type, encoding, encoded_message_definition"
+        definitions = {
+            name: texts for name, *texts in _query(file, f"SELECT {fields} FROM message_definitions")
+        }
     by_number = Counter[int]()
     with suppress(_DamageError):  # which `_sqlite_messages` reports
         by_number.update(number for (number,) in _query(file, "SELECT topic_id FROM messages ORDER BY id"))
@@ -379,10 +349,8 @@ def _sqlite_topics(file: Path) -> Mapping[Topic, int]:
 
 def _sqlite_messages(file: Path) -> Iterator[Message]:
     topics = {topic.name: topic for topic in _sqlite_topics(file)}
-    query = (
-        "SELECT name, timestamp, data FROM messages JOIN topics ON topics.id = topic_id ORDER BY messages.id"
-    )
-    for name, when, data in _query(file, query):
+    joined = "messages JOIN topics ON topics.id = topic_id"
+    for name, when, data in _query(file, f"SELECT name, timestamp, data FROM {joined} ORDER BY messages.id"):
         if not (isinstance(when, int) and isinstance(data, bytes)):
             raise _DamageError("holds a damaged row")
         yield Message(topics[name], when, data)
@@ -400,36 +368,44 @@ def _ros1_messages(file: Path) -> Iterator[Message]:
         version = stream.readline(16)
         if version != b"#ROSBAG V2.0\n":
             raise _DamageError(f"is a bag of version {version[9:].decode('latin-1').strip()}, not 2.0")
-        size, closed = file.stat().st_size, True
-        while stream.tell() < size:
-            fields, data, is_whole = _ros1_record(stream, size)
+        size, is_closed = file.stat().st_size, True
+        for fields, data in _ros1_records(stream, size):
             if fields["op"] == _HEADER:
-                closed = struct.unpack("<Q", fields["index_pos"])[0] != 0
+                is_closed = struct.unpack("<Q", fields["index_pos"])[0] != 0
+            inner: Iterator[tuple[dict[str, Any], bytes]] = iter([(fields, data)])
             if fields["op"] == _CHUNK:
                 codec, length = fields["compression"].decode(), struct.unpack("<I", fields["size"])[0]
-                if codec != "none":
-                    data = _unpack(data, _codec(codec), min(_most(file), length))
-                chunk = BytesIO(data)
-                while chunk.tell() < len(data):
-                    yield from _ros1_message(*_ros1_record(chunk, len(data)), topics)
-            else:
-                yield from _ros1_message(fields, data, is_whole, topics)
-            if not is_whole:
-                raise _DamageError("ends within a record")
-    if not closed:
+                most = min(unpacked_limit(size), length)
+                chunk = data if codec == "none" else _unpack(data, codec, most)
+                inner = _ros1_records(BytesIO(chunk), len(chunk))
+            for part, content in inner:
+                number = int.from_bytes(part.get("conn", b""), "little")
+                if part.get("op") == _CONNECTION:
+                    about = _ros1_fields(content)
+                    texts = (part["topic"], about["type"], about["message_definition"])
+                    name, kind, text = (value.decode(errors="replace") for value in texts)
+                    topics[number] = Topic(name, kind, "ros1", "ros1msg", text)
+                elif part.get("op") == _MESSAGE and number in topics:
+                    seconds, rest = struct.unpack("<II", part["time"])
+                    yield Message(topics[number], seconds * 10**9 + rest, content)
+    if not is_closed:
         raise _DamageError("was not closed by its recorder")
 
 
-def _ros1_record(stream: IO[bytes], size: int) -> tuple[dict[str, Any], bytes, bool]:
-    """Return the fields of a record, its data, and whether the file does not end before them."""
+def _ros1_records(stream: IO[bytes], size: int) -> Iterator[tuple[dict[str, Any], bytes]]:
+    """Yield the fields and the data of records; of a chunk in which the file ends those that are there."""
     exact = _ExactStream(stream)
-    length = struct.unpack("<I", exact.read(4))[0]
-    if length > min(size, _MAX_HEADER):
-        raise _DamageError("holds a damaged record")
-    fields = _ros1_fields(exact.read(length))
-    length = struct.unpack("<I", exact.read(4))[0]
-    data = stream.read(min(length, size))
-    return fields, data, len(data) == length
+    while stream.tell() < size:
+        length = struct.unpack("<I", exact.read(4))[0]
+        if length > min(size, MAX_HEADER):
+            raise _DamageError("holds a damaged record")
+        fields = _ros1_fields(exact.read(length))
+        length = struct.unpack("<I", exact.read(4))[0]
+        data = stream.read(min(length, size))
+        if len(data) == length or fields.get("op") == _CHUNK:
+            yield fields, data
+        if len(data) < length:
+            raise _DamageError("ends within a record")
 
 
 def _ros1_fields(header: bytes) -> dict[str, Any]:
@@ -443,28 +419,10 @@ def _ros1_fields(header: bytes) -> dict[str, Any]:
     return fields
 
 
-def _ros1_message(
-    fields: Mapping[str, Any], data: bytes, is_whole: bool, topics: dict[int, Topic]
-) -> Iterator[Message]:
-    """Yield the message of a record, if it is one; keep the topic that a connection describes."""
-    if not is_whole:
-        raise _DamageError("ends within a record")
-    if fields.get("op") == _CONNECTION:
-        about = _ros1_fields(data)
-        kind, text = (about[key].decode(errors="replace") for key in ("type", "message_definition"))
-        name = fields["topic"].decode(errors="replace")
-        topics[int.from_bytes(fields["conn"], "little")] = Topic(name, kind, "ros1", "ros1msg", text)
-    elif fields.get("op") == _MESSAGE:
-        topic = topics.get(int.from_bytes(fields["conn"], "little"))
-        seconds, rest = struct.unpack("<II", fields["time"])
-        if topic is not None:
-            yield Message(topic, seconds * 10**9 + rest, data)
-
-
 # Messages
 
 
-def decoder(topic: Topic, file: str) -> Callable[[bytes], Any]:
+def make_decoder(topic: Topic, file: str) -> Callable[[bytes], Any]:
     """Return the function that decodes the messages of a topic: mappings of JSON, or objects with fields.
 
     The function raises a ValueError for bytes that are no such message.
@@ -478,13 +436,7 @@ def decoder(topic: Topic, file: str) -> Callable[[bytes], Any]:
         message = f"{topic.name} with messages encoded as {format_value(topic.encoding)}"
         raise LogError(Finding(file=file, found=message, allowed="cdr (ROS 2), ros1, json"))
     from rosbags.serde import SerdeError
-    from rosbags.typesys import (
-        Stores,
-        TypesysError,
-        get_types_from_idl,
-        get_types_from_msg,
-        get_typestore,
-    )
+    from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
     from rosbags.typesys.msg import normalize_msgtype
 
     kind = normalize_msgtype(topic.type)

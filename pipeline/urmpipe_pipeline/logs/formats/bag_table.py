@@ -1,16 +1,17 @@
 """The table of one topic of a recording: the fields of its messages as columns, their stamps as the clock.
 
-- `read_bag`: the topic that is given, or the only one of the first kind in `KINDS` that the recording has.
-- A message becomes a row; of a JointTrajectory or a Path each of its points. Arrays with a list of names
-  are called by these: position.elbow_joint. Any other number is called by its path: twist.linear.x, data[0].
-- The clock is header.stamp in integer [ns], or the time of the recorder where messages have no stamps.
+1. `read_bag`: the topic that is given, or the only one of the first kind in `KINDS` that the recording has.
+2. Rows: a message is a row; of a JointTrajectory or a Path each point, of transforms those of a frame.
+3. Columns: arrays with a list of names are called by these: position.elbow_joint. Any other number is
+   called by its path: twist.linear.x, data[0].
+4. The clock is header.stamp in integer [ns], or the time of the recorder where messages have no stamps.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -20,33 +21,22 @@ import pyarrow as pa
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError, format_value
 from urmpipe_pipeline.joint_log import Inference, LogWarning
-from urmpipe_pipeline.logs.formats.bag import Message, decoder, open_bag
+from urmpipe_pipeline.logs.formats.bag import Message, make_decoder, open_bag
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import JOINT, ROLE, UNIT
 from urmpipe_pipeline.logs.formats.text import refuse_wide
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import key, vocabulary
 
-JOINTS, POINTS, FRAMES = (
-    ("JointState", "JointStates"),
-    ("JointTrajectory", "Path"),
-    ("TransformStamped", "FrameTransform"),
-)
+JOINTS, POINTS = ("JointState", "JointStates"), ("JointTrajectory", "Path")
 TOOL_POSES = ("PoseStamped", "PoseWithCovarianceStamped", "PoseInFrame")
-POSES = (*TOOL_POSES, "Odometry")
 CONTROLLERS = ("JointTrajectoryControllerState", "JointControllerState")
 ARRAYS = ("Float64MultiArray", "Float32MultiArray")
-TRANSFORMS = ("TFMessage", "FrameTransforms")
-KINDS = (
-    JOINTS,
-    (*POINTS, *POSES, *CONTROLLERS, *ARRAYS),
-    (*FRAMES, *TRANSFORMS),
-)  # the first that is there is read
+TRANSFORMS = ("TransformStamped", "FrameTransform", "TFMessage", "FrameTransforms")
+KINDS = (JOINTS, (*POINTS, *TOOL_POSES, "Odometry", *CONTROLLERS, *ARRAYS), TRANSFORMS)  # the first is read
 SOURCE = "ros"  # REP 103: rad, m, s
 
-MAX_VALUES = (
-    500  # numbers of an array that become columns, as many as a log may have joints: others are images, scans
-)
+MAX_VALUES = 500  # numbers of an array that become columns: larger ones are images and scans
 MAX_LISTED = 12  # choices of a question, topics of a message
 MIN_DISTINCT = 0.5  # share of the messages with different stamps, below which the stamps are no clock
 
@@ -55,7 +45,6 @@ _NO_VALUES = frozenset(("header", "stamp", "timestamp", "layout", "time_from_sta
 _POSITION = re.compile(r"(.*?\.)?positions?\.(?P<name>.*)")  # of a joint, in any message
 _STAMPS = ("time_from_start", "stamp", "timestamp")
 _FRACTIONS = ("nanosec", "nsec", "nsecs")
-
 
 _Values: TypeAlias = tuple[Sequence[str], Sequence[Any]]  # names of numbers, and the numbers
 
@@ -81,10 +70,9 @@ class _Topics(NamedTuple):
         return re.split(r"[/.:]+", self.types[name])[-1]
 
     def describe(self, name: str) -> str:
-        """Return type and number of messages of a topic."""
         return f"{self.types[name] or 'no type'}, {format_count(self.counts[name], 'message')}"
 
-    def list(self, names: Sequence[str]) -> str:
+    def format_list(self, names: Sequence[str]) -> str:
         """Return topics with their types and numbers of messages."""
         shown = [f"{name} ({self.describe(name)})" for name in names[:MAX_LISTED]]
         return ", ".join([*shown, *([f"{len(names) - MAX_LISTED} more"] if len(names) > MAX_LISTED else [])])
@@ -102,83 +90,79 @@ def read_bag(path: Path, options: LogMap) -> MemoryTable:
         LogError: If it is no recording, messages cannot be decoded, or several topics may be the log.
     """
     bag = open_bag(path)
-    counts = Counter[str]()
+    file, counts = str(path), Counter[str]()
     for topic, count in bag.topics.items():
         counts[topic.name] += count
-    topics = _Topics(str(path), counts, {topic.name: topic.type for topic in bag.topics})
-    name, frame, why = _choose(topics, options.topic)
+    topics = _Topics(file, counts, {topic.name: topic.type for topic in bag.topics})
+    name, frame, why = _choose_topic(topics, options.topic)
     messages, damage = bag.read(name)
-    warnings = [*_damage_warning(topics, name, len(messages), damage)]
-    rows = [*_decode(messages, topics.file)]
+    warnings, why_missing = [], "; ".join(damage)
+    if damage and not messages:
+        found = f"found no message of {name} that can be read ({why_missing})"
+        raise LogError(Finding(f"{found}, allowed: a complete recording", file))
+    if damage:
+        read = f"{format_count(len(messages), 'message')} of {name}"
+        fault = f"the recording is cut or damaged: {read} were read, others are missing ({why_missing})"
+        warnings.append(LogWarning("cut-recording", fault, assumption=f"{read} are the motion"))
+    rows = [*_decode(messages, file)]
     applied = ["topic"] if options.topic else []
     kind, title, clock = topics.kind(name), name, ""
-    if kind in (*FRAMES, *TRANSFORMS):
-        rows, title = _select_frame([*_iter_transforms(rows)], topics, name, frame)
+    if kind in TRANSFORMS:
+        rows, title = _select_frame(rows, file, name, frame)
     elif kind in POINTS:
-        rows = _select_points(rows, options.episode, topics.file, name)
+        rows = _select_points(rows, options.episode, file, name)
         applied += ["episode"] if options.episode else []
         clock = "time_from_start" if kind == "JointTrajectory" else ""
     elif kind in JOINTS:
-        rows, other_joints = _select_joints(rows, options.joints, topics.file)
-        warnings += other_joints
-    table, inferences, more = _build_table(rows, name, topics.file, clock)
+        rows = _select_joints(rows, options.joints, file, warnings)
     unread = [other for other in counts if other != name]
-    hints = tuple(Hint("topic", other) for other in unread[:1])
-    inferences = [Inference("topic", title, why, hints=hints), *inferences]
+    inferences = [Inference("topic", title, why, hints=tuple(Hint("topic", other) for other in unread[:1]))]
+    table = _build_table(rows, name, file, clock, inferences, warnings)
     if unread:
-        inferences.append(Inference("topics not read", topics.list(unread), "a log is one topic"))
+        inferences.append(Inference("topics not read", topics.format_list(unread), "a log is one topic"))
     for other in unread if kind in JOINTS else ():
         if topics.kind(other) in TOOL_POSES:
-            message = f"{topics.list([other])} is not read: its rows are not those of the joints"
+            message = f"{topics.format_list([other])} is not read: its rows are not those of the joints"
             warnings.append(LogWarning("other-topic", message, hints=(Hint("topic", other, "reads it"),)))
     is_ros = "/" in topics.types[name] or any(kind in kinds for kinds in KINDS)
     return MemoryTable(
         path.name if path.is_dir() else path.stem, table, path=path, inferences=tuple(inferences),
-        applied=tuple(applied), source=SOURCE if is_ros else "", warnings=(*warnings, *more),
+        applied=tuple(applied), source=SOURCE if is_ros else "", warnings=tuple(warnings),
     )  # fmt: skip
 
 
-def _choose(topics: _Topics, option: str | None) -> tuple[str, str, str]:
+def _choose_topic(topics: _Topics, option: str | None) -> tuple[str, str, str]:
     """Return the topic that is read, the frame that the option names with it, and why."""
     names = sorted(topics.counts)
     if option is not None:
         for topic, frame in ((option, ""), option.rpartition(":")[::2]):
             name = next((name for name in names if topic in (name, name.lstrip("/"))), None)
-            if name and (not frame or topics.kind(name) in (*FRAMES, *TRANSFORMS)):
+            if name and (not frame or topics.kind(name) in TRANSFORMS):
                 return name, frame, "given as an option"
-        allowed = f"a topic of the recording: {topics.list(names)}"
-        raise LogError(
-            Finding(file=topics.file, parameter="topic", found=format_value(option), allowed=allowed)
+        raise _option_error(
+            topics.file, "topic", option, f"a topic of the recording: {topics.format_list(names)}"
         )
     for kinds in KINDS:
         matching = [name for name in names if topics.kind(name) in kinds]
         if len(matching) == 1:
             return matching[0], "", f"the only one with a {topics.kind(matching[0])}"
         if matching:
-            raise _topic_question(topics.file, {name: topics.describe(name) for name in matching})
-    if len(names) > 1:
-        raise _topic_question(topics.file, {name: topics.describe(name) for name in names})
-    return names[0], "", "the only one"
+            names = matching
+            break
+    if len(names) == 1:
+        return names[0], "", "the only one"
+    choices = [(name, topics.describe(name)) for name in names]
+    raise _question(topics.file, f"{len(names)} topics that may be the log", "topic", choices)
 
 
-def _topic_question(file: str, choices: Mapping[str, str], what: str = "topics") -> LogError:
-    """Return the question which topic, or frame of it, to read."""
-    message = f"{len(choices)} {what} that may be the log"
-    hints = tuple(Hint("topic", name, f"reads {does}") for name, does in [*choices.items()][:MAX_LISTED])
-    return LogError(Finding(file=file, found=message, allowed="one of them", hints=hints))
+def _question(file: str, found: str, option: str, choices: Sequence[tuple[Any, str]]) -> LogError:
+    """Return a question with the value of an option for each choice, and what that reads."""
+    hints = tuple(Hint(option, value, f"reads {what}") for value, what in choices[:MAX_LISTED])
+    return LogError(Finding(file=file, found=found, allowed="one of them", hints=hints))
 
 
-def _damage_warning(topics: _Topics, name: str, count: int, damage: Sequence[str]) -> Iterator[LogWarning]:
-    """Yield a warning about a recording that is read in part; raise if nothing of the topic was."""
-    if not damage:
-        return
-    reasons = "; ".join(damage)
-    if not count:
-        message = f"found no message of {name} that can be read ({reasons}), allowed: a complete recording"
-        raise LogError(Finding(message, topics.file))
-    read = f"{format_count(count, 'message')} of {name}"
-    message = f"the recording is cut or damaged: {read} were read, others are missing ({reasons})"
-    yield LogWarning("cut-recording", message, assumption=f"{read} are the motion")
+def _option_error(file: str, option: str, value: str | None, allowed: str) -> LogError:
+    return LogError(Finding(file=file, parameter=option, found=format_value(value), allowed=allowed))
 
 
 # Rows
@@ -186,7 +170,8 @@ def _damage_warning(topics: _Topics, name: str, count: int, damage: Sequence[str
 
 def _decode(messages: Sequence[Message], file: str) -> Iterator[_Row]:
     """Yield the messages decoded; raise with the number of those that cannot be."""
-    decoders = {topic: decoder(topic, file) for topic in dict.fromkeys(message.topic for message in messages)}
+    topics = dict.fromkeys(message.topic for message in messages)
+    decoders = {topic: make_decoder(topic, file) for topic in topics}
     bad = list[tuple[int, str]]()
     for number, (topic, log_ns, data) in enumerate(messages, start=1):
         try:
@@ -195,7 +180,7 @@ def _decode(messages: Sequence[Message], file: str) -> Iterator[_Row]:
         except (ValueError, TypeError) as error:
             bad.append((number, str(error).partition("\n")[0]))
             continue
-        yield _Row(_stamp(fields), log_ns, message, _names_in(fields))
+        yield _Row(_stamp(fields), log_ns, message, _array_names(fields))
     if bad:
         number, reason = bad[0]
         count = f"{len(bad)} of {format_count(len(messages), 'message')} that cannot be decoded"
@@ -229,12 +214,11 @@ def _stamp(fields: Mapping[str, Any]) -> int | None:
     stamp = getattr(header, "stamp", None)
     if stamp is None:
         inner = header if isinstance(header, Mapping) else {}
-        places = (place[name] for place in (inner, fields) for name in _STAMPS if name in place)
-        stamp = next(places, None)
+        stamp = next((part[name] for part in (inner, fields) for name in _STAMPS if name in part), None)
     return _nanoseconds(stamp)
 
 
-def _names_in(fields: Mapping[str, Any]) -> tuple[str, ...]:
+def _array_names(fields: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names that a message gives the values of its arrays."""
     for field in _NAMES:
         names = fields.get(field)
@@ -248,54 +232,40 @@ def _names_in(fields: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _select_points(rows: Sequence[_Row], episode: str | None, file: str, name: str) -> list[_Row]:
     """Return the points of a trajectory or the poses of a path as rows, those of the message `episode`."""
+    points = [_fields(row.message).get("points") or _fields(row.message).get("poses") or () for row in rows]
     if episode is None and len(rows) > 1:
-        counts = enumerate((len(_points_of(row)) for row in rows[:MAX_LISTED]), start=1)
-        hints = tuple(Hint("episode", str(k), f"reads {format_count(n, 'point')}") for k, n in counts)
-        message = f"{len(rows)} trajectories of {name}"
-        raise LogError(Finding(file=file, found=message, allowed="one of them", hints=hints))
+        choices = [(str(k), format_count(len(part), "point")) for k, part in enumerate(points, start=1)]
+        raise _question(file, f"{len(rows)} trajectories of {name}", "episode", choices)
     number = 1 if episode is None else int(episode) if episode.isdecimal() else 0
     if not 1 <= number <= len(rows):
-        allowed = f"1 to {len(rows)}, the trajectories of {name}"
-        raise LogError(Finding(file=file, parameter="episode", found=format_value(episode), allowed=allowed))
+        raise _option_error(file, "episode", episode, f"1 to {len(rows)}, the trajectories of {name}")
     row = rows[number - 1]
-    return [_Row(_stamp(_fields(point)), row.log_ns, point, row.names) for point in _points_of(row)]
+    return [row._replace(stamp=_stamp(_fields(point)), message=point) for point in points[number - 1]]
 
 
-def _points_of(row: _Row) -> Sequence[Any]:
-    fields = _fields(row.message)
-    points: Sequence[Any] = fields.get("points") or fields.get("poses") or ()
-    return points
-
-
-def _iter_transforms(rows: Sequence[_Row]) -> Iterator[tuple[str, _Row]]:
-    """Yield the transforms of messages, each with the frame that it places."""
+def _select_frame(rows: Sequence[_Row], file: str, name: str, frame: str) -> tuple[list[_Row], str]:
+    """Return the transforms of one frame, and its title."""
+    frames = dict[str, list[_Row]]()
     for row in rows:
         for transform in _fields(row.message).get("transforms", [row.message]):
             fields = _fields(transform)
-            yield str(fields.get("child_frame_id", "")), _Row(_stamp(fields), row.log_ns, transform, ())
-
-
-def _select_frame(
-    transforms: Sequence[tuple[str, _Row]], topics: _Topics, name: str, frame: str
-) -> tuple[list[_Row], str]:
-    """Return the transforms of one frame, and its title."""
-    counts = Counter(child for child, _ in transforms)
-    if not frame and len(counts) > 1:
-        choices = {f"{name}:{child}": format_count(n, "transform") for child, n in counts.most_common()}
-        raise _topic_question(topics.file, choices, f"frames of {name}")
-    frame = frame or next(iter(counts), "")
-    if frame not in counts:
-        allowed = f"a frame of {name}: {', '.join([*counts][:MAX_LISTED])}"
-        raise LogError(
-            Finding(file=topics.file, parameter="topic", found=format_value(frame), allowed=allowed)
-        )
-    return [row for child, row in transforms if child == frame], f"{name}:{frame}"
+            placed = _Row(_stamp(fields), row.log_ns, transform, ())
+            frames.setdefault(str(fields.get("child_frame_id", "")), []).append(placed)
+    if not frame and len(frames) > 1:
+        in_order = sorted(frames.items(), key=lambda item: -len(item[1]))
+        choices = [(f"{name}:{child}", format_count(len(part), "transform")) for child, part in in_order]
+        raise _question(file, f"{len(frames)} frames of {name} that may be the log", "topic", choices)
+    frame = frame or next(iter(frames), "")
+    if frame not in frames:
+        allowed = f"a frame of {name}: {', '.join([*frames][:MAX_LISTED])}"
+        raise _option_error(file, "topic", frame, allowed)
+    return frames[frame], f"{name}:{frame}"
 
 
 def _select_joints(
-    rows: Sequence[_Row], joints: Sequence[str], file: str
-) -> tuple[list[_Row], list[LogWarning]]:
-    """Return the messages of one set of joints, and warnings about those of other sets.
+    rows: Sequence[_Row], joints: Sequence[str], file: str, warnings: list[LogWarning]
+) -> list[_Row]:
+    """Return the messages of one set of joints, and add warnings about those of other sets.
 
     Two nodes may publish on one topic: messages with nothing but grippers or wheels are left out.
     """
@@ -303,28 +273,25 @@ def _select_joints(
     order = {frozenset(row.names): row.names for row in reversed(rows)}
     no_arm = vocabulary().other | vocabulary().grippers
     arms = [names for names in sets if not all(no_arm & {*key(name).split("_")} for name in names)] or [*sets]
-    requested = [names for names in sets if joints and all(_is_among(joint, names) for joint in joints)]
-    if not requested and len(arms) > 1:
-        choices = [(order[names], format_count(count, "message")) for names, count in sets.most_common()]
-        hints = tuple(
-            Hint("joints", [f"position.{name}" for name in names], f"reads {count}")
-            for names, count in choices[:MAX_LISTED]
-        )
-        message = f"messages with {len(sets)} different sets of joints"
-        raise LogError(Finding(file=file, found=message, allowed="one of them", hints=hints))
-    kept = requested or arms
-    left_out = [
-        f"{format_count(count, 'message')} with the joints {', '.join(order[names]) or 'without names'}"
-        for names, count in sets.items()
-        if names not in kept
-    ]
-    warnings = [LogWarning("other-joints", f"{message} are left out") for message in left_out]
-    return [row for row in rows if frozenset(row.names) in kept], warnings
-
-
-def _is_among(joint: str, names: Collection[str]) -> bool:
-    """Return whether a joint, perhaps as its column is called, is among names."""
-    return joint in names or any(joint.endswith(f".{name}") for name in names)
+    if joints:  # perhaps as their columns are called
+        requested = [
+            names
+            for names in sets
+            if all(joint in names or any(joint.endswith(f".{name}") for name in names) for joint in joints)
+        ]
+        arms = requested or arms
+    if len(arms) > 1 and not (joints and requested):
+        choices = [
+            ([f"position.{name}" for name in order[names]], format_count(count, "message"))
+            for names, count in sets.most_common()
+        ]
+        raise _question(file, f"messages with {len(sets)} different sets of joints", "joints", choices)
+    for names, count in sets.items():
+        if names not in arms:
+            listed = ", ".join(order[names]) or "without names"
+            message = f"{format_count(count, 'message')} with the joints {listed} are left out"
+            warnings.append(LogWarning("other-joints", message))
+    return [row for row in rows if frozenset(row.names) in arms]
 
 
 # Columns
@@ -334,10 +301,11 @@ def _values(message: Any, names: tuple[str, ...], large: set[str], before: str =
     """Yield the numbers of a message with their names, which are paths."""
     for name, value in _fields(message).items():
         if name not in _NO_VALUES:
-            yield from _value(before + name, value, names, large)
+            yield from _field_values(before + name, value, names, large)
 
 
-def _value(path: str, value: Any, names: tuple[str, ...], large: set[str]) -> Iterator[_Values]:
+def _field_values(path: str, value: Any, names: tuple[str, ...], large: set[str]) -> Iterator[_Values]:
+    """Yield the numbers of a field; of a list of messages by their name if they have one, else by number."""
     if isinstance(value, (int, float)):
         yield (path,), (int(value) if isinstance(value, bool) else value,)
     elif isinstance(value, list) or hasattr(value, "tolist"):
@@ -350,7 +318,13 @@ def _value(path: str, value: Any, names: tuple[str, ...], large: set[str]) -> It
             yield _labels(path, names, len(values)), values
         elif values and not isinstance(values[0], str):
             for k, item in enumerate(values):
-                yield from _item(path, k, item, names, large)
+                is_message = not (isinstance(item, (int, float, list, str)) or hasattr(item, "tolist"))
+                name = _fields(item).get("name") if is_message and item is not None else None
+                if isinstance(name, str):
+                    for labels, numbers in _values(item, names, large):
+                        yield tuple(f"{label}.{name}" for label in labels), numbers
+                else:
+                    yield from _field_values(f"{path}[{k}]", item, names, large)
     elif value is not None and not isinstance(value, (str, bytes)) and _nanoseconds(value) is None:
         yield from _values(value, names, large, f"{path}.")
 
@@ -363,22 +337,15 @@ def _labels(path: str, names: tuple[str, ...], count: int) -> tuple[str, ...]:
     return tuple(f"{path}[{k}]" for k in range(count))
 
 
-def _item(path: str, k: int, item: Any, names: tuple[str, ...], large: set[str]) -> Iterator[_Values]:
-    """Yield the numbers of an element of a list: by its name if it has one, position.NAME, else by number."""
-    if item is None or isinstance(item, (str, bytes)):
-        return
-    fields = {} if isinstance(item, (int, float, list)) or hasattr(item, "tolist") else _fields(item)
-    if isinstance(fields.get("name"), str):
-        for labels, values in _values(item, names, large):
-            yield tuple(f"{label}.{fields['name']}" for label in labels), values
-    else:
-        yield from _value(f"{path}[{k}]", item, names, large)
-
-
 def _build_table(
-    rows: Sequence[_Row], topic: str, file: str, clock: str
-) -> tuple[pa.Table, list[Inference], list[LogWarning]]:
-    """Return rows as a table, with inferences and warnings about its clock and its columns."""
+    rows: Sequence[_Row],
+    topic: str,
+    file: str,
+    clock: str,
+    inferences: list[Inference],
+    warnings: list[LogWarning],
+) -> pa.Table:
+    """Return rows as a table, and add inferences and warnings about its clock and its columns."""
     large = set[str]()
     blocks = dict[tuple[str, ...], tuple[list[int], list[list[Any]]]]()  # rows with the same numbers
     for place, row in enumerate(rows):
@@ -389,6 +356,7 @@ def _build_table(
         places, block = blocks.setdefault(tuple(labels), ([], []))
         places.append(place)
         block.append(numbers)
+    times, called = _choose_clock(rows, topic, clock, inferences, warnings)
     columns = dict[str, list[Any]]()
     for names, (places, block) in blocks.items():
         if twice := [name for name, count in Counter(names).items() if count > 1]:
@@ -399,18 +367,18 @@ def _build_table(
             column = columns.setdefault(name, [None] * len(rows))
             for place, value in zip(places, values, strict=True):
                 column[place] = value
-    times, called, inferences, warnings = _clock(rows, topic, clock)
-    arrays = [*map(_array, (times, *columns.values()))]
+    arrays = [_array(times)]
     fields = [pa.field(called, arrays[0].type, metadata={UNIT: b"ns"})]
     joints = {name for names in {row.names for row in rows} for name in names}
-    for name, array in zip(columns, arrays[1:], strict=True):
+    for name, column in columns.items():
         match = _POSITION.fullmatch(name)
         is_joint = match is not None and match["name"] in joints and "error" not in name.split(".")
-        fields.append(pa.field(name, array.type, metadata={ROLE: JOINT} if is_joint else None))
+        arrays.append(_array(column))
+        fields.append(pa.field(name, arrays[-1].type, metadata={ROLE: JOINT} if is_joint else None))
     if large:
         why = f"arrays of more than {MAX_VALUES} values"
         inferences.append(Inference("values not read", ", ".join(sorted(large)), why))
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields)), inferences, warnings
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
 def _array(values: Sequence[Any]) -> pa.Array:
@@ -421,20 +389,22 @@ def _array(values: Sequence[Any]) -> pa.Array:
         return pa.array([None if value is None else float(value) for value in values])
 
 
-def _clock(
-    rows: Sequence[_Row], topic: str, name: str
-) -> tuple[list[int], str, list[Inference], list[LogWarning]]:
-    """Return the times of rows in [ns], the name of their column, inferences and warnings."""
+def _choose_clock(
+    rows: Sequence[_Row], topic: str, name: str, inferences: list[Inference], warnings: list[LogWarning]
+) -> tuple[list[int], str]:
+    """Return the times of rows in [ns] and the name of their column; add what was found out about them."""
     stamps, logged = [row.stamp for row in rows if row.stamp is not None], [row.log_ns for row in rows]
+    distinct = len(set(stamps))
     if name and len(stamps) == len(rows):
-        return stamps, name, [], []
+        return stamps, name
     if not stamps:
         why = "the messages have no stamps: when the recorder received each"
-        return logged, "log_time", [Inference("clock", "log time", why)], []
-    distinct = len(set(stamps))
-    if len(stamps) < len(rows) or (len(rows) > 1 and distinct <= MIN_DISTINCT * len(rows)):
+        inferences.append(Inference("clock", "log time", why))
+    elif len(stamps) < len(rows) or (len(rows) > 1 and distinct <= MIN_DISTINCT * len(rows)):
         fault = f"repeat ({distinct} different ones in {len(rows)} messages)"
         fault = "are all 0" if set(stamps) == {0} else fault
         message = f"the stamps of {topic} {fault}: times are those of the recorder"
-        return logged, "log_time", [], [LogWarning("log-time", message)]
-    return stamps, "header.stamp", [], []
+        warnings.append(LogWarning("log-time", message))
+    else:
+        return stamps, "header.stamp"
+    return logged, "log_time"
