@@ -36,6 +36,7 @@ from urmpipe_models.errors import (
 )
 from urmpipe_pipeline.array_choice import Choice, Name, Question, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.logs.formats.files import question
 from urmpipe_pipeline.logs.formats.form import spread_names
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import ROLE, UNIT, arrow_column
@@ -45,7 +46,7 @@ from urmpipe_pipeline.logs.formats.text import refuse_unpacked, refuse_wide
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
 
-MAX_LISTED = 9  # choices of a question, or arrays that are not read, in a message
+MAX_LISTED = 9  # choices, or arrays that are not read, in a message
 MAX_JOINT_ROWS = 16  # rows of an array without others that may have its joints as rows, if it is wider
 
 Array: TypeAlias = NDArray[Any]
@@ -129,15 +130,14 @@ def spread_array(name: Name, values: Array, rows: int) -> Iterator[ArrayColumn]:
         yield (*name[:-1], label if name[-1] else label[1:]), "", np.ascontiguousarray(column)
 
 
-def ask_for_arrays(path: Path, question: Question) -> NoReturn:
+def ask_for_arrays(path: Path, asked: Question) -> NoReturn:
     """Raise the question which episode, or which arrays of one length, are read."""
-    values = [value for value, _ in question.choices]
+    values = [value for value, _ in asked.choices]
     shown = ", ".join(values[:MAX_LISTED]) + ", ..." * (len(values) > MAX_LISTED)
-    parts = f"{len(values)} episodes" if question.option == "episode" else f"arrays of {len(values)} lengths"
-    if question.requested is not None:
-        parts = f"no {question.option} {question.requested} among {parts}"
-    hints = (Hint(question.option, value, f"reads {rows}") for value, rows in question.choices[:MAX_LISTED])
-    raise LogError(Finding(file=str(path), found=f"{parts}: {shown}", allowed="one", hints=tuple(hints)))
+    parts = f"{len(values)} episodes" if asked.option == "episode" else f"arrays of {len(values)} lengths"
+    if asked.requested is not None:
+        parts = f"no {asked.option} {asked.requested} among {parts}"
+    raise question(path, f"{parts}: {shown}", asked.option, asked.choices)
 
 
 # The clock of a number

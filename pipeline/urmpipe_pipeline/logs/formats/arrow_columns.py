@@ -1,8 +1,8 @@
-"""Times that are doubles, put right by the exact clock that stands beside them in our own files.
+"""Columns of an Arrow table as those of a text table: numbers, and the texts of a CSV file for all else.
 
-Columns of an Arrow table as those of a text table: numbers, and the texts of a CSV file for all else.
+Structs become a column per field, NAME.FIELD; lists a column per entry, NAME_1, NAME_2, ...
 
-Structs become a column a field, NAME.FIELD; lists a column an entry, NAME_1, NAME_2, ...
+`exact_times`: times that are doubles, corrected by the exact clock beside them in urmpipe's own files.
 """
 
 from __future__ import annotations
@@ -22,8 +22,13 @@ from urmpipe_pipeline.logs.formats.form import spread_names
 from urmpipe_pipeline.logs.formats.numbers import UNIT, arrow_column, is_number
 from urmpipe_pipeline.logs.formats.text import MOST_COLUMNS, refuse_wide
 
-EXPONENTS = {b"s": 9, b"ms": 6, b"us": 3, b"ns": 0}
-"""Powers of ten from the units of times to [ns]."""
+EXPONENTS = {b"s": 9, b"ms": 6, b"us": 3, b"ns": 0}  # powers of ten from units of times to [ns]
+USUAL_SHARE = 0.9  # of the lists of a column that have one length, where the others are damaged
+DAY_NS = 86_400 * 10**9
+
+_RESOLUTIONS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}  # [ns]
+
+Named = tuple[pa.Field, pa.ChunkedArray]
 
 
 def exact_times(table: pa.Table, clock: pa.ChunkedArray) -> pa.Table:
@@ -44,15 +49,6 @@ def decimals(ns: IntArray, exponent: int) -> pa.Array:
     return pa.Array.from_buffers(kind, len(ns), [None, pa.py_buffer(np.ascontiguousarray(words))])
 
 
-USUAL_SHARE = 0.9
-"""Share of the lists of a column that have one length where the others are damaged."""
-
-_DAY_NS = 86_400 * 10**9
-_FINENESS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
-
-Named = tuple[pa.Field, pa.ChunkedArray]
-
-
 def plain_table(table: pa.Table, place: str) -> pa.Table:
     """Return a table of numbers and texts alone, its names without blanks around them.
 
@@ -64,7 +60,7 @@ def plain_table(table: pa.Table, place: str) -> pa.Table:
         LogError: If a list has another length than those of nearly all other rows.
     """
     pairs = zip(table.schema, table.columns, strict=True)
-    flat = (plain for field, column in pairs for plain in _flat(field, column, place))
+    flat = (plain for field, column in pairs for plain in _flatten(field, column, place))
     columns = list(islice(flat, MOST_COLUMNS + 1))
     refuse_wide(len(columns), place)
     fields = [
@@ -83,39 +79,38 @@ def number_texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     return pc.replace_substring_regex(texts, r"^(-?\d+)$", r"\1.0")
 
 
-def _flat(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Named]:
-    """Yield a column; of a struct or a list the columns that it holds."""
+def is_list(kind: pa.DataType) -> bool:
+    """Return whether a column has lists, of one length or not."""
+    return bool(pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind))
+
+
+def _flatten(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Named]:
+    """Yield a column, or those of a struct, or of lists of one length; none of lists of many lengths."""
     kind = column.type
     if isinstance(kind, pa.BaseExtensionType):
-        yield from _flat(field, column.cast(kind.storage_type), place)
+        yield from _flatten(field, column.cast(kind.storage_type), place)
     elif pa.types.is_dictionary(kind):
         values = [_without_view(chunk.dictionary).take(chunk.indices) for chunk in column.chunks]
-        yield from _flat(field, pa.chunked_array(values, None if values else pa.null()), place)
+        yield from _flatten(field, pa.chunked_array(values, None if values else pa.null()), place)
     elif pa.types.is_struct(kind):
         for inner, values in zip(kind, column.flatten(), strict=True):
-            yield from _flat(inner.with_name(f"{field.name}.{inner.name}"), values, place)
-    elif pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind):
-        yield from _spread(field, column, place)
+            yield from _flatten(inner.with_name(f"{field.name}.{inner.name}"), values, place)
+    elif not is_list(kind):
+        yield field, _to_numbers_or_texts(column)
     else:
-        yield field, _plain(column)
-
-
-def _spread(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Named]:
-    """Yield a column for each entry of lists of one length; none of lists of many lengths."""
-    lengths = np.asarray(pc.list_value_length(column).fill_null(-1).to_numpy())
-    there = lengths[lengths >= 0]
-    usual = int(np.bincount(there).argmax()) if len(there) else 0
-    other = np.flatnonzero((lengths >= 0) & (lengths != usual))
-    if not usual or len(other) > (1.0 - USUAL_SHARE) * len(there):
-        return
-    if len(other):
-        row = int(other[0])
-        found = f"{lengths[row]} entries"
-        allowed = f"{usual}, as in the other rows"
-        raise LogError(Finding(file=place, row=row + 1, column=field.name, found=found, allowed=allowed))
-    refuse_wide(usual, place)
-    for k, name in enumerate(spread_names([field.name], [usual])):
-        yield from _flat(field.with_name(name), pc.list_element(column, k), place)
+        lengths = np.asarray(pc.list_value_length(column).fill_null(-1).to_numpy())
+        present = lengths[lengths >= 0]
+        usual = int(np.bincount(present).argmax()) if len(present) else 0
+        other = np.flatnonzero((lengths >= 0) & (lengths != usual))
+        if not usual or len(other) > (1.0 - USUAL_SHARE) * len(present):
+            return
+        if len(other):
+            found, allowed = f"{lengths[other[0]]} entries", f"{usual}, as in the other rows"
+            row = int(other[0]) + 1
+            raise LogError(Finding(file=place, row=row, column=field.name, found=found, allowed=allowed))
+        refuse_wide(usual, place)
+        for k, name in enumerate(spread_names([field.name], [usual])):
+            yield from _flatten(field.with_name(name), pc.list_element(column, k), place)
 
 
 def _without_view(values: Any) -> Any:
@@ -123,44 +118,42 @@ def _without_view(values: Any) -> Any:
     return values.cast(pa.string()) if pa.types.is_string_view(values.type) else values
 
 
-def _plain(column: pa.ChunkedArray) -> pa.ChunkedArray:
+def _to_numbers_or_texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Return numbers and texts as they are, all else as the texts that pandas writes of it."""
-    for is_kind, made in _MADE:
+    for is_kind, convert in _CONVERSIONS:
         if is_kind(column.type):
-            return made(column)
+            return convert(column)
     texts = (None if value is None else printable(str(value)) for value in column.to_pylist())
     return pa.chunked_array([pa.array(texts, pa.string())])
 
 
-def _dates(column: pa.ChunkedArray) -> pa.ChunkedArray:
+def _date_texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Return dates and times with as many decimals as the finest needs; days alone without a time."""
     zoned = column.type.tz is not None
-    unit = _fineness(column.cast(pa.int64()), column.type.unit)
-    if not zoned and unit == "s" and _all_days(column):
-        return column.cast(pa.date32()).cast(pa.string())
+    unit = _resolution(column.cast(pa.int64()), column.type.unit)
+    if not zoned and unit == "s":
+        days = pc.floor_temporal(column, unit="day")
+        if pc.all(pc.equal(days, column)).as_py():
+            return column.cast(pa.date32()).cast(pa.string())
     texts = column.cast(pa.timestamp(unit, column.type.tz)).cast(pa.string())
     if not zoned:
         return texts
     return pc.replace_substring_regex(pc.replace_substring(texts, "Z", "+0000"), r"(\d\d)$", r":\1")
 
 
-def _all_days(column: pa.ChunkedArray) -> bool:
-    return bool(pc.all(pc.equal(pc.floor_temporal(column, unit="day"), column)).as_py())
-
-
-def _fineness(counts: pa.ChunkedArray, unit: str) -> str:
+def _resolution(counts: pa.ChunkedArray, unit: str) -> str:
     """Return the coarsest unit in which counts of a unit are whole."""
     values = counts.drop_null().to_numpy()
-    common = int(np.gcd.reduce(values)) * _FINENESS[unit] if len(values) else 0
-    return next(name for name, step in _FINENESS.items() if common % step == 0)
+    common = int(np.gcd.reduce(values)) * _RESOLUTIONS[unit] if len(values) else 0
+    return next(name for name, step in _RESOLUTIONS.items() if common % step == 0)
 
 
-def _lengths_of_time(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """Return lengths of time as days and hours, minutes, seconds: -1 days +23:59:59.995000 is -5 ms."""
+def _duration_texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Return durations as days and hours, minutes, seconds: -1 days +23:59:59.995000 is -5 ms."""
     counts = column.cast(pa.int64())
-    ns = counts.fill_null(0).to_numpy() * _FINENESS[column.type.unit]
-    unit = _fineness(counts, column.type.unit)
-    days, rest = map(arrow_column, np.divmod(ns, _DAY_NS))
+    ns = counts.fill_null(0).to_numpy() * _RESOLUTIONS[column.type.unit]
+    unit = _resolution(counts, column.type.unit)
+    days, rest = map(arrow_column, np.divmod(ns, DAY_NS))
     kind = pa.time32("s") if unit == "s" else pa.time64("ns" if unit == "ns" else "us")
     clock = rest.cast(pa.time64("ns")).cast(kind).cast(pa.string())
     sign = pc.if_else(pc.less(days, 0), " days +", " days ")
@@ -168,17 +161,17 @@ def _lengths_of_time(column: pa.ChunkedArray) -> pa.ChunkedArray:
     return pc.if_else(column.is_null(), None, pa.chunked_array([texts]))
 
 
-_MADE: Sequence[tuple[Callable[[pa.DataType], bool], Callable[[pa.ChunkedArray], pa.ChunkedArray]]] = (
+def _is_text(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind))
+
+
+_CONVERSIONS: Sequence[tuple[Callable[[pa.DataType], bool], Callable[[pa.ChunkedArray], pa.ChunkedArray]]] = (
     (pa.types.is_float16, lambda column: column.cast(pa.float32())),
     (is_number, lambda column: column),
     (pa.types.is_null, lambda column: column.cast(pa.float64())),
-    (pa.types.is_string_view, lambda column: pc.utf8_trim_whitespace(_without_view(column))),
-    (pa.types.is_string, pc.utf8_trim_whitespace),
-    (pa.types.is_large_string, pc.utf8_trim_whitespace),
+    (_is_text, lambda column: pc.utf8_trim_whitespace(_without_view(column))),
     (pa.types.is_boolean, lambda column: pc.if_else(column, "True", "False")),
-    (pa.types.is_timestamp, _dates),
-    (pa.types.is_duration, _lengths_of_time),
-    (pa.types.is_date, lambda column: column.cast(pa.string())),
-    (pa.types.is_time, lambda column: column.cast(pa.string())),
+    (pa.types.is_timestamp, _date_texts),
+    (pa.types.is_duration, _duration_texts),
+    (lambda kind: pa.types.is_date(kind) or pa.types.is_time(kind), lambda column: column.cast(pa.string())),
 )
-"""What is made of a column, by its type."""

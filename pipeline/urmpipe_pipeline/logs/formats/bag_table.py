@@ -19,9 +19,10 @@ from typing import Any, NamedTuple, TypeAlias
 import pyarrow as pa
 
 from urmpipe_models.display import format_count
-from urmpipe_models.errors import Finding, Hint, LogError, format_value
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.logs.formats.bag import Message, make_decoder, open_bag
+from urmpipe_pipeline.logs.formats.files import choice_error, question
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import JOINT, ROLE, UNIT
 from urmpipe_pipeline.logs.formats.text import refuse_wide
@@ -61,7 +62,7 @@ class _Row(NamedTuple):
 class _Topics(NamedTuple):
     """The topics of a recording: its file, the number of messages and the type of each by name."""
 
-    file: str
+    path: Path
     counts: Mapping[str, int]
     types: Mapping[str, str]
 
@@ -90,34 +91,34 @@ def read_bag(path: Path, options: LogMap) -> MemoryTable:
         LogError: If it is no recording, messages cannot be decoded, or several topics may be the log.
     """
     bag = open_bag(path)
-    file, counts = str(path), Counter[str]()
+    counts = Counter[str]()
     for topic, count in bag.topics.items():
         counts[topic.name] += count
-    topics = _Topics(file, counts, {topic.name: topic.type for topic in bag.topics})
+    topics = _Topics(path, counts, {topic.name: topic.type for topic in bag.topics})
     name, frame, why = _choose_topic(topics, options.topic)
     messages, damage = bag.read(name)
     warnings, why_missing = [], "; ".join(damage)
     if damage and not messages:
         found = f"found no message of {name} that can be read ({why_missing})"
-        raise LogError(Finding(f"{found}, allowed: a complete recording", file))
+        raise LogError(Finding(f"{found}, allowed: a complete recording", str(path)))
     if damage:
         read = f"{format_count(len(messages), 'message')} of {name}"
         fault = f"the recording is cut or damaged: {read} were read, others are missing ({why_missing})"
         warnings.append(LogWarning("cut-recording", fault, assumption=f"{read} are the motion"))
-    rows = [*_decode(messages, file)]
+    rows = [*_decode(messages, path)]
     applied = ["topic"] if options.topic else []
     kind, title, clock = topics.kind(name), name, ""
     if kind in TRANSFORMS:
-        rows, title = _select_frame(rows, file, name, frame)
+        rows, title = _select_frame(rows, path, name, frame)
     elif kind in POINTS:
-        rows = _select_points(rows, options.episode, file, name)
+        rows = _select_points(rows, options.episode, path, name)
         applied += ["episode"] if options.episode else []
         clock = "time_from_start" if kind == "JointTrajectory" else ""
     elif kind in JOINTS:
-        rows = _select_joints(rows, options.joints, file, warnings)
+        rows = _select_joints(rows, options.joints, path, warnings)
     unread = [other for other in counts if other != name]
     inferences = [Inference("topic", title, why, hints=tuple(Hint("topic", other) for other in unread[:1]))]
-    table = _build_table(rows, name, file, clock, inferences, warnings)
+    table = _build_table(rows, name, path, clock, inferences, warnings)
     if unread:
         inferences.append(Inference("topics not read", topics.format_list(unread), "a log is one topic"))
     for other in unread if kind in JOINTS else ():
@@ -139,9 +140,8 @@ def _choose_topic(topics: _Topics, option: str | None) -> tuple[str, str, str]:
             name = next((name for name in names if topic in (name, name.lstrip("/"))), None)
             if name and (not frame or topics.kind(name) in TRANSFORMS):
                 return name, frame, "given as an option"
-        raise _option_error(
-            topics.file, "topic", option, f"a topic of the recording: {topics.format_list(names)}"
-        )
+        allowed = f"a topic of the recording: {topics.format_list(names)}"
+        raise choice_error(topics.path, "topic", option, allowed)
     for kinds in KINDS:
         matching = [name for name in names if topics.kind(name) in kinds]
         if len(matching) == 1:
@@ -152,26 +152,16 @@ def _choose_topic(topics: _Topics, option: str | None) -> tuple[str, str, str]:
     if len(names) == 1:
         return names[0], "", "the only one"
     choices = [(name, topics.describe(name)) for name in names]
-    raise _question(topics.file, f"{len(names)} topics that may be the log", "topic", choices)
-
-
-def _question(file: str, found: str, option: str, choices: Sequence[tuple[Any, str]]) -> LogError:
-    """Return a question with the value of an option for each choice, and what that reads."""
-    hints = tuple(Hint(option, value, f"reads {what}") for value, what in choices[:MAX_LISTED])
-    return LogError(Finding(file=file, found=found, allowed="one of them", hints=hints))
-
-
-def _option_error(file: str, option: str, value: str | None, allowed: str) -> LogError:
-    return LogError(Finding(file=file, parameter=option, found=format_value(value), allowed=allowed))
+    raise question(topics.path, f"{len(names)} topics that may be the log", "topic", choices)
 
 
 # Rows
 
 
-def _decode(messages: Sequence[Message], file: str) -> Iterator[_Row]:
+def _decode(messages: Sequence[Message], path: Path) -> Iterator[_Row]:
     """Yield the messages decoded; raise with the number of those that cannot be."""
     topics = dict.fromkeys(message.topic for message in messages)
-    decoders = {topic: make_decoder(topic, file) for topic in topics}
+    decoders = {topic: make_decoder(topic, str(path)) for topic in topics}
     bad = list[tuple[int, str]]()
     for number, (topic, log_ns, data) in enumerate(messages, start=1):
         try:
@@ -185,7 +175,7 @@ def _decode(messages: Sequence[Message], file: str) -> Iterator[_Row]:
         number, reason = bad[0]
         count = f"{len(bad)} of {format_count(len(messages), 'message')} that cannot be decoded"
         first = f"the first is message {number} of {messages[number - 1].topic.name} ({reason})"
-        raise LogError(Finding(file=file, found=f"{count}: {first}", allowed="complete messages"))
+        raise LogError(Finding(file=str(path), found=f"{count}: {first}", allowed="complete messages"))
 
 
 def _fields(message: Any) -> Mapping[str, Any]:
@@ -230,20 +220,20 @@ def _array_names(fields: Mapping[str, Any]) -> tuple[str, ...]:
     return ()
 
 
-def _select_points(rows: Sequence[_Row], episode: str | None, file: str, name: str) -> list[_Row]:
+def _select_points(rows: Sequence[_Row], episode: str | None, path: Path, name: str) -> list[_Row]:
     """Return the points of a trajectory or the poses of a path as rows, those of the message `episode`."""
     points = [_fields(row.message).get("points") or _fields(row.message).get("poses") or () for row in rows]
     if episode is None and len(rows) > 1:
         choices = [(str(k), format_count(len(part), "point")) for k, part in enumerate(points, start=1)]
-        raise _question(file, f"{len(rows)} trajectories of {name}", "episode", choices)
+        raise question(path, f"{len(rows)} trajectories of {name}", "episode", choices)
     number = 1 if episode is None else int(episode) if episode.isdecimal() else 0
     if not 1 <= number <= len(rows):
-        raise _option_error(file, "episode", episode, f"1 to {len(rows)}, the trajectories of {name}")
+        raise choice_error(path, "episode", episode, f"1 to {len(rows)}, the trajectories of {name}")
     row = rows[number - 1]
     return [row._replace(stamp=_stamp(_fields(point)), message=point) for point in points[number - 1]]
 
 
-def _select_frame(rows: Sequence[_Row], file: str, name: str, frame: str) -> tuple[list[_Row], str]:
+def _select_frame(rows: Sequence[_Row], path: Path, name: str, frame: str) -> tuple[list[_Row], str]:
     """Return the transforms of one frame, and its title."""
     frames = dict[str, list[_Row]]()
     for row in rows:
@@ -254,16 +244,16 @@ def _select_frame(rows: Sequence[_Row], file: str, name: str, frame: str) -> tup
     if not frame and len(frames) > 1:
         in_order = sorted(frames.items(), key=lambda item: -len(item[1]))
         choices = [(f"{name}:{child}", format_count(len(part), "transform")) for child, part in in_order]
-        raise _question(file, f"{len(frames)} frames of {name} that may be the log", "topic", choices)
+        raise question(path, f"{len(frames)} frames of {name} that may be the log", "topic", choices)
     frame = frame or next(iter(frames), "")
     if frame not in frames:
         allowed = f"a frame of {name}: {', '.join([*frames][:MAX_LISTED])}"
-        raise _option_error(file, "topic", frame, allowed)
+        raise choice_error(path, "topic", frame, allowed)
     return frames[frame], f"{name}:{frame}"
 
 
 def _select_joints(
-    rows: Sequence[_Row], joints: Sequence[str], file: str, warnings: list[LogWarning]
+    rows: Sequence[_Row], joints: Sequence[str], path: Path, warnings: list[LogWarning]
 ) -> list[_Row]:
     """Return the messages of one set of joints, and add warnings about those of other sets.
 
@@ -285,7 +275,7 @@ def _select_joints(
             ([f"position.{name}" for name in order[names]], format_count(count, "message"))
             for names, count in sets.most_common()
         ]
-        raise _question(file, f"messages with {len(sets)} different sets of joints", "joints", choices)
+        raise question(path, f"messages with {len(sets)} different sets of joints", "joints", choices)
     for names, count in sets.items():
         if names not in arms:
             listed = ", ".join(order[names]) or "without names"
@@ -340,7 +330,7 @@ def _labels(path: str, names: tuple[str, ...], count: int) -> tuple[str, ...]:
 def _build_table(
     rows: Sequence[_Row],
     topic: str,
-    file: str,
+    path: Path,
     clock: str,
     inferences: list[Inference],
     warnings: list[LogWarning],
@@ -361,8 +351,8 @@ def _build_table(
     for names, (places, block) in blocks.items():
         if twice := [name for name, count in Counter(names).items() if count > 1]:
             message = f"message {places[0] + 1} of {topic} has {twice[0]} twice, allowed: each name once"
-            raise LogError(Finding(message, file))
-        refuse_wide(len({*columns, *names}), file)
+            raise LogError(Finding(message, str(path)))
+        refuse_wide(len({*columns, *names}), str(path))
         for name, values in zip(names, zip(*block, strict=True), strict=True):
             column = columns.setdefault(name, [None] * len(rows))
             for place, value in zip(places, values, strict=True):

@@ -5,6 +5,7 @@
    bytes go into a file without a name that takes over that number. Other pipes and devices are no logs.
 2. `import_optional`: a library of the extra `logs`, or the error that names it.
 3. `read_separately`: the contents of a file whose library may crash, from a separate process.
+4. `question`: which of several tables of a file is read.
 """
 
 from __future__ import annotations
@@ -13,19 +14,21 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from select import select
 from tempfile import TemporaryFile
 from typing import Any
 
-from urmpipe_models.errors import Finding, Hint, LogError, format_value
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.file_contents import PASSWORD
 from urmpipe_pipeline.subprocess_reader import ReaderCrashError, read_in_subprocess
 
 PIPE_TIMEOUTS = (5.0, 55.0)  # [s] without a byte until a silent pipe is named, and after that until it fails
+MAX_CHOICES = 9  # of a question
 MAX_PIPED = 4 << 30  # bytes of a pipe that are kept: one that never ends would fill the disk
 
 _OWN_PIPE = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,9})|/dev/stdin")
@@ -178,3 +181,14 @@ def first_bytes(path: Path, count: int) -> bytes:
             return file.read(count)
     except OSError:
         return b""
+
+
+def question(path: Path, found: str, option: str, choices: Iterable[tuple[Any, str]]) -> LogError:
+    """Return the question which table of a file is read: values of an option, each with what that reads."""
+    hints = (Hint(option, value, f"reads {what}") for value, what in islice(choices, MAX_CHOICES))
+    return LogError(Finding(file=str(path), found=found, allowed="one", hints=tuple(hints)))
+
+
+def choice_error(path: Path, option: str, value: str | None, allowed: str) -> OptionError:
+    """Return the error about a table that a file does not have."""
+    return OptionError(Finding(file=str(path), parameter=option, found=format_value(value), allowed=allowed))

@@ -16,14 +16,16 @@ from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 from urmpipe_models.display import format_count
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
+from urmpipe_models.errors import Finding, Hint, LogError, format_value
 from urmpipe_pipeline.file_contents import Cell, Row, Sheet, clock_text
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_number
 from urmpipe_pipeline.logs.formats.files import (
+    choice_error,
     first_bytes,
     import_optional,
     password_error,
+    question,
     read_separately,
 )
 from urmpipe_pipeline.logs.formats.text import Segment, refuse_unpacked, text_segment
@@ -85,8 +87,7 @@ def _choose_sheet(path: Path, sheets: Sequence[Sheet], requested: str | None) ->
     if requested is not None:
         number = int(requested) if requested.isdecimal() and requested.isascii() else 0
         if requested not in names and not 1 <= number <= len(names):
-            found, allowed = format_value(requested), ", ".join(map(format_value, names))
-            raise OptionError(Finding(file=str(path), parameter="sheet", found=found, allowed=allowed))
+            raise choice_error(path, "sheet", requested, ", ".join(map(format_value, names)))
         return sheets[names.index(requested) if requested in names else number - 1], "given as an option"
     shown = [sheet for sheet in sheets if sheet.is_shown] or sheets
     tables = [sheet for sheet in shown if _numeric_rows(sheet, 2) > 1]
@@ -94,15 +95,15 @@ def _choose_sheet(path: Path, sheets: Sequence[Sheet], requested: str | None) ->
     if len(tables) == 1:
         return tables[0], "the only sheet" if len(names) == 1 else "the only sheet with a table"
     if tables:
-        counts = [(sheet.name, format_count(_numeric_rows(sheet, 1), "row")) for sheet in tables]
-        hints = [Hint("sheet", name, f"reads its {count} of numbers") for name, count in counts]
-        found, allowed = f"{len(tables)} sheets with a table", "one"
-    else:
-        found = f"no rows of numbers in {format_count(len(shown), 'sheet')} ({', '.join(names)})"
-        allowed = "a table with one row per sample"
-        values = "if its cells are formulas, save it in a spreadsheet program, which adds their values"
-        hints = [Hint("", effect=values)]
-    raise LogError(Finding(file=str(path), found=found, allowed=allowed, hints=tuple(hints)))
+        counts = ((sheet.name, format_count(_numeric_rows(sheet, 1), "row")) for sheet in tables)
+        choices = ((name, f"its {count} of numbers") for name, count in counts)
+        raise question(path, f"{len(tables)} sheets with a table", "sheet", choices)
+    found = f"no rows of numbers in {format_count(len(shown), 'sheet')} ({', '.join(names)})"
+    allowed = "a table with one row per sample"
+    values = Hint(
+        "", effect="if its cells are formulas, save it in a spreadsheet program, which adds their values"
+    )
+    raise LogError(Finding(file=str(path), found=found, allowed=allowed, hints=(values,)))
 
 
 def _numeric_rows(sheet: Sheet, count: int) -> int:
