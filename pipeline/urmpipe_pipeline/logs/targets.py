@@ -1,180 +1,80 @@
-"""How a table of targets is written, told by its header: x, y, z say more than rows of which some are wrong.
+"""Tables with a pose or a position in each row, and columns beside it: targets, and the rows of a path.
 
-A few targets are typed by hand, and all of their rows may be wrong. How a log is written its rows tell.
+A log is refused for one wrong cell, since a gap in a motion is a gap in everything computed from it. The rows
+of a table of targets stand each for itself: a wrong row is a fault of that row.
 
-A table with a pose or a position a row, and columns beside it: targets, and the rows of a path.
+1. `sniff_targets`: how the table is written is shown by its header: x, y, z say more than rows of which some,
+   or all, are wrong.
+2. `read_pose_table`: the columns and their roles as in a log; lengths are in m and angles in rad unless the
+   header or an option gives a unit; rz, ry, rx mean R = Rz Ry Rx.
+3. `_read_rows`: the numbers, the faults of rows, and a time for every row.
+4. `_rotation_form`, `_rotation_units`, `_to_rotations`: the orientation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
-from urmpipe_models.math3d import FORMS, RotationForm, column_count
+from urmpipe_models.math3d import FORMS, RotationForm, column_count, is_angular, to_matrices, to_quaternions
 from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
-from urmpipe_pipeline.logs.clock import split_file_column
-from urmpipe_pipeline.logs.columns import Column, columns_of, listed, unit_inference
+from urmpipe_pipeline.logs.clock import DEFAULT_PERIOD, Clock, split_file_column
+from urmpipe_pipeline.logs.columns import Column, columns_of, listed, unit_hints, unit_inference
 from urmpipe_pipeline.logs.formats.cells import DECIMALS, DELIMITERS, count_up, is_number, split_line
+from urmpipe_pipeline.logs.formats.clock_forms import UNREADABLE
 from urmpipe_pipeline.logs.formats.files import unchanged
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
-from urmpipe_pipeline.logs.formats.numbers import RowFault
+from urmpipe_pipeline.logs.formats.numbers import Numbers, RowFault
 from urmpipe_pipeline.logs.formats.opening import PATH, open_tables
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import COMMENTS, HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.plan import Plan, make_plan
-from urmpipe_pipeline.logs.rotation import form_inference
-from urmpipe_pipeline.logs.target_rows import (
-    ExtraColumn,
-    Rows,
-    read_rows,
-    rotation_units,
-    target_form,
-    target_rotations,
-)
+from urmpipe_pipeline.logs.pose_columns import ORTHOGONAL
+from urmpipe_pipeline.logs.roles import Roles
+from urmpipe_pipeline.logs.rotation import PURE, form_inference
+from urmpipe_pipeline.logs.rows import find_row_errors, unknown_times
+from urmpipe_pipeline.logs.timestamps import read_text_times, separate_repeated
 from urmpipe_pipeline.logs.units import MAX_REACH, UnitFinder, UnitSources
-from urmpipe_pipeline.logs.vocabulary import Unit, key, split_unit, vocabulary
+from urmpipe_pipeline.logs.vocabulary import Patterns, Unit, key, split_unit, vocabulary
 
+MAX_NORM_ERROR = 1e-3  # of a quaternion, as printed digits cause; then it is divided by its norm
+MAX_RAD = 2 * np.pi * 1.01  # angles without a unit, most of them beyond this, are hardly in rad
+ALLOWED = "a finite number"  # in the cells of a pose
 
-def sniff_targets(
-    segment: Segment, delimiter: str | None = None, decimal: str | None = None, position: Sequence[str] = ()
-) -> TextTable:
-    """Return how a table is written: by its soundest rows, if a header names x, y, z or the columns given.
+NAMED = Hint("orientation", None, "with --position and --rotation names them")
 
-    These are the rows with a cell for each name and the most numbers for x, y, z. All lines below the header
-    are rows then, but for comments and a line of units. If no row is sound, the first line that is no comment
-    may be such a header still, or the next one below a title.
-
-    Raises:
-        LogError: If it holds no rows, no numbers below a header without x, y, z, or a header that does not
-            fit its rows.
-        OptionError: As `sniff`.
-    """
-    lines = list(islice(head_lines(segment), MAX_SAMPLED_ROWS))
-    for place, line in enumerate(lines):
-        below = [other for other in lines[place + 1 :] if not other.is_comment]
-        whole = _soundest(below, _headers(line.text, position))
-        if whole:
-            # The first line may tell the delimiter; any other above the header tells nothing.
-            layout = sniff(segment, delimiter, decimal, [*lines[: min(place, 1)], line, *whole])
-            return (
-                _from(layout, below) if layout.header == line.number else sniff(segment, delimiter, decimal)
-            )
-    body = [line for line in lines if not line.is_comment]
-    for place, line in enumerate(body[:2]):
-        header = _fitting(body[place + 1 :], _headers(line.text, position))
-        if header and delimiter is None:
-            return _by_header(segment, decimal, body[: place + 1], header, body[place + 1 :])
-    return sniff(segment, delimiter, decimal)
-
-
-def _by_header(
-    segment: Segment,
-    decimal: str | None,
-    head: Sequence[HeadLine],
-    header: _Header,
-    below: Sequence[HeadLine],
-) -> TextTable:
-    """Return a layout that the header alone tells, of rows that are all wrong."""
-    sound = replace(below[0], text=header.delimiter.join(["0"] * header.width))  # as the header asks for
-    layout = _from(sniff(segment, None, decimal, [*head, sound]), below)
-    rows = [line for line in below if line.number >= layout.first_line]
-    return replace(layout, sample=tuple(tuple(split_line(line.text, header.delimiter)) for line in rows))
-
-
-def _from(layout: TextTable, below: Sequence[HeadLine]) -> TextTable:
-    """Return a layout whose rows begin right below its header, or behind a line of units."""
-    cells = split_line(below[0].text, layout.delimiter)
-    units = tuple(cells) if len(below) > 1 and _are_units(cells) else ()
-    first = below[1 if units else 0]
-    return replace(layout, units=units, first_line=first.number, offset=first.offset)
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    """Return whether the cells of a line are units."""
-    told = [vocabulary().unit(cell.strip("[]() ")) for cell in cells if cell]
-    return bool(told) and all(told)
+_OUR_ANGLES = frozenset(("rx", "ry", "rz"))
+_KUKA_ANGLES = frozenset("abc")
 
 
 @dataclass(frozen=True, slots=True)
-class _Header:
-    """A line of names: the sign between them, how many there are, and which are those of x, y, z."""
+class ExtraColumn:
+    """A column beside the poses.
 
-    delimiter: str
-    width: int
-    position: tuple[int, ...]
+    Attributes:
+        patterns: Of its name.
+        allowed: The values that a cell may hold, in words.
+        fits: Returns which numbers, in the file's unit and of shape (n,), a cell may hold.
+        empty: The value of an empty cell, in SI.
+        length: Whether it holds lengths.
+    """
 
-
-def _headers(text: str, named: Sequence[str]) -> list[_Header]:
-    """Return what a line is as a header, by each delimiter that makes names of x, y and z of it."""
-    for comment in COMMENTS:
-        text = text.strip().removeprefix(comment)
-    split = [(delimiter, split_line(text, delimiter)) for delimiter in DELIMITERS]
-    return [_Header(sign, len(cells), found) for sign, cells in split if (found := _position(cells, named))]
-
-
-def _position(cells: Sequence[str], named: Sequence[str]) -> tuple[int, ...]:
-    """Return which names are those of x, y and z, or of a transform with them; none without all of them."""
-    labels = [split_unit(cell)[0] for cell in cells]
-    told = tuple(k for k, label in enumerate(labels) if {label, cells[k]} & {*named})
-    if len(told) == 3:
-        return told
-    keys = [key(label) for label in labels]
-    for pattern in vocabulary().tcp_position:
-        found = ((k, pattern.search(one)) for k, one in enumerate(keys))
-        matches = {k: match.groupdict().get("axis") for k, match in found if match}
-        if {"x", "y", "z"} <= set(matches.values()):
-            return tuple(k for k, axis in matches.items() if axis)
-    entries = next(pattern for pattern in vocabulary().tcp_matrix if "i" in pattern.groupindex)
-    transform = tuple(k for k, one in enumerate(keys) if entries.search(one))
-    return transform if len(transform) in (12, 16) else ()
-
-
-def _soundest(below: Sequence[HeadLine], headers: Sequence[_Header]) -> list[HeadLine]:
-    """Return the lines with the most numbers for x, y, z, by the header and decimal sign with most lines."""
-    best: tuple[int, list[HeadLine]] = 0, []
-    for header in headers:
-        for decimal in DECIMALS:
-            numbers = [_numbers(line.text, header, decimal) for line in below]
-            most = max(numbers, default=0)
-            whole = [line for line, count in zip(below, numbers, strict=True) if count == most > 0]
-            if (most, len(whole)) > (best[0], len(best[1])):
-                best = most, whole
-    return best[1]
-
-
-def _numbers(text: str, header: _Header, decimal: str) -> int:
-    """Return how many numbers a line has for x, y, z; 0 if it has other than a cell for each name."""
-    cells = split_line(text, header.delimiter)
-    if len(cells) < header.width or any(cells[header.width :]):
-        return 0
-    return sum(is_number(cells[k], decimal) for k in header.position)
-
-
-def _fitting(below: Sequence[HeadLine], headers: Sequence[_Header]) -> _Header | None:
-    """Return the header that fits most of some rows; None without one, or if they begin with an index."""
-
-    def widths(header: _Header) -> list[int]:
-        """Return how many cells each row has by a header's delimiter."""
-        return [len(split_line(line.text, header.delimiter)) for line in below]
-
-    found = max(headers, key=lambda header: widths(header).count(header.width), default=None)
-    if found is None or not below:
-        return None
-    rows = [split_line(line.text, found.delimiter) for line in below]
-    if len(rows) == 1 and _are_units(rows[0]):
-        return None
-    first = [cells[0] for cells in rows]
-    indexed = set(widths(found)) == {found.width + 1} and len(below) > 1 and count_up(first)
-    return None if indexed else found
+    patterns: Patterns
+    allowed: str
+    fits: Callable[[FloatArray], BoolArray]
+    empty: float
+    length: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,7 +87,8 @@ class PoseTable:
         rotation: Matrices [-], shape (n, 3, 3), NaN in a row with a fault; None if the table has positions
             only.
         further: The columns beside the pose by their meaning, in [m] or [-], shape (n,).
-        clock: Times in integer [ns] on the table's clock, shape (n,); None without one.
+        clock: Times in integer [ns] on the table's clock, shape (n,); None without one. A row whose time is
+            not known stands between its neighbours.
         faults: Data row from 1, and all that is wrong with it.
         inferences: What was found out about the table.
         warnings: What a person should know about it.
@@ -208,7 +109,7 @@ class PoseTable:
     @property
     def unused(self) -> list[Column]:
         """The columns that are neither a time nor have a role."""
-        return _unused(self.plan)
+        return _unused_columns(self.plan)
 
     @property
     def unused_numbers(self) -> list[Column]:
@@ -224,13 +125,11 @@ def read_pose_table(
 ) -> PoseTable:
     """Return the rows of a table: x, y, z, where it has one the orientation, and further columns.
 
-    Lengths are in m and angles in rad unless the header or the options give a unit; rz, ry, rx mean
-    R = Rz Ry Rx. A further length without a unit in its own name has the unit of x, y, z.
-
     Args:
         file: A text table, as a log may be.
         options: How to read the file where it does not show it; those about joints are not used.
-        further: The columns to look for beside the poses, by their meaning.
+        further: The columns to look for beside the poses, by their meaning. One with lengths has the unit of
+            x, y, z unless its name has one.
         naming: The remedy where columns have no names, for the error.
 
     Raises:
@@ -242,86 +141,308 @@ def read_pose_table(
     if split_file_column(options.time):
         allowed = "a column of the table of targets"
         raise OptionError(Finding(parameter="time", found=format_value(options.time or ""), allowed=allowed))
+    options = replace(options, joints=(), names=(), signs=(), offsets=())
+    length = vocabulary().unit(options.unit.get("", ""))
+    if length is not None and length.quantity == "length" and not length.order:  # of x, y, z
+        options = replace(options, unit={name: unit for name, unit in options.unit.items() if name})
+    else:
+        length = None
+    is_named = bool(options.position)
     with unchanged([file]):
-        return _read(file, options, further, naming)
-
-
-def _read(file: Path, options: LogMap, further: Mapping[str, ExtraColumn], naming: str) -> PoseTable:
-    """Return the rows of a table as `read_pose_table` does."""
-    asked, length = _plain_length(replace(options, joints=(), names=(), signs=(), offsets=()))
-    tables = open_tables([file], asked, partial(sniff_targets, position=asked.position))
-    names = {name: one.patterns for name, one in further.items()}
-    plan = make_plan(tables, replace(asked, source=PATH), None, names)
-    if length is not None:  # what a column's own option says comes first
-        plain = dict.fromkeys((column.number for column in plan.roles.position), length)
-        plan = replace(plan, units={**plain, **plan.units})
-    named = bool(asked.position)
-    _refuse_unclear(plan, naming, named=named, timed=asked.time is not None)
-    form, assumed = target_form(plan.roles, _unused(plan), str(file), asked.rotation, named=named)
-    rows = read_rows(plan, further)
-    poses = _poses(plan, rows, form, further)
-    passed_over = (one for one in plan.roles.warnings if one.kind == PASSED_OVER)
+        tables = open_tables([file], options, partial(sniff_targets, position=options.position))
+        names = {name: column.patterns for name, column in further.items()}
+        plan = make_plan(tables, replace(options, source=PATH), None, names)
+        if length is not None:  # a column's own option comes first
+            plain = dict.fromkeys((column.number for column in plan.roles.position), length)
+            plan = replace(plan, units={**plain, **plan.units})
+        _check_columns(plan, naming, named=is_named, timed=options.time is not None)
+        form, assumed = _rotation_form(plan, str(file), options.rotation, named=is_named)
+        values, times, faults, about_clock = _read_rows(plan, further)
+    table = _to_poses(plan, values, faults, form, further)
+    before = (plan.tables, plan.tables.layouts[plan.main], plan.clock, plan.roles, about_clock)
+    passed_over = (warning for warning in plan.roles.warnings if warning.kind == PASSED_OVER)
     return replace(
-        poses,
-        inferences=(*_about_file(plan), *rows.inferences, *poses.inferences),
-        warnings=(*plan.clock.warnings, *passed_over, *rows.warnings, *assumed, *poses.warnings),
+        table,
+        clock=times,
+        inferences=(*(inference for part in before for inference in part.inferences), *table.inferences),
+        warnings=(*plan.clock.warnings, *passed_over, *about_clock.warnings, *assumed, *table.warnings),
     )
 
 
-def _plain_length(asked: LogMap) -> tuple[LogMap, Unit | None]:
-    """Return the options without a plain length (mm), and that unit, which is of x, y, z here."""
-    unit = vocabulary().unit(asked.unit.get("", ""))
-    if unit is None or unit.quantity != "length" or unit.order:
-        return asked, None
-    return replace(asked, unit={name: one for name, one in asked.unit.items() if name}), unit
-
-
-def _unused(plan: Plan) -> list[Column]:
-    """Return the columns that are neither a time nor have a role."""
+def _unused_columns(plan: Plan) -> list[Column]:
     used = {*plan.clock.columns, *plan.roles.columns}
     return [column for column in columns_of(plan.tables.layouts, plan.tables.titles) if column not in used]
 
 
-def _poses(
-    plan: Plan, rows: Rows, form: RotationForm | None, further: Mapping[str, ExtraColumn]
+def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None:
+    """Raise if columns without names remain, or the orientation stands in another table.
+
+    Args:
+        plan: What is to be read.
+        naming: The remedy where columns have no names.
+        named: Whether options name the columns of the pose.
+        timed: Whether options name the time.
+    """
+    layout, used = plan.tables.layouts[plan.main], [*plan.clock.columns, *plan.roles.columns]
+    if len(plan.used) > 1:
+        found = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
+        raise LogError(Finding(f"{found}, allowed: one table", layout.file))
+    cells = len(layout.names) - (not layout.names[-1])
+    if layout.header is None and cells > len(used) and not (plan.roles.rotation or named):
+        time = " beside the time" if plan.clock.columns else ""
+        count = cells - len(plan.clock.columns)
+        hints = [Hint("", effect=naming)]
+        hints += [Hint("rotation", form, "specifies it") for form in FORMS if 3 + column_count(form) == count]
+        if not (timed or time) and count - 1 in {3, *(3 + column_count(form) for form in FORMS)}:
+            hints.append(Hint("time", "1", "if the first is the time"))
+        found = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
+        raise LogError(Finding(found, layout.file, hints=tuple(hints)))
+
+
+# How a table is written
+
+
+class _Header(NamedTuple):
+    """A line of names: the sign between them, how many there are, and which are those of x, y, z."""
+
+    delimiter: str
+    width: int
+    position: tuple[int, ...]
+
+
+def sniff_targets(
+    segment: Segment, delimiter: str | None = None, decimal: str | None = None, position: Sequence[str] = ()
+) -> TextTable:
+    """Return how a table is written: by its soundest rows, if a header names x, y, z or the columns given.
+
+    These are the rows with a cell for each name and the most numbers for x, y, z. All lines below the header
+    are rows then, but for comments and a line of units. If no row is sound, the first line that is no comment
+    may be such a header still, or the next one below a title.
+
+    Raises:
+        LogError: If it holds no rows, no numbers below a header without x, y, z, or a header that does not
+            fit its rows.
+        OptionError: As `sniff`.
+    """
+    lines = list(islice(head_lines(segment), MAX_SAMPLED_ROWS))
+    for place, line in enumerate(lines):
+        below = [other for other in lines[place + 1 :] if not other.is_comment]
+        if sound := _soundest_lines(below, _find_headers(line.text, position)):
+            # The first line may show the delimiter; any other above the header shows nothing.
+            table = sniff(segment, delimiter, decimal, [*lines[: min(place, 1)], line, *sound])
+            is_header = table.header == line.number
+            return _with_rows(table, below) if is_header else sniff(segment, delimiter, decimal)
+    body = [line for line in lines if not line.is_comment]
+    for place, line in enumerate(body[:2] if delimiter is None else ()):
+        below = body[place + 1 :]
+        if header := _fitting_header(below, _find_headers(line.text, position)):  # all rows are wrong
+            zeros = replace(below[0], text=header.delimiter.join(["0"] * header.width))
+            table = _with_rows(sniff(segment, None, decimal, [*body[: place + 1], zeros]), below)
+            texts = (line.text for line in below if line.number >= table.first_line)
+            return replace(table, sample=tuple(tuple(split_line(text, header.delimiter)) for text in texts))
+    return sniff(segment, delimiter, decimal)
+
+
+def _with_rows(table: TextTable, below: Sequence[HeadLine]) -> TextTable:
+    """Return a table whose rows begin right below its header, or behind a line of units."""
+    cells = split_line(below[0].text, table.delimiter)
+    units = tuple(cells) if len(below) > 1 and _are_units(cells) else ()
+    first = below[1 if units else 0]
+    return replace(table, units=units, first_line=first.number, offset=first.offset)
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    units = [vocabulary().unit(cell.strip("[]() ")) for cell in cells if cell]
+    return bool(units) and all(units)
+
+
+def _find_headers(text: str, named: Sequence[str]) -> list[_Header]:
+    """Return what a line is as a header, by each delimiter that makes names of x, y and z of it."""
+    for comment in COMMENTS:
+        text = text.strip().removeprefix(comment)
+    split = [(delimiter, split_line(text, delimiter)) for delimiter in DELIMITERS]
+    headers = (_Header(sign, len(cells), _position_columns(cells, named)) for sign, cells in split)
+    return [header for header in headers if header.position]
+
+
+def _position_columns(cells: Sequence[str], named: Sequence[str]) -> tuple[int, ...]:
+    """Return which names are those of x, y and z, or of a transform with them; none without all of them."""
+    labels = [split_unit(cell)[0] for cell in cells]
+    given = tuple(k for k, label in enumerate(labels) if {label, cells[k]} & {*named})
+    if len(given) == 3:
+        return given
+    keys = [key(label) for label in labels]
+    for pattern in vocabulary().tcp_position:
+        matches = ((k, pattern.search(name)) for k, name in enumerate(keys))
+        axes = {k: match.groupdict().get("axis") for k, match in matches if match}
+        if {"x", "y", "z"} <= set(axes.values()):
+            return tuple(k for k, axis in axes.items() if axis)
+    entries = next(pattern for pattern in vocabulary().tcp_matrix if "i" in pattern.groupindex)
+    transform = tuple(k for k, name in enumerate(keys) if entries.search(name))
+    return transform if len(transform) in (12, 16) else ()
+
+
+def _soundest_lines(below: Sequence[HeadLine], headers: Sequence[_Header]) -> list[HeadLine]:
+    """Return the lines with the most numbers for x, y, z, by the header and decimal sign with most lines."""
+    best: tuple[int, list[HeadLine]] = 0, []
+    for header in headers:
+        rows = [split_line(line.text, header.delimiter) for line in below]
+        for decimal in DECIMALS:
+            counts = [
+                0  # other than a cell for each name
+                if len(cells) < header.width or any(cells[header.width :])
+                else sum(is_number(cells[k], decimal) for k in header.position)
+                for cells in rows
+            ]
+            most = max(counts, default=0)
+            sound = [line for line, count in zip(below, counts, strict=True) if count == most > 0]
+            if (most, len(sound)) > (best[0], len(best[1])):
+                best = most, sound
+    return best[1]
+
+
+def _fitting_header(below: Sequence[HeadLine], headers: Sequence[_Header]) -> _Header | None:
+    """Return the header that fits most of some rows; None without one, or if they begin with an index."""
+    fits = []
+    for header in headers if below else ():
+        rows = [split_line(line.text, header.delimiter) for line in below]
+        fits.append((sum(len(cells) == header.width for cells in rows), header, rows))
+    if not fits:
+        return None
+    _, best, rows = max(fits, key=lambda fit: fit[0])
+    is_wider = all(len(cells) == best.width + 1 for cells in rows)
+    is_indexed = is_wider and len(rows) > 1 and count_up([cells[0] for cells in rows])
+    return None if is_indexed or (len(rows) == 1 and _are_units(rows[0])) else best
+
+
+# Rows and their faults
+
+
+def _read_rows(
+    plan: Plan, further: Mapping[str, ExtraColumn]
+) -> tuple[FloatArray, IntArray | None, dict[int, list[RowFault]], Numbers]:
+    """Return the numbers of the plan's columns, times, faults by row, and what was found out about the clock.
+
+    A fault is a row that is not written like the others, a cell of a pose without a finite number, a cell of
+    a further column with a wrong number, or a missing time. Times that run backwards are an error of the
+    file, as in a log: either of two rows may be the wrong one. Numbers are in the file's units, of shape
+    (n, columns), times in [ns].
+
+    Raises:
+        LogError: If there is no row, if a fault remains without the wrong rows (the header again), or if the
+            known times are no clock.
+    """
+    layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
+    allowed = {column.index: ALLOWED for column in plan.roles.columns}
+    allowed |= {column.index: further[name].allowed for name, column in plan.roles.further.items()}
+    read = layout.read([column.index for column in plan.roles.columns], clock.parts, allowed)
+    if read.lasting:
+        raise LogError(*read.lasting)
+    numbers = read_text_times(layout, clock.parts, read)
+    if len(numbers.values) and np.isnan(numbers.values[-1]).all():  # as spreadsheets end
+        filled = (row for row, cells in enumerate(layout.iter_cells(), start=1) if any(cells))
+        numbers = numbers.at(slice(max((*filled, *(row + 1 for row in numbers.unread)), default=0)))
+    if not len(numbers.values):
+        raise LogError(Finding("found no row with a number, allowed: at least one", layout.file))
+    faults = _find_faults(numbers, plan.roles, further, clock)
+    if numbers.clock is None:
+        return numbers.values, None, faults, numbers
+    known = np.flatnonzero(numbers.clock > UNREADABLE)
+    if not len(known):
+        found = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
+        hints = (Hint("time", "none", "leaves the column out"),)
+        raise LogError(Finding(found, layout.file, column=clock.columns[0].header, hints=hints))
+    timed = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=(), wrong=0).at(known)
+    timed = separate_repeated(replace(timed, rows=known + 1))
+    if findings := find_row_errors(layout, timed, (), clock):
+        raise LogError(*findings)
+    assert timed.clock is not None
+    return numbers.values, _fill_times(known, timed.clock, len(numbers.clock)), faults, timed
+
+
+def _find_faults(
+    numbers: Numbers, roles: Roles, further: Mapping[str, ExtraColumn], clock: Clock
+) -> dict[int, list[RowFault]]:
+    """Return all that is wrong with rows, in their order."""
+    faults = {row + 1: list(of_row) for row, of_row in numbers.unread.items()}
+    for finding in unknown_times(numbers, clock):
+        faults.setdefault(finding.row or 0, []).append(RowFault(finding.message, (finding.column or "",)))
+    poses, others = np.split(numbers.values, [len(roles.columns) - len(roles.further)], axis=1)
+    for row in np.flatnonzero(~np.isfinite(poses).all(axis=1)).tolist():
+        of_row = faults.setdefault(row + 1, [])
+        if not all(fault.columns for fault in of_row):
+            continue  # the row as a whole
+        reported = {name for fault in of_row for name in fault.columns}
+        names: dict[str, list[str]] = {}  # columns in which the same was found
+        for column, value in zip(roles.columns, poses[row].tolist(), strict=False):
+            if not math.isfinite(value) and column.header not in reported:
+                text = "no number" if math.isnan(value) else str(value)
+                names.setdefault(text, []).append(column.header)
+        of_row += [RowFault(f"found {text}, allowed: {ALLOWED}", (*same,)) for text, same in names.items()]
+    for (name, column), values in zip(roles.further.items(), others.T, strict=True):
+        fits = further[name].fits(values) | np.isnan(values)
+        for row in np.flatnonzero(~fits).tolist():
+            text = f"found {values[row]:g}, allowed: {further[name].allowed}"
+            faults.setdefault(row + 1, []).append(RowFault(text, (column.header,)))
+    return {row: faults[row] for row in sorted(faults)}
+
+
+def _fill_times(known: IntArray, times: IntArray, rows: int) -> IntArray:
+    """Return a time for each row: known ones as they are, others in even steps between and around them."""
+    if len(known) == rows:
+        return times
+    step = int(np.median(np.diff(times) // np.diff(known))) if len(known) > 1 else int(DEFAULT_PERIOD * 1e9)
+    row = np.arange(rows)
+    before, after = times[0] + (row - known[0]) * step, times[-1] + (row - known[-1]) * step
+    inside = times[0] + np.rint(np.interp(row, known, times - times[0])).astype(np.int64)
+    filled = np.where(row < known[0], before, np.where(row > known[-1], after, inside))
+    filled[known] = times
+    return np.asarray(filled, dtype=np.int64)
+
+
+# Poses
+
+
+def _to_poses(
+    plan: Plan,
+    values: FloatArray,
+    faults: dict[int, list[RowFault]],
+    form: RotationForm | None,
+    further: Mapping[str, ExtraColumn],
 ) -> PoseTable:
     """Return the rows in SI, the pose of a row with a fault as NaN, and what was found out about units."""
     finder = UnitFinder(UnitSources(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
     columns = plan.roles.rotation
-    placed, turned, others = np.split(rows.values.copy(), [3, 3 + len(columns)], axis=1)
-    for part in (placed, turned):
-        part[_without_pose(plan, rows)] = np.nan
-    lengths, warnings = _length_units(plan, finder, placed)
-    position = placed * [unit.factor for unit in lengths]
-    beside, told = _further(plan, finder, others, further, lengths)
-    table = PoseTable(plan, position, None, beside, rows.clock, rows.faults, (), tuple(warnings))
-    if form is None:
-        return replace(table, inferences=(*finder.inferences, *told))
-    by_name = [one.unit if one else None for one in finder.sources.of_rotation(columns, (form,))]
-    units, assumed = rotation_units(columns, form, _finite(turned), by_name)
-    rotation, none = target_rotations(columns, form, turned * [unit.factor for unit in units])
-    position[list(none)] = np.nan
-    faults = {row: [*rows.faults.get(row, ())] for row in sorted({*rows.faults, *(k + 1 for k in none)})}
-    for index, fault in none.items():
-        faults[index + 1].append(fault)
-    found = form_inference([column.header for column in columns], form, units[0], "their names, or as given")
-    return replace(
-        table,
-        rotation=rotation,
-        faults=faults,
-        inferences=(*finder.inferences, *told, found),
-        warnings=(*warnings, *assumed),
-    )
-
-
-def _without_pose(plan: Plan, rows: Rows) -> list[int]:
-    """Return the rows, from 0, in which something else is wrong than a further column."""
+    position, turns, others = np.split(values.copy(), [3, 3 + len(columns)], axis=1)
     beside = {column.header for column in plan.roles.further.values()}
-    return [
-        row - 1
-        for row, faults in rows.faults.items()
-        if not all(fault.columns and beside.issuperset(fault.columns) for fault in faults)
-    ]
+    for row, of_row in faults.items():
+        if not all(fault.columns and beside.issuperset(fault.columns) for fault in of_row):
+            position[row - 1], turns[row - 1] = np.nan, np.nan
+    lengths, warnings = _length_units(plan, finder, position)
+    position *= [unit.factor for unit in lengths]
+    extra, inferences = dict[str, FloatArray](), list[Inference]()
+    for (name, column), cells in zip(plan.roles.further.items(), others.T, strict=True):
+        factor = 1.0
+        if further[name].length and finder.sources.find(column, ("length",)):
+            factor = finder.settle_positions([column], np.zeros((1, 1)))[0].factor
+        elif further[name].length:
+            factor = lengths[0].factor
+            inferences.append(unit_inference([column], lengths[0].name, "as x, y, z", "named", every=False))
+        extra[name] = np.where(np.isnan(cells), further[name].empty, cells * factor)
+    rotation = None
+    if form is not None:
+        by_name = [found.unit if found else None for found in finder.sources.of_rotation(columns, (form,))]
+        units, assumed = _rotation_units(columns, form, _finite_rows(turns), by_name)
+        rotation, wrong = _to_rotations(columns, form, turns * [unit.factor for unit in units])
+        position[list(wrong)] = np.nan
+        for index, fault in wrong.items():
+            faults.setdefault(index + 1, []).append(fault)
+        headers = [column.header for column in columns]
+        inferences.append(form_inference(headers, form, units[0], "their names, or as given"))
+        warnings += assumed
+    faults = {row: faults[row] for row in sorted(faults)}
+    about = (*finder.inferences, *inferences)
+    return PoseTable(plan, position, rotation, extra, None, faults, about, tuple(warnings))
 
 
 def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[list[Unit], list[LogWarning]]:
@@ -332,74 +453,117 @@ def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[l
     columns = plan.roles.position
     units = finder.settle_positions(columns, np.zeros((1, 3)))
     source = plan.tables.known.units if plan.tables.known else {}
-    told = "length" in source or any(one.unit or one.number in plan.units for one in columns)
-    nearest = np.abs(_finite(values)).max(axis=1).min(initial=np.inf)
-    if told or not MAX_REACH < nearest < np.inf:
+    stated = "length" in source or any(column.unit or column.number in plan.units for column in columns)
+    nearest = np.abs(_finite_rows(values)).max(axis=1).min(initial=np.inf)
+    if stated or not MAX_REACH < nearest < np.inf:
         return units, []
-    said = f"no unit is given for {listed(columns)}: they are taken as m, though every row is beyond any arm"
+    message = (
+        f"no unit is given for {listed(columns)}: they are taken as m, though every row is beyond any arm"
+    )
     hints = (Hint("unit", {"": "mm"}, "overrides this"),)
-    return units, [LogWarning("assumed-unit", said, hints=hints)]
+    return units, [LogWarning("assumed-unit", message, hints=hints)]
 
 
-def _further(
-    plan: Plan,
-    finder: UnitFinder,
-    values: FloatArray,
-    further: Mapping[str, ExtraColumn],
-    lengths: Sequence[Unit],
-) -> tuple[dict[str, FloatArray], list[Inference]]:
-    """Return the columns beside the poses in SI, and the units that they share with x, y, z."""
-    found, said = {}, []
-    for (name, column), cells in zip(plan.roles.further.items(), values.T, strict=True):
-        factor = 1.0
-        if further[name].length and finder.sources.find(column, ("length",)):
-            factor = finder.settle_positions([column], np.zeros((1, 1)))[0].factor
-        elif further[name].length:
-            factor = lengths[0].factor
-            said.append(unit_inference([column], lengths[0].name, "as x, y, z", "named", every=False))
-        found[name] = np.where(np.isnan(cells), further[name].empty, cells * factor)
-    return found, said
-
-
-def _finite(values: FloatArray) -> FloatArray:
-    """Return the rows without NaN."""
+def _finite_rows(values: FloatArray) -> FloatArray:
     return values[np.isfinite(values).all(axis=1)]
 
 
-def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> None:
-    """Raise if columns without names are left over, or the orientation stands in another table.
+# Orientation
 
-    Args:
-        plan: What is to be read.
-        naming: The remedy where columns have no names.
-        named: Whether the user names the columns of the pose.
-        timed: Whether the user names the time.
+
+def _rotation_form(
+    plan: Plan, file: str, requested: RotationForm | None, *, named: bool
+) -> tuple[RotationForm | None, list[LogWarning]]:
+    """Return the form of the orientation, None if the rows are positions, and what was assumed.
+
+    rz, ry, rx are angles about the moving axes Z, Y, X; a header in the order rx, ry, rz may also mean a
+    rotation vector, as UR writes: it is taken as the angles, with a warning.
 
     Raises:
-        LogError: With what may be read instead.
+        LogError: If only a part of an orientation is there, its form is not known, or a form is given for
+            positions.
     """
-    layout, used = plan.tables.layouts[plan.main], [*plan.clock.columns, *plan.roles.columns]
-    file = str(layout.path)
-    if len(plan.used) > 1:
-        found = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
-        raise LogError(Finding(f"{found}, allowed: one table", file))
-    cells = len(layout.names) - (not layout.names[-1])
-    if layout.header is None and cells > len(used) and not (plan.roles.rotation or named):
-        time = " beside the time" if plan.clock.columns else ""
-        count = cells - len(plan.clock.columns)
-        found = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
-        raise LogError(Finding(found, file, hints=tuple(_remedies(count, naming, timed=timed or bool(time)))))
+    columns, forms = plan.roles.rotation, plan.roles.forms
+    if not columns and requested:
+        found = f"{requested} given for {listed(plan.roles.position)} and no orientation"
+        allowed = "its columns beside them"
+        raise LogError(Finding(file=file, parameter="rotation", found=found, allowed=allowed, hints=(NAMED,)))
+    if not columns:
+        patterns = (  # KUKA's A, B, C may be anything
+            pattern
+            for words in vocabulary().tcp_rotations
+            if words.forms != ("zyx",)
+            for pattern in words.patterns
+            if "axis" in pattern.groupindex
+        )
+        parts = [*patterns]
+        unused = [] if named else _unused_columns(plan)
+        if half := [column for column in unused if any(part.search(column.key) for part in parts)]:
+            found, allowed = listed(half), "all of rz, ry, rx or of qx, qy, qz, qw, or none"
+            message = f"found {found} as a part of an orientation, allowed: {allowed}"
+            raise LogError(Finding(message, file, hints=(NAMED,)))
+        return None, []
+    if len(forms) == 1:
+        return forms[0], []
+    if not all(column.words & _OUR_ANGLES for column in columns):
+        hints = tuple(Hint("rotation", form, "specifies it") for form in forms)
+        message = f"found {listed(columns)}, which may be {' or '.join(forms)}, allowed: one form"
+        raise LogError(Finding(message, file, hints=hints))
+    if columns[0].index > columns[1].index > columns[2].index:
+        return "rpy", []
+    message = f"{listed(columns)} are taken as angles about the moving axes Z, Y, X (rz, ry, rx)"
+    hints = (Hint("rotation", "vector", "if they are a rotation vector, as UR writes"),)
+    return "rpy", [LogWarning("assumed-rotation", message, hints=hints)]
 
 
-def _remedies(count: int, naming: str, *, timed: bool) -> Iterator[Hint]:
-    """Yield remedies for so many columns without names: a header, the form of the orientation, the time."""
-    yield Hint("", effect=naming)
-    yield from (Hint("rotation", form, "specifies it") for form in FORMS if 3 + column_count(form) == count)
-    if not timed and count - 1 in {3, *(3 + column_count(form) for form in FORMS)}:
-        yield Hint("time", "1", "if the first is the time")
+def _rotation_units(
+    columns: Sequence[Column], form: RotationForm, values: FloatArray, stated: Sequence[Unit | None]
+) -> tuple[list[Unit], list[LogWarning]]:
+    """Return the unit of each column of an orientation, rad where none is stated, and what was assumed.
+
+    That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn or
+    they are called A, B, C as KUKA's, which are in degrees. Values are those of finite rows in the file's
+    units, shape (n, columns).
+    """
+    if not is_angular(form):
+        return [PURE] * len(columns), []
+    known = [unit for unit in stated if unit is not None]
+    if known:
+        return [unit or known[0] for unit in stated], []
+    units = [vocabulary().units["rad"]] * len(columns)
+    beyond = len(values) > 0 and bool(np.median(np.abs(values).max(axis=1)) > MAX_RAD)
+    if not beyond and not any(column.key in _KUKA_ANGLES for column in columns):
+        return units, []
+    why = ", though most are beyond a turn" if beyond else ""
+    message = f"no unit is given for {listed(columns)}: they are taken as rad{why}"
+    return units, [LogWarning("assumed-unit", message, hints=unit_hints(columns[:1], "deg"))]
 
 
-def _about_file(plan: Plan) -> Iterator[Inference]:
-    """Yield what was found out about the file before its rows were read."""
-    for found in (plan.tables, plan.tables.layouts[plan.main], plan.clock, plan.roles):
-        yield from found.inferences
+def _to_rotations(
+    columns: Sequence[Column], form: RotationForm, values: FloatArray
+) -> tuple[FloatArray, dict[int, RowFault]]:
+    """Return the rotation matrices [-], shape (n, 3, 3), and by index what is wrong with rows that hold none.
+
+    Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and has no fault.
+    """
+    names = tuple(column.header for column in columns)
+    faults = {row: RowFault(reason, names) for row, reason in _iter_no_rotations(values, form)}
+    sound = values.copy()
+    sound[list(faults)] = np.nan
+    return to_matrices(to_quaternions(sound, form)), faults
+
+
+def _iter_no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int, str]]:
+    """Yield index and reason of rows that hold no rotation: by a quaternion's norm, a matrix's R R^T."""
+    if form.startswith("quat"):
+        norm = np.linalg.norm(values, axis=1)
+        for row in np.flatnonzero(np.abs(norm - 1.0) > MAX_NORM_ERROR).tolist():
+            yield row, f"found a quaternion of norm {norm[row]:.6g}, allowed: 1 within {MAX_NORM_ERROR:g}"
+    elif form == "matrix":
+        r = values.reshape(-1, 3, 3)
+        off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        with np.errstate(invalid="ignore"):  # rows with NaN, which have faults already
+            det = np.linalg.det(r)
+        for row in np.flatnonzero((off > ORTHOGONAL) | (det < 0)).tolist():
+            found = f"R R^T off I by {off[row]:.3g} and det R = {det[row]:.3g}"
+            yield row, f"found {found}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"

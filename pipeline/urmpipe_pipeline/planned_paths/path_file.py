@@ -16,8 +16,7 @@ from urmpipe_pipeline.logs.columns import Column, listed
 from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.text import fingerprint
 from urmpipe_pipeline.logs.log_map import LogMap
-from urmpipe_pipeline.logs.target_rows import ExtraColumn
-from urmpipe_pipeline.logs.targets import PoseTable, read_pose_table
+from urmpipe_pipeline.logs.targets import ExtraColumn, PoseTable, read_pose_table
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.planned_paths.row_checks import are_radii, are_variants, curve_faults
 

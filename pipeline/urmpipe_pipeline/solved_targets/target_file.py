@@ -15,8 +15,7 @@ from urmpipe_pipeline.logs.clock import even_clock, unused_period
 from urmpipe_pipeline.logs.columns import listed
 from urmpipe_pipeline.logs.formats.text import fingerprint
 from urmpipe_pipeline.logs.log_map import LogMap
-from urmpipe_pipeline.logs.target_rows import NAMED
-from urmpipe_pipeline.logs.targets import PoseTable, read_pose_table
+from urmpipe_pipeline.logs.targets import NAMED, PoseTable, read_pose_table
 
 FEWEST = 3
 """An orientation has at least so many columns."""
