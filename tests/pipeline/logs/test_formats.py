@@ -271,6 +271,7 @@ JOINTS = {
 ASSUMED = {"assumed-unit", "assumed-joints"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", FORMATS)
 def test_every_format_is_the_log_of_its_csv(what: str, tmp_path: Path, expected: JointLog) -> None:
     path = tmp_path / f"log{Path(what).suffix}"
@@ -325,6 +326,7 @@ def test_text_in_a_mat_file(tmp_path: Path) -> None:
 EPISODES: dict[str, Any] = {"demo_0/q": Q, "demo_0/t": T, "demo_1/q": Q[:40], "demo_1/t": T[:40]}
 
 
+@pytest.mark.slow
 def test_episodes_and_lengths_are_questions(tmp_path: Path) -> None:
     path = tmp_path / "demos.hdf5"
     lengths = {0: 60, 1: 50, 10: 40}
@@ -424,6 +426,7 @@ def test_times_in_cells(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(log.t_ns, us * 1000, rtol=0, atol=1000 if "date" in name else 0)
 
 
+@pytest.mark.slow
 def test_ingest_a_workbook_without_options(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -496,6 +499,7 @@ def data_set(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_each_episode_of_a_data_set_is_a_choice(data_set: Path) -> None:
     assert follow(data_set, ["--episode 0", "--episode 1", "--episode 2"]) == [*LENGTHS.values()]
     for number, rows in LENGTHS.items():
@@ -571,6 +575,7 @@ DAMAGED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DAMAGED)
 def test_cut_files_are_one_line(name: str, tmp_path: Path) -> None:
     path, (parts, text) = tmp_path / f"log{Path(name).suffix}", DAMAGED[name]
@@ -581,6 +586,7 @@ def test_cut_files_are_one_line(name: str, tmp_path: Path) -> None:
         assert re.fullmatch(re.escape(f"{path}{text}") + "[^\n]+", refusal(LogError, read_log, [path]))
 
 
+@pytest.mark.slow
 def test_files_without_samples_are_one_line(tmp_path: Path) -> None:
     path = tmp_path / "log"
     h5(path, images=IMAGES)
@@ -603,6 +609,7 @@ def test_files_without_samples_are_one_line(tmp_path: Path) -> None:
         assert refusal(LogError, read, path) == f"{path}: {fault}; {save}"
 
 
+@pytest.mark.slow
 def test_what_unpacks_to_too_much_is_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "log.h5", "w") as file:
         file.create_dataset("q", (10**9, 6), "f4", chunks=(1000, 6), compression="gzip")

@@ -156,7 +156,8 @@ def is_period(name: str) -> bool:
 def times_of_period(period: float, rows: int, evidence: str) -> tuple[dict[str, Array], Inference]:
     """Return the column of even times in [ns], shape (rows,), of a time between samples in [s]."""
     times = np.rint(np.arange(rows) * (period * 1e9)).astype(np.int64)
-    return {"t [ns]": times}, Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),))
+    inference = Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),), basis="named")
+    return {"t [ns]": times}, inference
 
 
 def find_even_times(

@@ -20,7 +20,7 @@ import pyarrow as pa
 
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.formats.bag import Message, make_decoder, open_bag
 from urmpipe_pipeline.logs.formats.files import choice_error, question
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
@@ -117,7 +117,9 @@ def read_bag(path: Path, options: LogMap) -> MemoryTable:
     elif kind in JOINTS:
         rows = _select_joints(rows, options.joints, path, warnings)
     unread = [other for other in counts if other != name]
-    inferences = [Inference("topic", title, why, hints=tuple(Hint("topic", other) for other in unread[:1]))]
+    hints = tuple(Hint("topic", other) for other in unread[:1])
+    basis: Basis = "given" if options.topic else "named"
+    inferences = [Inference("topic", title, why, hints=hints, basis=basis)]
     table = _build_table(rows, name, path, clock, inferences, warnings)
     if unread:
         inferences.append(Inference("topics not read", topics.format_list(unread), "a log is one topic"))

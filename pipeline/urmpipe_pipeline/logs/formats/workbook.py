@@ -18,7 +18,7 @@ from zipfile import BadZipFile, ZipFile
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError, format_value
 from urmpipe_pipeline.file_contents import Cell, Row, Sheet, clock_text
-from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.joint_log import Basis, Inference
 from urmpipe_pipeline.logs.formats.cells import is_number
 from urmpipe_pipeline.logs.formats.files import (
     choice_error,
@@ -62,7 +62,8 @@ def read_workbook(path: Path, options: LogMap) -> Segment | None:
     save = Hint("", effect="open it in a spreadsheet program and save it again")
     sheets = read_separately(path, "a workbook", "workbook", hints=(save,))
     sheet, why = _choose_sheet(path, sheets, options.sheet)
-    inference = Inference("sheet", sheet.name, why, hints=(Hint("sheet"),))
+    basis: Basis = "named" if options.sheet is None else "given"
+    inference = Inference("sheet", sheet.name, why, hints=(Hint("sheet"),), basis=basis)
     return text_segment(path, "\n".join(_lines(sheet.rows, options.decimal)) + "\n", "\t", (inference,))
 
 
