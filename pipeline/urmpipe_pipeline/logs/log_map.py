@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from numbers import Real
 from typing import Any, NamedTuple, TypeAlias
 
@@ -22,6 +22,7 @@ COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
 UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
 SIDE = "a word in the names of columns, such as actual, or several, such as arm2_solved"
 EPISODES = "an episode by number or name, or COLUMN=VALUE"
+LAYOUTS = "table, transposed, flat:N or flat-by-joint:N, with N numbers a sample"
 ROWS = "rows from 1, both ends included, such as 2:-1 or 1:99,101:-1; -1 is the last"
 INTERVALS = "two ends for all revolute joints, or ends by joint, such as q1=-180:180"
 
@@ -34,6 +35,70 @@ class Evidence(NamedTuple):
 
     basis: Basis
     why: str
+
+
+def _is_word(value: Any) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _is_column(value: Any) -> bool:
+    return isinstance(value, str) or _is_number(value)
+
+
+def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    """Return a test for lists of such values; a text and a table are none."""
+
+    def fit(value: Any) -> bool:
+        is_single = isinstance(value, (str, Mapping)) or hasattr(value, "columns")
+        return not is_single and isinstance(value, Iterable) and all(map(fits, value))
+
+    return fit
+
+
+def _are_named(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, Mapping) and all(map(fits, value.values()))
+
+
+def is_interval(value: Any) -> bool:
+    """Return whether a value is two ends: numbers in the file's own unit, or angles with units."""
+    angle = compatible_units("rad")
+    kinds = (_is_number, lambda end: isinstance(end, str) and math.isfinite(quantity_to_si(end, angle)))
+    return any(_are(fits)(value) for fits in kinds) and len(value) == 2
+
+
+def _is_name(value: Any) -> bool:
+    return _is_column(value) and value != ""
+
+
+def _is_text_of(pattern: str) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, str) and re.fullmatch(pattern, value) is not None
+
+
+def _entry(fits: Callable[[Any], bool], allowed: str, default: Any = None) -> Any:
+    """Return a field of the map with its test, and the text of what it takes."""
+    metadata = {"fits": fits, "allowed": allowed}
+    if default == {}:
+        return field(default_factory=dict, metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+_ROWS = r"(-?[1-9]\d*)?:(-?[1-9]\d*)?(,(-?[1-9]\d*)?:(-?[1-9]\d*)?)*"
+_LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
+_SIDES = r"(?s).*[^\W_].*"
+_TEXT = (_is_word, "a non-empty text")
+_NAME = "a column by name or number, or FILE:COLUMN"
+_COLUMNS = (_are(_is_column), COLUMNS)
+_FRAME = (
+    lambda value: _are(_is_number)(value) and len(value) in (0, 3, 6),
+    "X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
+)
+_FLAG = (lambda value: isinstance(value, bool), "True or False")
+_PAIR = (lambda value: _are(_is_word)(value) and len(value) == 2, "two words")
+_FORM = (_is_text_of("|".join(FORMS)), ", ".join(FORMS))
 
 
 @dataclass(frozen=True)
@@ -83,35 +148,35 @@ class LogMap:
         questions: The entries that are open, with their choices as hints.
     """
 
-    source: str | None = None
-    delimiter: str | None = None
-    decimal: str | None = None
-    layout: str | None = None
-    sheet: str | None = None
-    topic: str | None = None
-    episode: str | None = None
-    rows: str | None = None
-    time: str | None = None
-    joints: tuple[str, ...] = ()
-    names: tuple[str, ...] = ()
-    signs: tuple[int, ...] = ()
-    offsets: tuple[float, ...] = ()
-    position: tuple[str, ...] = ()
-    orientation: tuple[str, ...] = ()
-    rotation: RotationForm | None = None
-    unit: Mapping[str, str] = field(default_factory=dict)
-    period: float | None = None
-    skip_bad: bool = False
-    interval: Mapping[str, GivenInterval] = field(default_factory=dict)
-    repair: bool = False
-    side: str | None = None
-    poses: bool = False
-    measured: tuple[str, ...] = ()
-    shared: bool = False
-    pair: tuple[str, str] | None = None
-    robot: str | None = None
-    base: tuple[float, ...] = ()
-    tool: tuple[float, ...] = ()
+    source: str | None = _entry(*_TEXT)
+    robot: str | None = _entry(*_TEXT)
+    base: tuple[float, ...] = _entry(*_FRAME, ())
+    tool: tuple[float, ...] = _entry(*_FRAME, ())
+    delimiter: str | None = _entry(*_TEXT)
+    decimal: str | None = _entry(*_TEXT)
+    layout: str | None = _entry(_is_text_of(_LAYOUTS), LAYOUTS)
+    sheet: str | None = _entry(_is_name, "a sheet by name or number")
+    topic: str | None = _entry(*_TEXT)
+    episode: str | None = _entry(_is_name, EPISODES)
+    rows: str | None = _entry(_is_text_of(_ROWS), ROWS)
+    side: str | None = _entry(_is_text_of(_SIDES), SIDE)
+    time: str | None = _entry(_is_name, _NAME)
+    period: float | None = _entry(_is_number, "a number, in s")
+    poses: bool = _entry(*_FLAG, False)
+    joints: tuple[str, ...] = _entry(*_COLUMNS, ())
+    names: tuple[str, ...] = _entry(_are(_is_column), "a list of names, such as ['q1', 'q2']", ())
+    signs: tuple[int, ...] = _entry(_are(_is_number), "a list of 1 or -1, such as [1, -1]", ())
+    offsets: tuple[float, ...] = _entry(_are(_is_number), "a list of numbers, such as [0.0, 90.0]", ())
+    position: tuple[str, ...] = _entry(*_COLUMNS, ())
+    orientation: tuple[str, ...] = _entry(*_COLUMNS, ())
+    rotation: RotationForm | None = _entry(*_FORM)  # noqa: RUF009 (a field)
+    measured: tuple[str, ...] = _entry(*_COLUMNS, ())
+    skip_bad: bool = _entry(*_FLAG, False)
+    repair: bool = _entry(*_FLAG, False)
+    unit: Mapping[str, str] = _entry(_are_named(_is_word), UNITS, {})
+    interval: Mapping[str, GivenInterval] = _entry(_are_named(is_interval), INTERVALS, {})
+    shared: bool = _entry(*_FLAG, False)
+    pair: tuple[str, str] | None = _entry(*_PAIR)
     evidence: Mapping[str, Evidence] = field(default_factory=dict, compare=False, repr=False)
     notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
     questions: tuple[Finding, ...] = field(default=(), compare=False, repr=False)
@@ -122,20 +187,19 @@ class LogMap:
         Raises:
             OptionError: With everything that is of a wrong kind.
         """
-        for one in fields(self):
-            if isinstance(value := getattr(self, one.name), Iterator):  # can be looked through only once
-                object.__setattr__(self, one.name, tuple(value))
+        for entry in fields(self):
+            if isinstance(value := getattr(self, entry.name), Iterator):  # can be iterated only once
+                object.__setattr__(self, entry.name, tuple(value))
         for name in ("unit", "interval"):
             object.__setattr__(self, name, _for_all(getattr(self, name)))
-        wrong = [
-            Finding(parameter=one.name, found=format_value(value), allowed=allowed)
-            for one in fields(self)
-            if one.name in _KINDS
-            for value, (fits, allowed) in [(getattr(self, one.name), _KINDS[one.name])]
-            if not ((value is None and one.default is None) or fits(value))
-        ]
-        if wrong:
-            raise OptionError(*wrong)
+        errors = []
+        for entry in fields(self):
+            value, metadata = getattr(self, entry.name), entry.metadata
+            if metadata and not ((value is None and entry.default is None) or metadata["fits"](value)):
+                found = format_value(value)
+                errors.append(Finding(parameter=entry.name, found=found, allowed=metadata["allowed"]))
+        if errors:
+            raise OptionError(*errors)
         for name in ("joints", "names", "position", "orientation", "measured"):
             object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
         object.__setattr__(self, "signs", tuple(int(s) if s == int(s) else s for s in self.signs))
@@ -149,102 +213,22 @@ class LogMap:
         object.__setattr__(self, "interval", intervals)
 
 
-def _is_word(value: Any) -> bool:
-    return isinstance(value, str) and value != ""
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _is_column(value: Any) -> bool:
-    return isinstance(value, str) or _is_number(value)
-
-
-def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Return what tells whether a value is a list of such; a text and a table are none."""
-
-    def fit(value: Any) -> bool:
-        alone = isinstance(value, (str, Mapping)) or hasattr(value, "columns")
-        return not alone and isinstance(value, Iterable) and all(map(fits, value))
-
-    return fit
-
-
-def _are_named(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: isinstance(value, Mapping) and all(map(fits, value.values()))
-
-
-def is_interval(value: Any) -> bool:
-    """Return whether a value is two ends: numbers in the file's own unit, or angles with units."""
-    angle = compatible_units("rad")
-    kinds = (_is_number, lambda end: isinstance(end, str) and math.isfinite(quantity_to_si(end, angle)))
-    return any(_are(fits)(value) for fits in kinds) and len(value) == 2
-
-
-def _is_name(value: Any) -> bool:
-    return _is_column(value) and value != ""
-
-
-def _is_rows(value: Any) -> bool:
-    return isinstance(value, str) and re.fullmatch(_ROWS, value) is not None
-
-
-def _is_layout(value: Any) -> bool:
-    return isinstance(value, str) and re.fullmatch(_LAYOUTS, value) is not None
-
-
-_ROWS = r"(-?[1-9]\d*)?:(-?[1-9]\d*)?(,(-?[1-9]\d*)?:(-?[1-9]\d*)?)*"
-_LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
-_WORDS = re.compile(r"[^\W_]")
-_TEXT = (_is_word, "a non-empty text")
-_COLUMNS = (_are(_is_column), COLUMNS)
-_FRAME = (
-    lambda value: _are(_is_number)(value) and len(value) in (0, 3, 6),
-    "X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
+KEYS = tuple(
+    entry.name
+    for entry in fields(LogMap)
+    if entry.metadata and entry.default is not MISSING and entry.name not in ("shared", "pair")
 )
-_FLAG = (lambda value: isinstance(value, bool), "True or False")
+"""The keys of a map before its tables, in the order in which it is written."""
 
-_KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
-    "source": _TEXT,
-    "delimiter": _TEXT,
-    "decimal": _TEXT,
-    "layout": (_is_layout, "table, transposed, flat:N or flat-by-joint:N, with N numbers a sample"),
-    "sheet": (_is_name, "a sheet by name or number"),
-    "topic": _TEXT,
-    "episode": (_is_name, EPISODES),
-    "rows": (_is_rows, ROWS),
-    "time": (_is_name, "a column by name or number, or FILE:COLUMN"),
-    "joints": _COLUMNS,
-    "names": (_are(_is_column), "a list of names, such as ['q1', 'q2']"),
-    "signs": (_are(_is_number), "a list of 1 or -1, such as [1, -1]"),
-    "offsets": (_are(_is_number), "a list of numbers, such as [0.0, 90.0]"),
-    "position": _COLUMNS,
-    "orientation": _COLUMNS,
-    "rotation": (lambda value: isinstance(value, str) and value in FORMS, ", ".join(FORMS)),
-    "unit": (_are_named(_is_word), UNITS),
-    "period": (_is_number, "a number, in s"),
-    "skip_bad": _FLAG,
-    "interval": (_are_named(is_interval), INTERVALS),
-    "repair": _FLAG,
-    "shared": _FLAG,
-    "side": (lambda value: _is_word(value) and _WORDS.search(value) is not None, SIDE),
-    "pair": (lambda value: _are(_is_word)(value) and len(value) == 2, "two words"),
-    "poses": _FLAG,
-    "measured": _COLUMNS,
-    "robot": _TEXT,
-    "base": _FRAME,
-    "tool": _FRAME,
-}
-"""What each field takes, and what to say of anything else."""
+TABLES = ("unit", "interval")
+"""The tables of a map."""
 
-
-READING = tuple(name for name in _KINDS if name not in ("robot", "base", "tool"))
-"""The fields that say how a log is read, without its arm."""
+READING = (*(key for key in KEYS if key not in ("robot", "base", "tool")), *TABLES, "shared", "pair")
+"""The fields that state how a log is read, without its arm."""
 
 
 def _for_all(value: Any) -> Any:
-    """Return a value that is given for all joints that turn as a mapping; what is one already as it is."""
+    """Return a value for all revolute joints as a mapping; a mapping as it is."""
     return {"": value} if isinstance(value, (str, list, tuple)) and value else value
 
 

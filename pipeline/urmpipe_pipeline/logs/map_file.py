@@ -20,42 +20,10 @@ from urmpipe_pipeline.joint_log import Basis, Inference, JointLog, LogColumn, Ro
 from urmpipe_pipeline.logs.clock import TIME_FILE, split_file_column
 from urmpipe_pipeline.logs.formats.opening import TABLE
 from urmpipe_pipeline.logs.formats.table import ROWS_READ
-from urmpipe_pipeline.logs.log_map import READING, Evidence, LogMap
+from urmpipe_pipeline.logs.log_map import KEYS, READING, TABLES, Evidence, LogMap
 from urmpipe_pipeline.logs.rotation import PURE
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
 from urmpipe_pipeline.outputs import MAP_HEADER
-
-TABLES = ("unit", "interval")
-KEYS = (
-    *(
-        "source",
-        "robot",
-        "base",
-        "tool",
-        "delimiter",
-        "decimal",
-        "layout",
-        "sheet",
-        "topic",
-        "episode",
-        "rows",
-        "side",
-    ),
-    *(
-        "time",
-        "period",
-        "poses",
-        "joints",
-        "names",
-        "signs",
-        "offsets",
-        "position",
-        "orientation",
-        "rotation",
-    ),
-    *("measured", "skip_bad", "repair"),
-)
-"""The keys of a map before its tables, in this order."""
 
 FRAME_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
