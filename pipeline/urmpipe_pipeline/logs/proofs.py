@@ -45,11 +45,8 @@ from urmpipe_pipeline.logs.vocabulary import Quantity, Unit, vocabulary
 
 Key = TypeVar("Key", bound=Hashable)
 
-Units: TypeAlias = tuple[Unit, ...]
-"""The unit of each column of a group."""
-
-Reading: TypeAlias = tuple[Units, Units]
-"""The units of the joints, and those of the recorded x, y, z."""
+Units: TypeAlias = tuple[Unit, ...]  # of each column of a group
+UnitReading: TypeAlias = tuple[Units, Units]  # of the joints, and of the recorded x, y, z
 
 SAMPLES = 400  # rows that decide, spread evenly over a log
 MAX_SHARE = 0.03  # of the motion, within which kinematics agree: calibration and a late clock explain less
@@ -58,24 +55,26 @@ MIN_SHARE_APART = 0.01  # ... and smaller ones by this share of the motion
 MAX_TOOL = 2.0  # [m], length of a tool; a longer one turns a small rotation into any motion
 MAX_STRETCH = 1.1  # singular values of M are within this factor of 1
 MIN_SPREAD = 0.02  # of a motion along an axis, as a share of its longest one, that determines M there
-DECOYS = (0.5, 2.0)  # scales of all joints or lengths that a proof excludes as well: else a tool explains any
+DECOY_SCALES = (
+    0.5,
+    2.0,
+)  # scales of all joints or lengths that a proof excludes as well: else a tool explains any
 FREE_BASE = 3  # index of the last of the four fits
 MIN_ROWS = (1, 5, 8, 12)  # of each fit: at least twice as many numbers as unknowns
 MAX_COORDINATE = 1e15  # in any unit; a larger one is an error of its file, and its square is infinite
-CELLS = 50  # of the motion of the joint that moves most: rows at rest count as one
-REJECTED = 3.0  # times the median residual, from which a row is left out of a fit
+CELLS_PER_MOTION = 50  # of the motion of the joint that moves most: rows at rest count as one
+MAX_RESIDUAL_RATIO = 3.0  # times the median residual, from which a row is left out of a fit
 MIN_TURN = 0.1  # standard deviation as rad, below which another base or tool does as much
-TURNS = 60  # rows whose pairs decide on an orientation
+MAX_ROTATION_ROWS = 60  # whose pairs decide on an orientation
 
 TURN = {"rad": math.tau, "deg": 360.0}
 ONE_TURN = math.tau * 1.01  # [rad], of joints that turn once either way, as UR's do: +-363 deg
 TWO_TURNS = 2 * math.tau  # [rad]; joints of arms turn no further either way
-WRAP_SLACK = 20.0 / 360.0  # share of a turn by which a step may differ from it
-FASTEST = 30.0  # [rad/s], a speed that no joint of an arm keeps up
+MAX_WRAP_DEVIATION = 20.0 / 360.0  # share of a turn by which a step may differ from it
+MAX_JOINT_SPEED = 30.0  # [rad/s]; no joint of an arm is faster for a tenth of the time
 MAX_DEGREES = 720.0  # [deg], two turns; larger values are ticks or per cent
-_SAMPLED = 10_000  # rows that show the usual size of values
-_WINDOW = 20  # rows over which a clock may hurry, as a recorder that stores late rows at once
-
+MAX_SIZE_ROWS = 10_000  # that show the usual size of values
+SPEED_WINDOW = 20  # rows over which a clock may hurry, as a recorder that stores late rows at once
 
 _FREED = ("", " with a tool of {}", " with another tool and base", " with a base that is turned")
 
@@ -125,7 +124,7 @@ def moving_rows(q: FloatArray, position: FloatArray) -> IndexArray:
         return rows
     turned, sparse = np.abs(q[rows] - np.median(q[rows], axis=0)), rows
     for share in (0.99, 0.9):  # of the rows, which show the size of the motion unless they are bad
-        cell = max(_quantile(joint, share) for joint in turned.T) / CELLS or 1.0
+        cell = max(_quantile(joint, share) for joint in turned.T) / CELLS_PER_MOTION or 1.0
         sparse = rows[np.sort(np.unique(np.rint(q[rows] / cell), axis=0, return_index=True)[1])]
         if len(sparse) >= MIN_ROWS[-1]:
             break
@@ -183,7 +182,7 @@ def _median_norm(vectors: FloatArray) -> float:
 
 def _are_near(residual: FloatArray) -> BoolArray:
     """Return which rows stay in a robust fit, by their residuals, shape (n,)."""
-    return np.asarray(residual <= max(REJECTED * float(np.median(residual)), 1e-9))
+    return np.asarray(residual <= max(MAX_RESIDUAL_RATIO * float(np.median(residual)), 1e-9))
 
 
 def _solve_robustly(a: FloatArray, b: FloatArray) -> tuple[FloatArray, float]:
@@ -246,12 +245,12 @@ class Recorded:
     lengths: tuple[Unit | None, ...]
 
     @cached_property
-    def stated(self) -> frozenset[Reading]:
+    def stated(self) -> frozenset[UnitReading]:
         """The readings that contradict no stated unit."""
         return frozenset(product(_complete(self.joints, "angle"), _complete(self.lengths, "length")))
 
     @cached_property
-    def usual(self) -> tuple[Reading, ...]:
+    def usual(self) -> tuple[UnitReading, ...]:
         """Those, and the readings in which all joints, or all of x, y, z, have one unit."""
         joints = [*_complete(self.joints, "angle"), *_complete((None,) * len(self.joints), "angle")]
         lengths = [*_complete(self.lengths, "length"), *_complete((None,) * len(self.lengths), "length")]
@@ -270,8 +269,8 @@ class Recorded:
 
 
 def fit_readings(
-    robot: Chain, recorded: Recorded, readings: Sequence[Reading], *, max_freedom: int = FREE_BASE
-) -> dict[Reading, Fit]:
+    robot: Chain, recorded: Recorded, readings: Sequence[UnitReading], *, max_freedom: int = FREE_BASE
+) -> dict[UnitReading, Fit]:
     """Return how near a robot comes to the recorded points with each of some readings."""
     q, position = recorded.rows
     factors = {units: np.array([unit.factor for unit in units]) for reading in readings for units in reading}
@@ -298,7 +297,7 @@ class KinematicUnits:
     lengths: Units
     freedom: int
     proved: tuple[bool, ...]
-    fits: Mapping[Reading, Fit]
+    fits: Mapping[UnitReading, Fit]
 
     @property
     def base(self) -> FloatArray:
@@ -349,8 +348,8 @@ def prove_by_kinematics(robot: Chain | None, recorded: Recorded) -> KinematicUni
     if best is None:
         return None
     (joints, lengths), freedom = best
-    decoys = [(_scale(joints, scale), lengths) for scale in DECOYS]
-    decoys += [(joints, _scale(lengths, scale)) for scale in DECOYS]
+    decoys = [(_scale(joints, scale), lengths) for scale in DECOY_SCALES]
+    decoys += [(joints, _scale(lengths, scale)) for scale in DECOY_SCALES]
     flipped = [(_flip(joints, j), lengths) for j in range(len(joints))]
     rivals = fit_readings(robot, recorded, [*decoys, *flipped], max_freedom=freedom)
     share = float(fits[joints, lengths].shares[freedom])
@@ -407,7 +406,7 @@ def rotation_distances(computed: FloatArray, recorded: FloatArray) -> tuple[floa
 
 def _relative_distance(computed: FloatArray, recorded: FloatArray) -> float:
     """Return the median difference of relative rotation vectors in [rad]; inf where too few rows turn."""
-    some = np.unique(np.linspace(0, len(computed) - 1, TURNS).astype(np.int64))
+    some = np.unique(np.linspace(0, len(computed) - 1, MAX_ROTATION_ROWS).astype(np.int64))
     i, j = np.triu_indices(len(some), 1)
     arm, measured = (
         to_rotation_vectors(quaternion_product(conjugate(q[some[i]]), q[some[j]]))
@@ -425,14 +424,12 @@ def _relative_distance(computed: FloatArray, recorded: FloatArray) -> float:
     return float(np.median(residual))
 
 
-@np.errstate(over="ignore", invalid="ignore")  # huge numbers: their steps are infinite
 def wraps_as_degrees(values: FloatArray) -> str | None:
     """Return why values are in deg, wraps by 360; None if there are none.
 
     Values within one turn may be in rad. They are in the file's own units, shape (n, columns).
     """
-    count = int(count_wraps(values, "deg").sum()) if peak(values) > math.tau else 0
-    return f"{format_count(count, 'step')} of about 360 from one row to the next" if count else None
+    return _format_wraps(values, "deg", "360") if peak(values) > math.tau else None
 
 
 def wraps_as_radians(values: FloatArray) -> str | None:
@@ -443,11 +440,15 @@ def wraps_as_radians(values: FloatArray) -> str | None:
     """
     if peak(values) > ONE_TURN:
         values = values[:, [j for j, column in enumerate(values.T) if peak(column) <= ONE_TURN]]
-    count = int(count_wraps(values, "rad").sum())
-    return f"{format_count(count, 'step')} of about 6.28 from one row to the next" if count else None
+    return _format_wraps(values, "rad", "6.28")
 
 
-@np.errstate(over="ignore", invalid="ignore")
+def _format_wraps(values: FloatArray, unit: str, turn: str) -> str | None:
+    count = int(count_wraps(values, unit).sum())
+    return f"{format_count(count, 'step')} of about {turn} from one row to the next" if count else None
+
+
+@np.errstate(over="ignore", invalid="ignore")  # huge numbers: their steps are infinite
 def count_wraps(values: FloatArray, unit: str) -> IntArray:
     """Return how often each column steps by a turn or two and continues from there, shape (columns,).
 
@@ -463,7 +464,7 @@ def count_wraps(values: FloatArray, unit: str) -> IntArray:
 
 
 def _count_wraps(values: FloatArray, turn: float) -> int:
-    steps, slack = np.abs(np.diff(values)), WRAP_SLACK * turn
+    steps, slack = np.abs(np.diff(values)), MAX_WRAP_DEVIATION * turn
     rows = np.flatnonzero(steps >= turn - slack)  # few: what is done with all steps costs most
     off = np.abs(steps[rows] - turn * np.clip(np.rint(steps[rows] / turn), 1, 2))
     rows, off = rows[off <= slack], off[off <= slack]
@@ -486,7 +487,7 @@ def too_fast_as_radians(values: FloatArray, t_ns: IntArray | None) -> str | None
     if t_ns is None or peak(values) <= math.tau:
         return None
     speed = max(_usual_speed(column, t_ns) for column in values.T)
-    if np.radians(speed) <= FASTEST < speed:
+    if np.radians(speed) <= MAX_JOINT_SPEED < speed:
         return f"as rad it would turn at {speed:.3g} rad/s for a tenth of the time"
     return None
 
@@ -504,7 +505,7 @@ def usual_peak(values: FloatArray) -> float:
 
     A spike is not among them. In any unit, shape (n, columns).
     """
-    some = np.abs(values[:: max(1, len(values) // _SAMPLED)])
+    some = np.abs(values[:: max(1, len(values) // MAX_SIZE_ROWS)])
     return max((_quantile(column[~np.isnan(column)], 0.99) for column in some.T), default=0.0)
 
 
@@ -522,7 +523,7 @@ def _usual_speed(column: FloatArray, t_ns: IntArray) -> float:
     dt = np.diff(t_ns) * 1e-9
     if not len(dt):
         return 0.0
-    starts = np.arange(0, len(dt), _WINDOW)
+    starts = np.arange(0, len(dt), SPEED_WINDOW)
     counts = np.diff(np.append(starts, len(dt)))
     around = np.repeat(np.add.reduceat(dt, starts) / counts, counts)
     rates = np.abs(np.diff(column)) / np.maximum(dt, around)

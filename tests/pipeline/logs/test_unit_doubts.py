@@ -133,7 +133,7 @@ UNLABELLED: Mapping[str, tuple[FloatArray, FloatArray, str]] = {
     "a clock in another unit": (5 * T[:, None], T / 1e3 * 5, "deg"),
     "a slide in mm": (np.column_stack((Q[:, :2], 300 + 200 * np.sin(T))), T, "asked"),
     "deg, fast": (Q * DEG * 2, T, "deg"),
-    "deg, slow": (Q * 5, T, "rad"),
+    "a slide in mm, wraps": (np.column_stack((WRAPPED[:, 5], 300 + 200 * np.sin(T))), T, "asked"),
 }
 
 
@@ -149,10 +149,10 @@ def test_without_a_unit_nothing_but_wraps_is_a_proof(case: str, read: Read, wron
     follow_hints(lambda **given: read(table, **given), log)
 
 
-def test_wraps_prove_radians_without_a_unit(read: Read) -> None:
-    log = read(csv(joints(), WRAPPED))
-    assert set(log.units.values()) == {"s", "rad"}
-    assert not log.warnings
+def test_wraps_prove_the_unit_of_joints_that_cannot_slide(read: Read) -> None:
+    assert not read(csv(joints(), WRAPPED)).warnings
+    assert not read(csv(joints(), WRAPPED * DEG), UR5E).warnings
+    assert assumed(read(csv(joints(), WRAPPED * DEG)))[0][0] == "q1, q2, q3, q4, q5 are in deg"
 
 
 def test_one_bad_row_decides_on_no_unit(read: Read) -> None:
