@@ -29,9 +29,9 @@ from urmpipe_pipeline.logs.convert import Reading
 from urmpipe_pipeline.logs.formats.files import unchanged
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, fingerprint_of
 from urmpipe_pipeline.logs.formats.opening import Tables, open_tables
-from urmpipe_pipeline.logs.formats.own import roles_of
 from urmpipe_pipeline.logs.formats.parquet import episode_file, is_data_set
 from urmpipe_pipeline.logs.formats.text import fingerprint
+from urmpipe_pipeline.logs.formats.urmpipe_tables import read_roles
 from urmpipe_pipeline.logs.log_map import READING, LogMap
 from urmpipe_pipeline.logs.map_file import file_entries
 from urmpipe_pipeline.logs.plan import Plan, make_plan, plan_topic
@@ -106,7 +106,7 @@ def open_map(files: Sequence[Path | MemoryTable], options: LogMap, error: LogErr
 
 def _with_own_clock(tables: Tables, options: LogMap) -> LogMap:
     """Return the options with the clock of a file that urmpipe wrote under another name."""
-    times = [k for k, role in roles_of(tables.layouts[0]).items() if role == "time"]
+    times = [k for k, role in read_roles(tables.layouts[0]).items() if role == "time"]
     if options.time is not None or len(tables.layouts) != 1 or len(times) != 1:
         return options
     name = key(split_unit(tables.layouts[0].names[times[0]])[0])

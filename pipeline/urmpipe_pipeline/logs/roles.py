@@ -44,8 +44,13 @@ from urmpipe_pipeline.logs.coverage import (
 )
 from urmpipe_pipeline.logs.formats.cells import grouped_number
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.own import GIVEN as GIVEN_KEY
-from urmpipe_pipeline.logs.formats.own import RECORDED, form_of, roles_of, stated_joints
+from urmpipe_pipeline.logs.formats.urmpipe_tables import GIVEN as GIVEN_KEY
+from urmpipe_pipeline.logs.formats.urmpipe_tables import (
+    RECORDED,
+    read_roles,
+    read_rotation_form,
+    stated_joints,
+)
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.names import (
     FIRST_NUMBER,
@@ -481,7 +486,7 @@ def written_roles(columns: Sequence[Column], table: LogTable, robot: Chain | Non
         LogError: If it has another number of joints.
     """
     by_index = {column.index: column for column in columns}
-    roles = [(by_index[index], role) for index, role in roles_of(table).items() if index in by_index]
+    roles = [(by_index[index], role) for index, role in read_roles(table).items() if index in by_index]
     groups = [tuple(column for column, of_column in roles if of_column == role) for role in ROLES[1:]]
     joints, rates, accelerations, position, rotation = groups
     if not joints and not position:
@@ -490,7 +495,7 @@ def written_roles(columns: Sequence[Column], table: LogTable, robot: Chain | Non
         check_count(joints, table.file, robot)
     names = tuple(column.name.removeprefix(RECORDED) for column in rotation)
     forms = (
-        [form for form in FORMS if form == form_of(table)]
+        [form for form in FORMS if form == read_rotation_form(table)]
         or [form for form, of_form in COLUMN_NAMES.items() if of_form == names]
         or [form for form in FORMS if column_count(form) == len(rotation)]
     )

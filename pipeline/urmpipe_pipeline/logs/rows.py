@@ -26,8 +26,8 @@ from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS, NO_TIME, UNREAD
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import SHOWN_FINDINGS, Numbers
 from urmpipe_pipeline.logs.formats.padding import without_padding
-from urmpipe_pipeline.logs.formats.table import ROWS_READ
-from urmpipe_pipeline.logs.formats.text_table import first_left_out
+from urmpipe_pipeline.logs.formats.row_choice import ROWS_READ
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.roles import Roles
 from urmpipe_pipeline.logs.timestamps import (
@@ -137,8 +137,8 @@ def _skip_unread(
 ) -> tuple[Numbers, list[LogWarning], list[Finding]]:
     """Return the numbers without rows that cannot be read, warnings, and how errors are left out."""
     warnings = []
-    if numbers.left_out:
-        line, text = first_left_out(table)
+    if numbers.left_out and isinstance(table, TextTable):
+        line, text = table.first_other_line()
         lines = f"{format_count(numbers.left_out, 'line')} without the labels of the rows"
         verb = "is" if numbers.left_out == 1 else "are"
         message = f"{lines} {verb} left out, first line {line}: {text}"

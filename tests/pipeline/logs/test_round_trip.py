@@ -18,10 +18,8 @@ from urmpipe_pipeline.logs.formats.numbers import ClockColumn
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import open_text
 from urmpipe_pipeline.logs.formats.text_table import (
+    BlockParser,
     RowReader,
-    byte_encoding,
-    clock_scales,
-    parse_block,
     row_blocks,
     squeeze,
 )
@@ -130,10 +128,10 @@ def test_rows_are_read_alone_as_they_are_parsed_together(table: Written) -> None
         clock = (ClockColumn(table.order.index(0), 0),)
         columns = [table.order.index(k + 1) for k in range(table.joints.shape[1])]
         block, reader = b"".join(row_blocks(layout)), RowReader(layout, columns, clock)
-    parsed = parse_block(layout, columns, clock, block, clock_scales(layout, clock))
-    by_row = reader.read(block.decode(byte_encoding(layout)).split("\n"))
+    parsed = BlockParser(layout, columns, clock).parse(block)
+    by_row = reader.read(block.decode(layout.byte_encoding).split("\n"))
     assert parsed is not None
-    assert not reader.verdict().findings
+    assert not reader.summary().findings
     np.testing.assert_array_equal(parsed.values, by_row.values)
     np.testing.assert_array_equal(parsed.clock, by_row.clock)
 

@@ -19,7 +19,7 @@ from urmpipe_pipeline.logs.formats.clock_forms import find_forms
 from urmpipe_pipeline.logs.formats.numbers import ClockColumn
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import open_text
-from urmpipe_pipeline.logs.formats.text_table import RowReader, clock_scales, parse_block, row_blocks
+from urmpipe_pipeline.logs.formats.text_table import BlockParser, RowReader, row_blocks
 from urmpipe_pipeline.logs.timestamps import read_text_times
 
 Read = Callable[..., JointLog]
@@ -301,7 +301,7 @@ def test_dates_are_exact_parsed_and_by_row(start: datetime, steps: list[int], wr
         key = {"us": "mdy", "german": "dmy", "counted": "us"}.get(writer, "")
         forms = find_forms(layout.cells(0))
         clock = (ClockColumn(0, forms=tuple(f for f in forms if key in f.keys) or forms),)
-        parsed = parse_block(layout, [1], clock, b"".join(row_blocks(layout)), clock_scales(layout, clock))
+        parsed = BlockParser(layout, [1], clock).parse(b"".join(row_blocks(layout)))
         by_row = RowReader(layout, [1], clock).read(text.splitlines()[1:])
         assert parsed is not None
         read = [read_text_times(layout, clock, numbers).clock for numbers in (parsed, by_row)]

@@ -18,8 +18,8 @@ import pyarrow.compute as pc
 from urmpipe_models.elementwise import IntArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.logs.formats.cells import Bytes, printable
-from urmpipe_pipeline.logs.formats.form import spread_names
 from urmpipe_pipeline.logs.formats.numbers import UNIT, arrow_column, is_number
+from urmpipe_pipeline.logs.formats.row_form import spread_names
 from urmpipe_pipeline.logs.formats.text import MOST_COLUMNS, refuse_wide
 
 EXPONENTS = {b"s": 9, b"ms": 6, b"us": 3, b"ns": 0}  # powers of ten from units of times to [ns]

@@ -1,8 +1,6 @@
-"""One line and one cell of a text table: how it is split, what is a number, what is a missing sample.
+"""Cells of text: how a line is split, what is a number, what a missing sample; a column of text as bytes.
 
-The cells of a column of text as bytes in one array, so that NumPy reads them.
-
-The lines above the numbers: names of the columns, groups over them, and their units.
+A column of text is `TextCells`: all bytes in one array, so that NumPy reads many cells of one length at once.
 """
 
 from __future__ import annotations
@@ -15,49 +13,33 @@ from contextlib import suppress
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal, DecimalException
 from functools import lru_cache
-from itertools import groupby, pairwise, repeat
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_pipeline.logs.formats.text import HeadLine
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
-SPACE = " "
-"""As a delimiter it stands for any run of spaces and tabs."""
-
+SPACE = " "  # as a delimiter it stands for any run of spaces and tabs
 DELIMITERS = (",", ";", "\t", SPACE, "|")
 DECIMALS = (".", ",")
+MAX_COARSE_DIGITS = 6  # significant digits of a format that is worth telling: its steps show in derivatives
+LONGEST_NS = 1 << 62  # times in [ns] stay below, 146 years: then their differences fit into 64 bits as well
+LONGEST_CELL = 64  # no form of a clock has more signs
+BLOCK = 1 << 15  # cells read at once: their bytes stay in the processor's cache
+_CACHED_CELLS = 1 << 14  # those of a file's head are looked at many times
 
-COARSE_DIGITS = 6
-"""A format of this many significant digits or fewer is worth telling: its steps show in derivatives."""
+_INFINITE = re.compile(r"[+-]?(?:inf|infinity|1\.#inf)\Z", re.IGNORECASE)
+_GROUPED = re.compile(r"(?<![\w.,])[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)(?![\w.,])")
 
-
-_CELLS = 1 << 14
-"""Cells that are remembered as numbers or not: those of a file's head are looked at many times."""
+Bytes = NDArray[np.uint8]
 
 
 @lru_cache
 def _number_pattern(decimal: str) -> re.Pattern[str]:
     point = re.escape(decimal)
     return re.compile(rf"[+-]?(?:\d+(?:{point}\d*)?|{point}\d+)(?:[eEdD][+-]?\d+)?\Z")
-
-
-LONGEST_NS = 1 << 62
-"""Times in [ns] stay below this, 146 years: then their differences fit into 64 bits as well."""
-
-_INFINITE = re.compile(r"[+-]?(?:inf|infinity|1\.#inf)\Z", re.IGNORECASE)
-
-
-_GROUPED = re.compile(r"(?<![\w.,])[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)(?![\w.,])")
-"""A number with a point or a comma between its thousands, and the other one before its decimals."""
-
-
-def grouped_number(text: str) -> str | None:
-    """Return the first number in a text that has signs between its thousands, as spreadsheets write it."""
-    found = _GROUPED.search(text)
-    return found[0] if found else None
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -82,11 +64,11 @@ def printable(text: str) -> str:
 
 
 def is_missing(cell: str) -> bool:
-    """Return whether a cell says that there is no sample: empty, Null, NaN, ..."""
+    """Return whether a cell stands for a missing sample: empty, Null, NaN, ..."""
     return cell.lower() in vocabulary().missing
 
 
-@lru_cache(_CELLS)
+@lru_cache(_CACHED_CELLS)
 def is_number(cell: str, decimal: str) -> bool:
     """Return whether a cell is a number with this decimal sign (infinities included)."""
     return bool(_number_pattern(decimal).match(cell) or _INFINITE.match(cell))
@@ -135,11 +117,17 @@ def to_nanoseconds(cell: str, decimal: str, exponent: int) -> int | None:
     return int(exact.to_integral_value(ROUND_HALF_EVEN)) if abs(exact) < LONGEST_NS else None
 
 
+def grouped_number(text: str) -> str | None:
+    """Return the first number in a text with signs between its thousands, as spreadsheets write; or None."""
+    match = _GROUPED.search(text)
+    return match[0] if match else None
+
+
 def significant_digits(cells: Iterable[str]) -> int | None:
     """Return the digits of a coarse fixed format such as +1.571e+00 (4), or None.
 
     Only numbers with an exponent tell: their mantissa shows the digits that the writer allowed itself.
-    Zeros are left out, since writers shorten them. The cells have a decimal point.
+    Zeros are ignored, since writers shorten them. The cells have a decimal point.
     """
     lengths = set()
     for cell in cells:
@@ -150,7 +138,7 @@ def significant_digits(cells: Iterable[str]) -> int | None:
         if not sign:
             return None
         lengths.add(len(digits))
-    return lengths.pop() if len(lengths) == 1 and max(lengths) <= COARSE_DIGITS else None
+    return lengths.pop() if len(lengths) == 1 and max(lengths) <= MAX_COARSE_DIGITS else None
 
 
 def count_up(cells: Sequence[str]) -> bool:
@@ -159,15 +147,6 @@ def count_up(cells: Sequence[str]) -> bool:
         return False
     first = int(cells[0])
     return list(cells) == [str(first + k) for k in range(len(cells))]
-
-
-Bytes = NDArray[np.uint8]
-
-BLOCK = 1 << 15
-"""Cells read at once: their bytes stay in the cache."""
-
-LONGEST_CELL = 64
-"""No form of a clock has more signs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,22 +165,20 @@ class TextCells:
     def of(cls, texts: Iterable[str]) -> TextCells:
         """Return texts as cells."""
         encoded = [text.encode("ascii", "replace") for text in texts]
-        starts = np.cumsum([0, *map(len, encoded)], dtype=np.int64)
-        return cls(np.frombuffer(b"".join(encoded), dtype=np.uint8), starts)
+        return cls(np.frombuffer(b"".join(encoded), dtype=np.uint8), _cumulate([*map(len, encoded)]))
 
     @classmethod
     def joined(cls, parts: Sequence[TextCells]) -> TextCells:
         """Return the cells of several parts of a column, one below the other."""
-        lengths = np.concatenate([np.diff(part.starts) for part in parts])
-        starts = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(lengths)))
+        starts = _cumulate(np.concatenate([np.diff(part.starts) for part in parts]))
         return cls(np.concatenate([part.data[part.starts[0] : part.starts[-1]] for part in parts]), starts)
 
     def at(self, rows: IntArray | slice) -> TextCells:
         """Return the cells of some rows: by index, shape (k,), or as a slice from the first one on."""
         lengths = np.diff(self.starts)[rows]
-        starts = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(lengths)))
-        place = np.repeat(self.starts[rows] - starts[:-1], lengths) + np.arange(starts[-1])
-        return TextCells(self.data[place], starts)
+        starts = _cumulate(lengths)
+        places = np.repeat(self.starts[rows] - starts[:-1], lengths) + np.arange(starts[-1])
+        return TextCells(self.data[places], starts)
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -213,7 +190,7 @@ class TextCells:
     def blocks(self) -> Iterator[tuple[IntArray, Bytes]]:
         """Yield some cells of one length each time: their rows, and their bytes, shape (n, length).
 
-        Empty cells, and those that are too long, are left out.
+        Empty cells, and those that are too long, are ignored.
         """
         for first in range(0, len(self), BLOCK):
             starts = self.starts[first : first + BLOCK + 1]
@@ -229,114 +206,5 @@ class TextCells:
                 yield rows + first, cells
 
 
-_UNIT = r"(?:[^\])\d]|(?<=[sm^])[23]|1(?=/))*"
-_BRACKETED = re.compile(rf"\[{_UNIT}\]|\({_UNIT}\)")
-"""A unit in brackets, such as [rad/s^2] or (1/min); with another number it is an index."""
-
-_COUNTED = re.compile(
-    r"(?P<stem>(Var|V|f|X|[Cc]ol(umn)?|[Ff]ield|[Cc]h(annel)?|data|ans|arr|Unnamed:)?[ _.]*)(?P<n>\d+)"
-)
-"""What programs call columns that nobody named: pandas, MATLAB, R, NumPy."""
-
-Row = list[str]
-
-
-def header_of(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tuple[int, Row] | None, Row]:
-    """Return line and names of the header, and the cells of a line of units between it and the data.
-
-    Where names repeat and the line above has groups that tell them apart, as Position and Velocity do over
-    the names of joints, a name is GROUP/NAME.
-    """
-    units: Row = []
-    split = [_header_cells(line.text, delimiter, width) for line in before]
-    for at in reversed(range(len(before))):
-        line, cells = before[at], split[at]
-        if abs(len(cells) - width) > 1 and (line.is_comment or len(cells) == 1):
-            continue  # a comment or a title
-        if not units and at > 0 and _all_units(cells, split[:at]):
-            units = cells
-            continue
-        if at and cells[0] and not any(cells[1:]):  # the name of an index alone, below those of the columns
-            split[at - 1] = [cells[0], *split[at - 1][1:]]
-            continue
-        above = split[at - 1] if at else []
-        names = _grouped(cells, above) if abs(len(above) - len(cells)) <= 1 else cells
-        same = names == cells and len(above) == len(cells)
-        units = above if not units and same and _all_units(above, [cells]) else units
-        return (line.number, [printable(cell) for cell in names]), units
-    return None, units
-
-
-def only_count(names: Sequence[str]) -> bool:
-    """Return whether names say nothing but the numbers of their columns: 0, 1, 2 of pandas, Var1, Var2."""
-    found = [_COUNTED.fullmatch(name) for name in names if name]
-    if len(found) < 3 or not all(found):
-        return False
-    parts = [(match["stem"], int(match["n"])) for match in found if match]
-    return len({stem for stem, _ in parts}) == 1 and all(b == a + 1 for (_, a), (_, b) in pairwise(parts))
-
-
-def numbered(above: HeadLine, row: Sequence[str], delimiter: str) -> bool:
-    """Return whether a row of numbers is the second line of a header: it counts up below each group.
-
-    Below q, q, q, qd, qd, qd stand 1, 2, 3, 1, 2, 3, as pandas writes columns of two levels.
-    """
-    groups = _header_cells(above.text, delimiter, len(row))
-    if len(groups) != len(row):
-        return False
-    both = [(group, name) for group, name in zip(groups, row, strict=True) if name]
-    counts = {group: [name for _, name in cells] for group, cells in groupby(both, key=lambda pair: pair[0])}
-    return bool(counts) and all(
-        len(count) > 1 and count_up(count) and not group[-1:].isdigit() for group, count in counts.items()
-    )
-
-
-def _grouped(names: Row, above: Row) -> Row:
-    """Return names with the groups above them, where they repeat and with their groups do not."""
-    above = [*above, *("" for _ in range(len(names) - len(above)))][: len(names)]
-    groups, last = [], ""
-    for cell in above:
-        last = cell or last
-        groups.append(last)
-    joined = [
-        f"{group}/{name}" if group and name else name or own
-        for name, own, group in zip(names, above, groups, strict=True)
-    ]
-    return joined if _repeat(names) and not _repeat(joined) else names
-
-
-def _repeat(names: Row) -> bool:
-    """Return whether a name stands there twice."""
-    known = sorted(filter(None, names))
-    return any(one == other for one, other in pairwise(known))
-
-
-def _header_cells(text: str, delimiter: str, width: int) -> Row:
-    """Split a header line, with its own delimiter if only that gives a name a column (numpy.savetxt)."""
-    if width == 1:
-        return _over_one_column(text)
-    text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
-    for comment in ("#", "//", "% "):
-        text = text.removeprefix(comment)
-    tried = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
-    return next((cells for cells in tried if len(cells) == width), tried[0])
-
-
-def _over_one_column(text: str) -> Row:
-    """Split a header line over rows of one cell, which show no sign between cells: by what parts most names.
-
-    A name with its unit behind a comma is one, and so is a comment in words.
-    """
-    plain = text.strip().lstrip("#%/ ")
-    parts = max((split_line(plain, sign) for sign in DELIMITERS if sign != SPACE), key=len)
-    with_unit = len(parts) == 2 and vocabulary().unit(parts[1]) is not None
-    in_words = plain != text.strip() and any(" " in part for part in parts)
-    return split_line(plain, "\t") if with_unit or in_words else parts
-
-
-def _all_units(cells: Row, above: Sequence[Row]) -> bool:
-    """Return whether a line holds units alone: known ones, or any in brackets below a line of names."""
-    words = [cell.strip("[]() ") for cell in cells]
-    bracketed = all(_BRACKETED.fullmatch(cell.strip()) for cell in cells if cell.strip())
-    named = bracketed and any(len(row) == len(cells) for row in above)
-    return any(words) and (named or all(not word or vocabulary().unit(word) for word in words))
+def _cumulate(lengths: Sequence[int] | IntArray) -> IntArray:
+    return np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(lengths, dtype=np.int64)))

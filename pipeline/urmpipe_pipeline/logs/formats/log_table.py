@@ -1,10 +1,10 @@
 """A table of a log, from text or in memory: names, units, sampled cells, and one way to read its columns.
 
 1. The head: names of the columns, their units, the cells of the first rows, what was found out.
-2. `read`: the numbers of some columns and the times of a clock, with what is wrong with rows and cells.
+2. `read`: the numbers of some columns and the times of a clock, with the faults of rows and cells.
 3. All numbers, for what the first rows cannot prove: read once, when they are first looked at.
 
-`TextTable` and `ArrowTable` know where the rows stand. No table knows a joint.
+`TextTable` and `ArrowTable` know where the rows are. No table knows a joint.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing, is_number, plain, to_float
 from urmpipe_pipeline.logs.formats.clock_forms import UNPADDED_NS
 from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers
-from urmpipe_pipeline.logs.formats.padding import FEWEST_MARKS, MARKS, end_rows
+from urmpipe_pipeline.logs.formats.padding import MARKS, MIN_MARKS, end_rows
 
 MAX_SAMPLED_ROWS = 250  # rows whose cells decide how a table is written
 
@@ -46,7 +46,7 @@ class LogTable(ABC):
         inferences: What was found out.
         rows: Data rows of the file that are read, from 0 and ascending, shape (n,); None for all of them.
         applied: Options of reading that its format applied already, such as "topic" or "episode".
-        across: Whether the rows of its only column stand side by side in one line of text.
+        across: Whether one line of text has the rows of its only column.
         arrow: The Arrow table that it is, where it is no text: then it has no lines.
     """
 
@@ -67,7 +67,7 @@ class LogTable(ABC):
     @property
     @abstractmethod
     def path(self) -> Path:
-        """The file that it stands in, or the name of a table in memory."""
+        """Its file, or the name of a table in memory."""
 
     @abstractmethod
     def _read(
@@ -80,7 +80,7 @@ class LogTable(ABC):
 
     @abstractmethod
     def iter_cells(self) -> Iterator[list[str]]:
-        """Yield the cells of each row as text, without an empty one behind a trailing delimiter."""
+        """Yield the cells of each row as text, without an empty one after a trailing delimiter."""
 
     @abstractmethod
     def take(self, rows: IntArray, *inferences: Inference) -> Self:
@@ -88,11 +88,11 @@ class LogTable(ABC):
 
     @abstractmethod
     def lines_of(self, rows: Sequence[int]) -> dict[int, int]:
-        """Return the line of the file of some data rows, both from 1; none of a table in memory."""
+        """Return the line of the file of some data rows, both from 1; empty for a table in memory."""
 
     @property
     def file(self) -> str:
-        """The path of the file that it stands in."""
+        """The path of its file."""
         return str(self.path)
 
     @property
@@ -140,10 +140,10 @@ class LogTable(ABC):
         """
         arguments = tuple(columns), tuple(clock), allowed
         if not self._answers or self._answers[0][0] != arguments:
-            self._answers[:] = [(arguments, self._read_anew(columns, clock, allowed or {}))]
+            self._answers[:] = [(arguments, self._read_or_reuse(columns, clock, allowed or {}))]
         return self._answers[0][1]
 
-    def _read_anew(
+    def _read_or_reuse(
         self, columns: Sequence[int], clock: Sequence[ClockColumn], allowed: Mapping[int, str]
     ) -> Numbers:
         known = self.__dict__.get("all_rows")
@@ -162,10 +162,10 @@ class LogTable(ABC):
         return [cells.text(row).strip(" \"'") for row in range(len(cells))]
 
     def without_sampled_ends(self) -> Self:
-        """Return the table without sampled rows at the end that hold no sample: they tell of no column."""
+        """Return the table without sampled rows at the end that hold no sample: they describe no column."""
         width = min(map(len, self.sample), default=0)
         last = self.sample[-1][:width] if self.sample else ()
-        if sum(to_float(cell, self.decimal) in MARKS for cell in last) < FEWEST_MARKS:
+        if sum(to_float(cell, self.decimal) in MARKS for cell in last) < MIN_MARKS:
             return self
         columns = [[to_float(row[k], self.decimal) for row in self.sample] for k in range(width)]
         numeric = [column for column in columns if None not in column]
@@ -184,7 +184,7 @@ class LogTable(ABC):
 
     @cached_property
     def all_rows(self) -> Numbers:
-        """The numbers of the numeric columns in the file's own units, with what is wrong with them."""
+        """The numbers of the numeric columns in the file's units, with their faults."""
         return self._read(self.numeric_columns, (), {})
 
     @cached_property

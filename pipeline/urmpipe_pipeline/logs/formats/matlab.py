@@ -26,8 +26,8 @@ from urmpipe_pipeline.logs.formats.arrow_columns import EXPONENTS, decimals
 from urmpipe_pipeline.logs.formats.files import read_separately
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import UNIT, arrow_column
-from urmpipe_pipeline.logs.formats.own import ORDERS, POINT, RECORDED, with_roles
 from urmpipe_pipeline.logs.formats.text import refuse_unpacked, unpacked_limit
+from urmpipe_pipeline.logs.formats.urmpipe_tables import ORDERS, POINT, RECORDED, with_roles
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 

@@ -19,7 +19,6 @@ from urmpipe_pipeline.logs.formats.cells import (
     LONGEST_NS,
     TextCells,
     is_text,
-    only_count,
     to_float,
     to_nanoseconds,
 )
@@ -34,21 +33,14 @@ from urmpipe_pipeline.logs.formats.numbers import (
     arrow_column,
     is_number,
 )
-from urmpipe_pipeline.logs.formats.text_table import MAY_BE_MISSING
+from urmpipe_pipeline.logs.formats.sniff import only_count
+from urmpipe_pipeline.logs.formats.text_table import MAY_BE_MISSING, find_missing
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
-_DIGITS = 38
-"""Digits that a decimal of 128 bits holds."""
-
-_DECIMALS = _DIGITS // 2
-"""Those of them that stand behind the point."""
-
-_SMALL = 0.01
-"""Doubles of this size or more have no more decimals than that: 17 digits are theirs."""
-
-
-_HALF, _ULPS = 0.5, 4
-"""A product of two doubles is less than so many units of its last place off that of the decimals."""
+_DIGITS = 38  # of a decimal of 128 bits
+_DECIMALS = _DIGITS // 2  # those of them after the point
+_SMALL = 0.01  # doubles of this size or more have no more decimals than that: 17 digits are theirs
+_ULPS = 4  # units in the last place that a product of two doubles may be off that of the decimals
 
 Number = TypeVar("Number", np.float64, np.int64, np.uint64)
 
@@ -59,12 +51,12 @@ class MemoryTable:
 
     Attributes:
         name: What the log is called, in the place of a file's stem.
-        columns: The columns, an Arrow table; units and roles may stand in the metadata of its fields.
+        columns: The columns, an Arrow table; units and roles may be in the metadata of its fields.
         named: Whether its columns have names; without them they are known by number, from 1.
         path: The file that it was read from; None of an object in memory.
         inferences: What was found out about it.
         applied: The reading options that its file was read by, such as "episode": they are done with.
-        source: Name of the source that its schema states, which tells units.
+        source: Name of the source that its schema states, which defines units.
         warnings: Warnings about its file.
     """
 
@@ -107,23 +99,24 @@ class ArrowTable(LogTable):
         for j, column in enumerate(columns):
             values[:, j], wrong = numbers_of(table.column(column))
             for row, text in wrong.items():
-                said = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
-                faults.setdefault(row, []).append(RowFault(said, (self.names[column],)))
+                message = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
+                faults.setdefault(row, []).append(RowFault(message, (self.names[column],)))
         findings = tuple(
             Finding(fault.said, self.file, row=self.file_row(row + 1), column=fault.columns[0])
             for row in sorted(faults)[:SHOWN_FINDINGS]
             for fault in faults[row]
         )
         rows = None if self.rows is None else self.rows + 1
-        found = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
+        faulty = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
         if not clock:
-            return Numbers(values, None, *found)
+            return Numbers(values, None, *faulty)
         texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)
         times = np.zeros(table.num_rows, dtype=np.int64)
         for part in () if texts else clock:
-            own = _nanoseconds(table.column(part.column), part.exponent)
-            times = np.where((own <= UNREADABLE) | (times <= UNREADABLE), np.minimum(own, times), times + own)
-        return Numbers(values, times, *found, texts=texts)
+            part_times = _nanoseconds(table.column(part.column), part.exponent)
+            is_known = (part_times > UNREADABLE) & (times > UNREADABLE)
+            times = np.where(is_known, times + part_times, np.minimum(part_times, times))
+        return Numbers(values, times, *faulty, texts=texts)
 
     def count_rows(self) -> int:
         """Return the number of rows."""
@@ -158,7 +151,7 @@ def to_log_table(memory: MemoryTable) -> ArrowTable:
     from urmpipe_pipeline.logs.formats.arrow_columns import plain_table  # its imports take long
 
     table = plain_table(memory.columns, str(memory.place))
-    _refuse_empty(memory, table)
+    _check_content(memory, table)
     named = memory.named and not only_count(table.column_names)
     names = tuple(table.column_names) if named else tuple(str(k + 1) for k in range(table.num_columns))
     units = tuple((field.metadata or {}).get(UNIT, b"").decode(errors="replace") for field in table.schema)
@@ -182,24 +175,24 @@ def sampled_cells(table: pa.Table) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
 
 
-def _refuse_empty(held: MemoryTable, table: pa.Table) -> None:
+def _check_content(memory: MemoryTable, table: pa.Table) -> None:
     """Raise a `LogError` if a table has no row, or none of its columns holds a number."""
-    file = str(held.place)
-    if not held.columns.num_rows or not held.columns.num_columns:
+    file = str(memory.place)
+    if not memory.columns.num_rows or not memory.columns.num_columns:
         raise LogError(Finding("found a table without rows, allowed: one row per sample", file))
     first = (_texts(column.slice(0, MAX_SAMPLED_ROWS)).to_pylist() for column in table.columns)
     if all(is_text(cell, ".") for cells in first for cell in cells if cell):
-        names = ", ".join(map(str, held.columns.column_names[:8]))
+        names = ", ".join(map(str, memory.columns.column_names[:8]))
         raise LogError(Finding(f"found no number in {names}, allowed: one column per joint", file))
 
 
-def fingerprint_of(held: MemoryTable) -> SourceFile:
+def fingerprint_of(memory: MemoryTable) -> SourceFile:
     """Return the name of a table in memory, and hash and length of its columns as Arrow streams them."""
     sink = _Hashing()
-    table = held.columns.combine_chunks()
+    table = memory.columns.combine_chunks()
     with pa.ipc.new_stream(pa.PythonFile(sink, "w"), table.schema.remove_metadata()) as stream:
         stream.write_table(table.replace_schema_metadata(None))
-    return SourceFile(held.name, sink.digest.hexdigest(), sink.size)
+    return SourceFile(memory.name, sink.digest.hexdigest(), sink.size)
 
 
 class _Hashing:
@@ -228,9 +221,9 @@ def numbers_of(column: pa.ChunkedArray) -> tuple[FloatArray, dict[int, str]]:
         numbers[missing] = np.nan
         return numbers, {}
     texts = column.to_pylist()
-    found = [np.nan if text is None else to_float(text, ".") for text in texts]
-    wrong = {row: texts[row] for row, value in enumerate(found) if value is None}
-    return np.array([np.nan if value is None else value for value in found], dtype=np.float64), wrong
+    parsed = [np.nan if text is None else to_float(text, ".") for text in texts]
+    wrong = {row: texts[row] for row, value in enumerate(parsed) if value is None}
+    return np.array([np.nan if value is None else value for value in parsed], dtype=np.float64), wrong
 
 
 def _values(column: pa.ChunkedArray, kind: type[Number]) -> tuple[NDArray[Number], BoolArray]:
@@ -243,11 +236,9 @@ def _values(column: pa.ChunkedArray, kind: type[Number]) -> tuple[NDArray[Number
     for chunk in filter(len, column.chunks):
         start, end = end, end + len(chunk)
         inside = slice(chunk.offset, chunk.offset + len(chunk))
-        there, numbers = chunk.buffers()
-        values[start:end] = np.frombuffer(numbers, dtype=kind)[inside]
+        values[start:end] = np.frombuffer(chunk.buffers()[1], dtype=kind)[inside]
         if chunk.null_count:
-            bits = np.unpackbits(np.frombuffer(there, dtype=np.uint8), bitorder="little")
-            missing[start:end] = bits[inside] == 0
+            missing[start:end] = find_missing(chunk)
     return values, missing
 
 
@@ -274,11 +265,11 @@ def _nanoseconds(column: pa.ChunkedArray, exponent: int) -> IntArray:
     """
     if pa.types.is_integer(column.type):
         unsigned = pa.types.is_uint64(column.type)
-        whole, missing = (
+        integers, missing = (
             _values(column, np.uint64) if unsigned else _values(column.cast(pa.int64()), np.int64)
         )
-        far = np.abs(whole.astype(np.float64)) * 10.0**exponent >= LONGEST_NS
-        times = np.where(far | missing, 0, whole).astype(np.int64) * 10**exponent
+        far = np.abs(integers.astype(np.float64)) * 10.0**exponent >= LONGEST_NS
+        times = np.where(far | missing, 0, integers).astype(np.int64) * 10**exponent
         return np.where(missing, NO_TIME, np.where(far, UNREADABLE, times))
     values, wrong = numbers_of(column)
     missing = np.isnan(values)
@@ -296,7 +287,7 @@ def _rounded(column: pa.ChunkedArray, values: FloatArray, exponent: int) -> IntA
     """
     product = values * 10.0**exponent
     near = np.rint(product)
-    sure = np.abs(product - near) + _ULPS * np.spacing(np.abs(product)) < _HALF
+    sure = np.abs(product - near) + _ULPS * np.spacing(np.abs(product)) < 0.5
     sure &= pa.types.is_float64(column.type)
     result = near.astype(np.int64)
     if not sure.all():

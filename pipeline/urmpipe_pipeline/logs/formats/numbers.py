@@ -1,6 +1,6 @@
-"""What type and metadata of an Arrow column tell: whether it holds numbers, its unit, its role.
+"""Numbers and times that are read of a table, in the file's units, with the faults of its rows.
 
-What is read of a table: numbers and times in the file's own units, and what is wrong with them.
+Columns of Arrow: which types are numbers, the keys of their unit and role.
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.logs.formats.cells import TextCells
 from urmpipe_pipeline.logs.formats.clock_forms import ClockForm
 
-UNIT, ROLE = b"unit", b"role"
-"""The keys of its unit, and of what it holds with its place among those of this role."""
+UNIT, ROLE = (
+    b"unit",
+    b"role",
+)  # keys of the unit of a column, and of its role and place
 
 JOINT = b"joint"  # the role of a column that is a joint, but in no known place
 
@@ -34,8 +36,7 @@ _PLAIN: Mapping[str, np.dtype[Any]] = {
     "b": np.dtype(np.uint8),
     "f2": np.dtype(np.float32),
     "f16": np.dtype(np.float64),
-}
-"""What holds values of types that Arrow has none for, or cannot write as text."""
+}  # for types that Arrow does not have, or cannot write as text
 
 
 def arrow_column(values: npt.NDArray[Any]) -> pa.Array:
@@ -43,14 +44,13 @@ def arrow_column(values: npt.NDArray[Any]) -> pa.Array:
     kind = values.dtype
     if kind.kind in "mM":
         return pa.array(values)
-    wanted = _PLAIN.get(kind.kind, _PLAIN.get(kind.str[1:], kind.newbyteorder("=")))
-    values = np.ascontiguousarray(values, dtype=wanted)
+    plain = _PLAIN.get(kind.kind, _PLAIN.get(kind.str[1:], kind.newbyteorder("=")))
+    values = np.ascontiguousarray(values, dtype=plain)
     buffers = [None, pa.py_buffer(values)]  # pyarrow.array imports pandas, which takes a second
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), buffers)
 
 
-SHOWN_FINDINGS = 20
-"""Findings that are told one by one; the others are counted."""
+SHOWN_FINDINGS = 20  # findings that are listed; further ones are counted
 
 
 def capped(findings: Sequence[Finding], file: str) -> list[Finding]:
@@ -66,7 +66,7 @@ class ClockColumn:
     Attributes:
         column: Its place.
         exponent: Power of ten from its unit to [ns]: 9 for s.
-        forms: What its cells may be if they are text: then exponent means nothing.
+        forms: The forms of its cells if they are text: then the exponent is not used.
     """
 
     column: int
@@ -76,7 +76,7 @@ class ClockColumn:
 
 @dataclass(frozen=True, slots=True)
 class RowFault:
-    """What is wrong with a row that cannot be used.
+    """The fault of a row that cannot be used.
 
     Attributes:
         said: What was found, and what is allowed.
@@ -100,11 +100,11 @@ class Numbers:
         values: Numbers in the file's own units, shape (n, columns); NaN where a sample is missing.
         clock: Time of each row in [ns] on the file's clock, shape (n,), or NO_TIME, REPORTED or UNREADABLE;
             None without a clock; without meaning while the texts of the clock are not read.
-        findings: What is wrong with rows and cells, the first of them.
+        findings: The first faults of rows and cells.
         wrong: How many such findings there are.
         lasting: Those of the findings that leaving out rows does not mend.
         unread: Rows that could not be read, by their index, with all that is wrong with each.
-        left_out: Lines among labelled rows that are none.
+        left_out: Lines among labelled rows that are not rows.
         rows: Data row of the file of each row, from 1, shape (n,), where some were left out.
         texts: The cells of the clock's columns, if they are text.
         inferences: What the clock's rows told about it.

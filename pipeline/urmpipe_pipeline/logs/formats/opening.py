@@ -1,4 +1,11 @@
-"""The tables of a log: what its files are, which source wrote them, how each table is written."""
+"""The tables of a log: what its files are, which source wrote them, how each table is written.
+
+1. Each file is opened: typed columns, a program or JSON become a table in memory, all else is text.
+2. A text is refused if it holds a merge conflict; CoppeliaSim's export is several tables in one file.
+3. Each table is sniffed: JSON lines, labels in rows, arrays in cells, or plain cells.
+4. Its rows are chosen: a row per sample (`layout`), then the rows and the episode that options name.
+5. The source: given as an option, stated by a schema, or known by the names of columns.
+"""
 
 from __future__ import annotations
 
@@ -15,21 +22,25 @@ from urmpipe_pipeline.logs.formats.bag import MAGIC, is_bag_folder, is_packed
 from urmpipe_pipeline.logs.formats.cells import is_number
 from urmpipe_pipeline.logs.formats.files import first_bytes, import_optional
 from urmpipe_pipeline.logs.formats.json import read_json, sniff_json_lines
-from urmpipe_pipeline.logs.formats.labels import refuse_among_rows, refuse_conflict, sniff_labels, with_names
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.own import in_si
+from urmpipe_pipeline.logs.formats.merge_conflict import refuse_among_rows, refuse_conflict
 from urmpipe_pipeline.logs.formats.programs import read_program
-from urmpipe_pipeline.logs.formats.shape import sniff_arrays, turned
-from urmpipe_pipeline.logs.formats.sniff import across, sniff
-from urmpipe_pipeline.logs.formats.table import choose_rows
+from urmpipe_pipeline.logs.formats.row_choice import choose_rows
+from urmpipe_pipeline.logs.formats.shape import orient_table
+from urmpipe_pipeline.logs.formats.sniff import GIVEN, across, sniff
+from urmpipe_pipeline.logs.formats.sniff_rows import name_echoed_columns, sniff_arrays, sniff_labels
 from urmpipe_pipeline.logs.formats.text import Segment, open_text, refuse_long_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
+from urmpipe_pipeline.logs.formats.urmpipe_tables import is_in_si
 from urmpipe_pipeline.logs.formats.workbook import read_workbook
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import KnownSource, vocabulary
 
 COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
+
+Sniff: TypeAlias = Callable[[Segment, str | None, str | None], TextTable]
+# finds out how a plain table is written, with delimiter and decimal sign as options give them
 
 
 def source_names() -> tuple[str, ...]:
@@ -43,11 +54,11 @@ class Tables:
 
     Attributes:
         source: Name of the source.
-        known: What is known of it, if anything.
-        layouts: How each table is written.
+        known: Its entry in the vocabulary, if it has one.
+        layouts: The tables.
         titles: Title of each table: the file's stem, or the graph's path.
         inferences: What was found out.
-        foreign: Whether its source was given, and has columns or graphs of its own, which are not there.
+        foreign: Whether its source was given, and has special columns or graphs, which are missing.
         warnings: Warnings about its files.
     """
 
@@ -62,11 +73,7 @@ class Tables:
     @property
     def paths(self) -> list[Path]:
         """The file of each table."""
-        return [layout.path for layout in self.layouts]
-
-
-Sniff: TypeAlias = Callable[[Segment, str | None, str | None], TextTable]
-"""What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
+        return [table.path for table in self.layouts]
 
 
 def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plain: Sniff = sniff) -> Tables:
@@ -82,56 +89,61 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
         found, allowed = format_value(options.source), ", ".join(source_names())
         raise OptionError(Finding(parameter="source", found=found, allowed=allowed))
     is_number.cache_clear()  # cells of other logs, which may be long
-    opened = map_collecting_errors(lambda one: _opened(one, options), files)
-    texts = [one for one in opened if isinstance(one, Segment)]
+    contents = map_collecting_errors(lambda file: _open_file(file, options), files)
+    texts = [content for content in contents if isinstance(content, Segment)]
     if options.sheet is not None and not options.shared and not any(text.delimiter for text in texts):
         sheet = format_value(options.sheet)
         raise OptionError(Finding(parameter="sheet", found=sheet, allowed="with a workbook"))
     markers = map_collecting_errors(refuse_conflict, texts)
-    titled = [
-        (log_stem(file) if isinstance(file, Path) else file.name, one)
-        for file, one in zip(files, opened, strict=True)
-    ]
-    forced, graphs = options.source == COPPELIASIM, list[tuple[str, Segment]]()
-    if len(texts) == len(files) == 1 and (
-        forced or (options.source is None and coppeliasim.is_export(texts[0]))
-    ):
-        graphs = coppeliasim.graphs(texts[0])
-        titled, forced = [*graphs] or titled, True
-    layouts = map_collecting_errors(lambda item: _layout(item[1], options, sniff_plain), titled)
-    map_collecting_errors(
-        lambda table: refuse_among_rows(*table),
-        zip([layout for layout in layouts if isinstance(layout, TextTable)], markers, strict=False),
-    )
+    titles = tuple(log_stem(file) if isinstance(file, Path) else file.name for file in files)
+    graphs: list[tuple[str, Segment]] = []
+    is_export = options.source == COPPELIASIM
+    if len(texts) == len(files) == 1 and options.source in (None, COPPELIASIM):
+        is_export = is_export or coppeliasim.is_export(texts[0])
+        graphs = coppeliasim.graphs(texts[0]) if is_export else []
+    if graphs:
+        titles, contents = tuple(title for title, _ in graphs), [segment for _, segment in graphs]
+    tables = map_collecting_errors(lambda content: _sniff(content, options, sniff_plain), contents)
+    text_tables = [table for table in tables if isinstance(table, TextTable)]
+    map_collecting_errors(lambda pair: refuse_among_rows(*pair), zip(text_tables, markers, strict=False))
     if len(files) > 1:
-        layouts = [across(layout) for layout in layouts]
-    layouts = _shaped(layouts, options) if sniff_plain is sniff else layouts
-    titles = tuple(title for title, _ in titled)
-    names = _names(layouts)
-    tables = [table for table in opened if isinstance(table, MemoryTable)]
-    stated = next((table.source for table in tables if table.source), "")
-    known, why = _known(names, options.source, titles if forced else (), stated)
-    if known is None and options.source is None and all(map(in_si, layouts)):
+        tables = [across(table) for table in tables]
+    if sniff_plain is sniff:
+        is_only = len(tables) == 1
+        oriented = map_collecting_errors(
+            lambda table: orient_table(table, options.layout, is_only=is_only), tables
+        )
+        tables = [table.without_sampled_ends() for table in choose_rows(oriented, options)]
+    in_memory = [content for content in contents if isinstance(content, MemoryTable)]
+    stated = next((memory.source for memory in in_memory if memory.source), "")
+    forms = (table.form for table in tables if isinstance(table, TextTable) and table.form)
+    names = [name for table in tables for name in table.names]
+    names += [label for form in forms for label in form.labels]
+    known, why = _find_source(names, options.source, titles if is_export else (), stated)
+    if known is None and options.source is None and all(map(is_in_si, tables)):
         known, why = vocabulary().source(URMPIPE_SOURCE), "what its columns are called, and their units"
-    name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
-    said = Inference("source", name, why, hints=(Hint("source"),), basis="named")
-    foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
-    foreign = foreign and options.source != stated
-    foreign = not graphs if options.source == COPPELIASIM else foreign
-    said_of_all = (*_encoding(texts[:1]), said)
-    warnings = tuple(warning for table in tables for warning in table.warnings)
-    return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, warnings)
+    name = options.source or (COPPELIASIM if is_export else known.name if known else TABLE)
+    is_foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
+    is_foreign = is_foreign and options.source != stated
+    inference = Inference("source", name, why, hints=(Hint("source"),), basis="named")
+    return Tables(
+        source=name,
+        known=known,
+        layouts=tuple(tables),
+        titles=titles,
+        inferences=(*_describe_text(texts[:1]), inference),
+        foreign=not graphs if options.source == COPPELIASIM else is_foreign,
+        warnings=tuple(warning for memory in in_memory for warning in memory.warnings),
+    )
 
 
-def _opened(one: Path | MemoryTable, options: LogMap) -> Segment | MemoryTable:
+def _open_file(file: Path | MemoryTable, options: LogMap) -> Segment | MemoryTable:
     """Return a table as it is in memory, a file of typed columns or a program read, any other as text."""
-    if isinstance(one, MemoryTable):
-        return one
-    if (typed := _read_typed(one, options)) is not None:
-        return typed
-    if (sheet := read_workbook(one, options)) is not None:
-        return sheet
-    text = open_text(one, any_suffix=options.source is not None)
+    if isinstance(file, MemoryTable):
+        return file
+    if (content := _read_typed(file, options) or read_workbook(file, options)) is not None:
+        return content
+    text = open_text(file, any_suffix=options.source is not None)
     table = read_program(text, options) or read_json(text, options)
     if table is None:
         refuse_long_lines(text)
@@ -168,49 +180,35 @@ def _read_typed(path: Path, options: LogMap) -> MemoryTable | None:
     return None
 
 
-def _shaped(layouts: Sequence[LogTable], options: LogMap) -> list[LogTable]:
-    """Return tables with a row a sample: the rows that are read, without end marks in what is sampled."""
-    alone = len(layouts) == 1
-    shaped = map_collecting_errors(lambda one: turned(one, options.layout, alone=alone), layouts)
-    return [one.without_sampled_ends() for one in choose_rows(shaped, options)]
+def _sniff(content: Segment | MemoryTable, options: LogMap, sniff_plain: Sniff) -> LogTable:
+    """Return a table: rows with labels, with arrays in their cells, or plain ones."""
+    if isinstance(content, MemoryTable):
+        return to_log_table(content)
+    signs = content.delimiter or options.delimiter, options.decimal
+    table = None if content.delimiter else sniff_json_lines(content)
+    table = table or (None if signs[0] else sniff_labels(content))
+    return table or sniff_arrays(content, *signs) or name_echoed_columns(sniff_plain(content, *signs))
 
 
-def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
-    """Yield the encoding of a text, and how its file was read."""
+def _describe_text(texts: Sequence[Segment]) -> Iterator[Inference]:
+    """Yield how the file of a text was read, and its encoding."""
     for text in texts:
         yield from text.inferences
-        if text.delimiter:
-            continue
-        mark = "byte order mark" if text.start else "its bytes"
-        utf_8 = (Hint("", effect="save the file as UTF-8"),)
-        yield Inference("encoding", text.encoding, mark, hints=utf_8)
+        if not text.delimiter:
+            evidence = "byte order mark" if text.start else "its bytes"
+            hints = (Hint("", effect="save the file as UTF-8"),)
+            yield Inference("encoding", text.encoding, evidence, hints=hints)
 
 
-def _layout(one: Segment | MemoryTable, options: LogMap, sniff_plain: Sniff) -> LogTable:
-    """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
-    if isinstance(one, MemoryTable):
-        return to_log_table(one)
-    given = one.delimiter or options.delimiter, options.decimal
-    found = None if one.delimiter else sniff_json_lines(one)
-    found = found or (None if given[0] else sniff_labels(one))
-    return found or sniff_arrays(one, *given) or with_names(sniff_plain(one, *given))
-
-
-def _known(
-    names: Sequence[str], given: str | None, graphs: Sequence[str], stated: str = ""
+def _find_source(
+    names: Sequence[str], chosen: str | None, graphs: Sequence[str], stated: str
 ) -> tuple[KnownSource | None, str]:
     """Return the source that is given, stated by a schema, or known by graphs or columns, and why."""
-    if given is not None:
-        return vocabulary().source(given), "given as an option"
+    if chosen is not None:
+        return vocabulary().source(chosen), GIVEN
     if stated:
         return vocabulary().source(stated), "the types of the messages"
     if graphs:
         return None, f"each graph has its path and header: {', '.join(graphs)}"
     known = next((source for source in vocabulary().sources if source.wrote(names)), None)
     return known, "the names of its columns" if known else "no source is known by these columns"
-
-
-def _names(layouts: Sequence[LogTable]) -> list[str]:
-    """Return the names of all columns and the labels of rows."""
-    labels = (table.form.labels if isinstance(table, TextTable) and table.form else () for table in layouts)
-    return [name for layout, more in zip(layouts, labels, strict=True) for name in (*layout.names, *more)]

@@ -27,8 +27,14 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.logs.formats.arrow_columns import exact_times, is_list
 from urmpipe_pipeline.logs.formats.files import choice_error, question
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.own import MARK, attributes_of, of_result, told_in, with_roles
 from urmpipe_pipeline.logs.formats.text import refuse_unpacked
+from urmpipe_pipeline.logs.formats.urmpipe_tables import (
+    MARK,
+    mark_result,
+    pandas_attributes,
+    read_metadata_json,
+    with_roles,
+)
 from urmpipe_pipeline.logs.log_map import LogMap
 
 if TYPE_CHECKING:
@@ -83,7 +89,7 @@ def dataframe_to_table(table: Any, name: str) -> MemoryTable:
         reason = str(error).partition("\n")[0].strip(" .")
         query = f"a {type(table).__name__} that cannot be read ({reason})"
         raise LogError(Finding(file=name, found=query, allowed="a table")) from error
-    return MemoryTable(name, of_result(_index_first(arrow), attributes_of(arrow.schema.metadata)))
+    return MemoryTable(name, mark_result(_index_first(arrow), pandas_attributes(arrow.schema.metadata)))
 
 
 def _read_dataframe(frame: pd.DataFrame, name: str) -> MemoryTable:
@@ -106,7 +112,7 @@ def _read_dataframe(frame: pd.DataFrame, name: str) -> MemoryTable:
             missing = values.isna()
             texts = [None if lacks else str(value) for value, lacks in zip(values, missing, strict=True)]
             arrays.append(pa.array(texts, pa.string()))
-    arrow = of_result(
+    arrow = mark_result(
         pa.Table.from_arrays(arrays, names=[label for label, _ in columns]), frame.attrs.get(MARK) or {}
     )
     return MemoryTable(name, arrow, named=not isinstance(frame.columns, pd.RangeIndex))
@@ -114,7 +120,7 @@ def _read_dataframe(frame: pd.DataFrame, name: str) -> MemoryTable:
 
 def _index_first(table: pa.Table) -> pa.Table:
     """Return a table that pandas made with its index in front, without a name where that has none."""
-    levels = told_in(table.schema.metadata, "pandas").get("index_columns")
+    levels = read_metadata_json(table.schema.metadata, "pandas").get("index_columns")
     names = table.column_names
     index = [name for name in (levels if isinstance(levels, list) else ()) if name in names]
     if not index or len(set(names)) < len(names):
@@ -193,7 +199,7 @@ def _read_file(path: Path, read: Callable[[], pa.Table], form: str, applied: Seq
         found = f"found a {form} file that cannot be read ({reason})"
         raise LogError(Finding(f"{found}, allowed: a whole one", str(path))) from None
     metadata = table.schema.metadata or {}
-    about = told_in(metadata, MARK)
+    about = read_metadata_json(metadata, MARK)
     if not about and MARK.encode() in metadata:
         found = f"found a {form} file of urmpipe whose metadata are damaged"
         raise LogError(Finding(f"{found}, allowed: as `export` wrote it", str(path)))
@@ -202,7 +208,7 @@ def _read_file(path: Path, read: Callable[[], pa.Table], form: str, applied: Seq
         if CLOCK in table.column_names and not (table.schema.field(CLOCK).metadata or {}).get(b"role"):
             table = exact_times(table.drop_columns([CLOCK]), table.column(CLOCK))
     else:
-        table = of_result(_index_first(table), attributes_of(metadata))
+        table = mark_result(_index_first(table), pandas_attributes(metadata))
     return MemoryTable(path.stem, table, path=path, applied=tuple(applied))
 
 

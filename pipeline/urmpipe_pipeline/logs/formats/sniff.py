@@ -1,12 +1,19 @@
-"""How a table is written: delimiter, decimal sign, header, where the data begin. Never from the locale."""
+"""How a table is written: delimiter, decimal sign, header, units, first row. Never from the locale.
+
+1. Style: the delimiter and decimal sign that make rows of one width, most of whose text is numbers.
+2. Data: the first row with numbers where most rows have them.
+3. Header: the last line of names above it, with a line of units and the groups over repeated names.
+4. Names: one for every cell of a row, also with an unnamed index or a trailing delimiter.
+"""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import islice
+from dataclasses import replace
+from itertools import groupby, islice, pairwise
+from typing import NamedTuple
 
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
@@ -17,12 +24,10 @@ from urmpipe_pipeline.logs.formats.cells import (
     SPACE,
     count_numbers,
     count_up,
-    header_of,
     is_missing,
     is_number,
     is_text,
-    numbered,
-    only_count,
+    printable,
     split_line,
 )
 from urmpipe_pipeline.logs.formats.clock_forms import is_clock_text
@@ -30,36 +35,33 @@ from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.text import FEWEST_LINES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
+from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.text import strip_apostrophe
 
-LEAST_FIT = 0.2
-"""A delimiter that fits less than this is not believed because it makes several columns."""
+MIN_FIT = 0.2  # a delimiter that fits less is not believed because it makes several columns
+FEW = 0.25  # share of the rows that may be damaged where the others tell how the table is written
+STYLE_LINES = 60  # lines that decide on the delimiter
+MAX_COUNT_DIGITS = 9  # of the number of a row: no table has a billion rows
+GIVEN = "given as an option"
 
-FEW = 0.25
-"""Share of the rows that may be damaged where the others tell how the table is written."""
-
-SCORED_LINES = 60
-"""Lines that decide on the delimiter."""
-
-COUNTED = 9
-"""So many digits a number of a row may have: no table has a billion rows."""
-
+_STATED_DELIMITER = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)  # the first line that Excel writes
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab", SPACE: "spaces", "|": "bar", ".": "point"}
 _SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": SPACE, "pipe": "|"}
-
-_TOLD = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)
 
 Row = list[str]
 
 
-@dataclass(frozen=True, slots=True)
-class _Style:
+class _Style(NamedTuple):
     """Delimiter and decimal sign, the width of most rows with them, and how well they fit, 0..1."""
 
     delimiter: str
     decimal: str
     width: int = 0
     fit: float = 0.0
+
+    @property
+    def credit(self) -> tuple[bool, float]:
+        return self.width > 1 and self.fit >= MIN_FIT, self.fit
 
 
 def sniff(
@@ -68,43 +70,52 @@ def sniff(
     decimal: str | None = None,
     lines: Sequence[HeadLine] | None = None,
 ) -> TextTable:
-    """Return how a table is written.
+    """Return a table by how it is written.
 
     Args:
         segment: The table's text.
-        delimiter: The sign between cells, or its name, if the file need not tell.
-        decimal: The decimal sign, or its name, if the file need not tell.
+        delimiter: The sign between cells, or its name, if the file need not show it.
+        decimal: The decimal sign, or its name, if the file need not show it.
         lines: The lines of its head with a plain cell for each array, if it holds arrays.
 
     Raises:
         LogError: If it holds no numbers, no rows, or a header that does not fit its rows.
-        OptionError: If delimiter or decimal is none that is allowed.
+        OptionError: If delimiter or decimal is not allowed.
     """
     lines = list(head_lines(segment)) if lines is None else lines
-    told, lines = _told_delimiter(lines)
-    delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
-    decimals = _choices("decimal", decimal, DECIMALS)
+    match = _STATED_DELIMITER.fullmatch(lines[0].text.rstrip("\r\n ")) if lines else None
+    stated, lines = (match[1], lines[1:]) if match else (None, lines)
+    delimiters = _signs("delimiter", delimiter or stated, DELIMITERS)
+    decimals = _signs("decimal", decimal, DECIMALS)
     body = [line for line in lines if not line.is_comment][:MAX_SAMPLED_ROWS]
-    style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
+    style = _best_style([line.text for line in body[:STYLE_LINES]], delimiters, decimals)
     rows = [split_line(line.text, style.delimiter) for line in body]
     width = _common_width(rows, style.decimal)
-    numeric = _numeric_columns(rows, width, style.decimal)
-    numbers = (i for i in range(len(rows)) if _is_data(rows, i, numeric, style.decimal))
-    data = list(islice(numbers, 2))
-    counted_below = (
-        len(data) > 1 and data[0] > 0 and numbered(body[data[0] - 1], rows[data[0]], style.delimiter)
-    )
-    first = data[1] if counted_below else next(iter(data), None)
+    first = _first_data_row(body, rows, width, style)
     if first is None:
-        given = {"delimiter": delimiter, "decimal sign": decimal}
-        raise LogError(_no_rows(segment, body, {what: sign for what, sign in given.items() if sign}))
-    _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
-    before = [line for line in lines if line.number < body[first].number]
-    header, units = header_of(before, style.delimiter, width)
-    names, said = _names(segment, header, body[first:], rows[first:], width)
+        options = {"delimiter": delimiter, "decimal sign": decimal}
+        raise LogError(_no_rows(segment, body, {what: sign for what, sign in options.items() if sign}))
+    widths = [len(row) for row in rows[first:]]
+    if 2 * widths.count(width) < len(widths):
+        text = body[first].text.strip()[:60]
+        message = f"found {text!r} and lines of {min(widths)} to {max(widths)} cells, allowed: a table"
+        raise LogError(Finding(message, file=str(segment.path), line=body[first].number))
+    above = [line for line in lines if line.number < body[first].number]
+    header, units = _find_header(above, style.delimiter, width)
+    names, inference = _name_cells(segment, header, body[first:], rows[first:], width)
     if header and only_count(names):
-        said = Inference("header", f"line {header[0]}", "its names only count: columns by number")
-        header, names = None, _by_number(names)
+        inference = Inference("header", f"line {header[0]}", "its names only count: columns by number")
+        if all(name.isdigit() for name in names if name):
+            names = tuple(str(k + 1) if name else "" for k, name in enumerate(names))  # users count from 1
+        header = None
+    by_rows = "the first line says so" if stated else f"it makes rows of {style.width} cells"
+    why = GIVEN if delimiter else by_rows
+    reads = GIVEN if decimal else "with it most cells are numbers"
+    inferences = [
+        Inference("delimiter", _NAMES[style.delimiter], why, hints=(Hint("delimiter"),), basis="named"),
+        Inference("decimal sign", _NAMES[style.decimal], reads, hints=(Hint("decimal"),), basis="named"),
+        inference,
+    ]
     return TextTable(
         segment=segment,
         delimiter=style.delimiter,
@@ -115,46 +126,47 @@ def sniff(
         first_line=body[first].number,
         offset=body[first].offset,
         sample=tuple(tuple(row) for row in rows[first:]),
-        inferences=(*_style_inferences(style, delimiter, decimal, told)[bool(segment.delimiter) :], said),
+        inferences=tuple(inferences[bool(segment.delimiter) :]),
     )
 
 
-def _by_number(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return names that only count, or in their place numbers from 1, as users have them."""
-    bare = all(name.isdigit() for name in names if name)
-    return tuple(str(k + 1) if name else "" for k, name in enumerate(names)) if bare else names
+def across(table: LogTable) -> LogTable:
+    """Return a text of a single line of numbers as one column; any other table as it is."""
+    is_line = table.header is None and len(table.sample) == 1 and len(table.names) > 2
+    if not isinstance(table, TextTable) or not is_line:
+        return table
+    if any(line.strip() for number, line in table.segment.lines() if number > table.first_line):
+        return table
+    cells = table.sample[0][: -1 if table.segment.has_more else None]  # of a longer line the last one is cut
+    sample = tuple((cell,) for cell in cells[:MAX_SAMPLED_ROWS])
+    return replace(table, names=("1",), sample=sample, across=True)
 
 
-def _told_delimiter(lines: Sequence[HeadLine]) -> tuple[str | None, Sequence[HeadLine]]:
-    """Return the delimiter that a first line sep=; tells (Excel), and the other lines."""
-    told = _TOLD.fullmatch(lines[0].text.rstrip("\r\n ")) if lines else None
-    return (told[1], lines[1:]) if told else (None, lines)
+def only_count(names: Sequence[str]) -> bool:
+    """Return whether names are nothing but numbers of columns: 0, 1, 2 of pandas, Var1, Var2."""
+    matches = [_COUNTED.fullmatch(name) for name in names if name]
+    if len(matches) < 3 or not all(matches):
+        return False
+    parts = [(match["stem"], int(match["n"])) for match in matches if match]
+    return len({stem for stem, _ in parts}) == 1 and all(b == a + 1 for (_, a), (_, b) in pairwise(parts))
 
 
-def across(layout: LogTable) -> LogTable:
-    """Return a table of a single line of numbers as one column; any other as it is."""
-    if not isinstance(layout, TextTable) or layout.header is not None:
-        return layout
-    if len(layout.sample) != 1 or len(layout.names) < 3:
-        return layout
-    lines = layout.segment.lines()
-    if any(line.strip() for number, line in lines if number > layout.first_line):
-        return layout
-    longer = layout.segment.has_more  # then the last value is cut
-    cells = layout.sample[0][: -1 if longer else None][:MAX_SAMPLED_ROWS]
-    column = tuple((cell,) for cell in cells)
-    return replace(layout, names=("1",), sample=column, across=True)
+_COUNTED = re.compile(
+    r"(?P<stem>(Var|V|f|X|[Cc]ol(umn)?|[Ff]ield|[Cc]h(annel)?|data|ans|arr|Unnamed:)?[ _.]*)(?P<n>\d+)"
+)  # what pandas, MATLAB, R and NumPy call columns that nobody named
 
 
-def _choices(parameter: str, given: str | None, allowed: Sequence[str]) -> Sequence[str]:
+def _signs(parameter: str, chosen: str | None, allowed: Sequence[str]) -> Sequence[str]:
     """Return the signs to try: the one given by the user, or all."""
-    if given is None:
+    if chosen is None:
         return allowed
-    sign = _SIGNS.get(given.lower(), given)
+    sign = _SIGNS.get(chosen.lower(), chosen)
     if sign not in allowed:
         names = ", ".join(_NAMES[sign] for sign in allowed)
-        allowed_signs = f"{names}, or the character itself"
-        raise OptionError(Finding(parameter=parameter, found=format_value(given), allowed=allowed_signs))
+        found = format_value(chosen)
+        raise OptionError(
+            Finding(parameter=parameter, found=found, allowed=f"{names}, or the character itself")
+        )
     return (sign,)
 
 
@@ -162,31 +174,27 @@ def _best_style(lines: Sequence[str], delimiters: Sequence[str], decimals: Seque
     """Return the style that fits best; of equals, the first.
 
     A single column is believed only where no delimiter makes more: 0,1 is two numbers before it is 0.1.
+    Spaces are not taken in place of tabs where they only part texts and make no more numbers.
     """
     best = _Style(delimiters[0], decimals[0])
+    best_rows: list[Row] = []
     for delimiter in delimiters:
         rows = [split_line(line, delimiter) for line in lines]
-        if _credit(best)[0] and all(len(row) < 2 for row in rows):
+        if best.credit[0] and all(len(row) < 2 for row in rows):
             continue
         for decimal in decimals:
             width = _common_width(rows, decimal)
             style = _Style(delimiter, decimal, width, _fit(rows, width, decimal))
-            if _credit(style) > _credit(best) and not _parts_words(lines, best, style):
-                best = style
+            if style.credit <= best.credit:
+                continue
+            if best.credit[0] and (best.delimiter, delimiter) == ("\t", SPACE):
+                with_spaces = sum(count_numbers(row, decimal) for row in rows)
+                if with_spaces <= sum(count_numbers(row, best.decimal) for row in best_rows):
+                    continue
+            best, best_rows = style, rows
         if best.width > 1 and best.fit == 1.0:
             break
     return best
-
-
-def _parts_words(lines: Sequence[str], best: _Style, style: _Style) -> bool:
-    """Return whether spaces, in place of tabs, only part texts: they make no more numbers."""
-    if (best.delimiter, style.delimiter) != ("\t", SPACE) or not _credit(best)[0]:
-        return False
-    with_tabs, with_spaces = (
-        sum(count_numbers(split_line(line, one.delimiter), one.decimal) for line in lines)
-        for one in (best, style)
-    )
-    return with_spaces <= with_tabs
 
 
 def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
@@ -200,22 +208,6 @@ def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
     return len(full) / len(rows) * numbers / sum(map(len, cells)) if full else 0.0
 
 
-def _credit(style: _Style) -> tuple[bool, float]:
-    return style.width > 1 and style.fit >= LEAST_FIT, style.fit
-
-
-def _style_inferences(
-    style: _Style, delimiter: str | None, decimal: str | None, told: str | None
-) -> list[Inference]:
-    given = "given as an option"
-    parts = "the first line says so" if told else f"it makes rows of {style.width} cells"
-    parts, reads = given if delimiter else parts, given if decimal else "with it most cells are numbers"
-    return [
-        Inference("delimiter", _NAMES[style.delimiter], parts, hints=(Hint("delimiter"),), basis="named"),
-        Inference("decimal sign", _NAMES[style.decimal], reads, hints=(Hint("decimal"),), basis="named"),
-    ]
-
-
 def _common_width(rows: Sequence[Row], decimal: str) -> int:
     """Return the width of most rows, each counted as often as it has numbers."""
     widths: Counter[int] = Counter()
@@ -224,39 +216,136 @@ def _common_width(rows: Sequence[Row], decimal: str) -> int:
     return widths.most_common(1)[0][0] if widths else 0
 
 
-def _numeric_columns(rows: Sequence[Row], width: int, decimal: str) -> list[int]:
-    """Return the columns in which at least half of the cells with content are numbers."""
-    full = [row for row in rows if len(row) == width]
-    columns = ([row[column] for row in full if not is_missing(row[column])] for column in range(width))
-    numbers = [(count_numbers(cells, decimal), len(cells)) for cells in columns]
-    return [column for column, (count, of) in enumerate(numbers) if count and 2 * count >= of]
+def _first_data_row(body: Sequence[HeadLine], rows: Sequence[Row], width: int, style: _Style) -> int | None:
+    """Return the index of the first row of data: at least half of it, where numbers belong, are numbers.
 
-
-def _is_data(rows: Sequence[Row], i: int, numeric: Sequence[int], decimal: str) -> bool:
-    """Return whether row i is data: at least half of it, where numbers belong, are numbers.
-
-    Of a row that is mostly empty, such as Rate,500,,,,, above a header, all must be.
+    Of a row that is mostly empty, such as Rate,500,,,,, above a header, all must be. Numbers belong into the
+    columns in which at least half of the cells with content are numbers.
     """
-    cells = [rows[i][column] for column in numeric if column < len(rows[i])]
-    cells = [cell for cell in cells if not is_missing(cell)]
-    numbers = [cell for cell in cells if is_number(cell, decimal)]
-    if 2 * len(cells) < len(numeric) and len(numbers) < len(cells):
-        return False
-    return bool(numbers) and 2 * len(numbers) >= len(cells) and not _is_numbered_header(rows, i, numbers)
+    full = [row for row in rows if len(row) == width]
+    columns = [[row[k] for row in full if not is_missing(row[k])] for k in range(width)]
+    counts = [count_numbers(cells, style.decimal) for cells in columns]
+    numeric = [k for k, count in enumerate(counts) if count and 2 * count >= len(columns[k])]
+
+    def is_data(row: Row) -> bool:
+        cells = [row[column] for column in numeric if column < len(row)]
+        cells = [cell for cell in cells if not is_missing(cell)]
+        numbers = [cell for cell in cells if is_number(cell, style.decimal)]
+        if 2 * len(cells) < len(numeric) and len(numbers) < len(cells):
+            return False
+        is_counted = row is rows[0] and _is_counted_header(rows, numbers)
+        return bool(numbers) and 2 * len(numbers) >= len(cells) and not is_counted
+
+    data = list(islice((k for k, row in enumerate(rows) if is_data(row)), 2))
+    if len(data) > 1 and data[0] > 0 and _counts_below(body[data[0] - 1], rows[data[0]], style.delimiter):
+        return data[1]
+    return next(iter(data), None)
 
 
-def _is_numbered_header(rows: Sequence[Row], i: int, numbers: Sequence[str]) -> bool:
+def _is_counted_header(rows: Sequence[Row], numbers: Sequence[str]) -> bool:
     """Return whether the first row holds the numbers 0, 1, 2, ... that pandas gives unnamed columns.
 
     pandas writes every float with a decimal point: whole numbers below mean that the row is data itself.
     """
-    if i > 0 or len(rows) == 1 or len(numbers) < 3 or not count_up(numbers):
+    if len(rows) == 1 or len(numbers) < 3 or not count_up(numbers):
         return False
-    others = len(rows[0]) - len(numbers)
-    return others <= 1 and not any(cell.isdigit() for cell in rows[1][others:])
+    texts = len(rows[0]) - len(numbers)
+    return texts <= 1 and not any(cell.isdigit() for cell in rows[1][texts:])
 
 
-def _names(
+def _counts_below(above: HeadLine, row: Sequence[str], delimiter: str) -> bool:
+    """Return whether a row of numbers is the second line of a header: it counts up below each group.
+
+    Below q, q, q, qd, qd, qd are 1, 2, 3, 1, 2, 3, as pandas writes columns of two levels.
+    """
+    groups = _split_header(above.text, delimiter, len(row))
+    if len(groups) != len(row):
+        return False
+    pairs = [(group, name) for group, name in zip(groups, row, strict=True) if name]
+    counts = {group: [name for _, name in cells] for group, cells in groupby(pairs, key=lambda pair: pair[0])}
+    return bool(counts) and all(
+        len(count) > 1 and count_up(count) and not group[-1:].isdigit() for group, count in counts.items()
+    )
+
+
+def _find_header(above: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tuple[int, Row] | None, Row]:
+    """Return line and names of the header, and the cells of a line of units between it and the data.
+
+    Where names repeat and the line above has groups that distinguish them, as Position and Velocity do over
+    the names of joints, a name is GROUP/NAME.
+    """
+    units: Row = []
+    split = [_split_header(line.text, delimiter, width) for line in above]
+    for k in reversed(range(len(above))):
+        line, cells = above[k], split[k]
+        if abs(len(cells) - width) > 1 and (line.is_comment or len(cells) == 1):
+            continue  # a comment or a title
+        if not units and k > 0 and _are_units(cells, split[:k]):
+            units = cells
+            continue
+        if k and cells[0] and not any(cells[1:]):  # the name of an index alone, below those of the columns
+            split[k - 1] = [cells[0], *split[k - 1][1:]]
+            continue
+        groups = split[k - 1] if k else []
+        names = _join_groups(cells, groups) if abs(len(groups) - len(cells)) <= 1 else cells
+        if not units and names == cells and len(groups) == len(cells) and _are_units(groups, [cells]):
+            units = groups
+        return (line.number, [printable(cell) for cell in names]), units
+    return None, units
+
+
+def _join_groups(names: Row, groups: Row) -> Row:
+    """Return names with the groups above them, where they repeat and with their groups do not."""
+    groups = [*groups, *("" for _ in range(len(names) - len(groups)))][: len(names)]
+    joined, last = [], ""
+    for name, group in zip(names, groups, strict=True):
+        last = group or last
+        joined.append(f"{last}/{name}" if last and name else name or group)
+    return joined if _repeat(names) and not _repeat(joined) else names
+
+
+def _repeat(names: Row) -> bool:
+    known = [name for name in names if name]
+    return len(set(known)) < len(known)
+
+
+def _split_header(text: str, delimiter: str, width: int) -> Row:
+    """Split a header line, with its own delimiter if only that gives a name per column (numpy.savetxt)."""
+    if width == 1:
+        return _split_over_one_column(text)
+    text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
+    for comment in ("#", "//", "% "):
+        text = text.removeprefix(comment)
+    rows = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
+    return next((cells for cells in rows if len(cells) == width), rows[0])
+
+
+def _split_over_one_column(text: str) -> Row:
+    """Split a header line over rows of one cell, which show no sign between cells: by what parts most names.
+
+    A name with its unit after a comma is one name, and so is a comment of several words.
+    """
+    names = text.strip().lstrip("#%/ ")
+    parts = max((split_line(names, sign) for sign in DELIMITERS if sign != SPACE), key=len)
+    with_unit = len(parts) == 2 and vocabulary().unit(parts[1]) is not None
+    is_comment = names != text.strip() and any(" " in part for part in parts)
+    return split_line(names, "\t") if with_unit or is_comment else parts
+
+
+_UNIT = r"(?:[^\])\d]|(?<=[sm^])[23]|1(?=/))*"
+_BRACKETED = re.compile(rf"\[{_UNIT}\]|\({_UNIT}\)")  # [rad/s^2], (1/min); else an index
+
+
+def _are_units(cells: Row, above: Sequence[Row]) -> bool:
+    """Return whether a line holds units alone: known ones, or any in brackets below a line of names."""
+    words = [cell.strip("[]() ") for cell in cells]
+    is_bracketed = all(_BRACKETED.fullmatch(cell.strip()) for cell in cells if cell.strip())
+    is_below_names = is_bracketed and any(len(row) == len(cells) for row in above)
+    are_known = all(not word or vocabulary().unit(word) for word in words)
+    return any(words) and (is_below_names or are_known)
+
+
+def _name_cells(
     segment: Segment,
     header: tuple[int, Row] | None,
     lines: Sequence[HeadLine],
@@ -264,88 +353,68 @@ def _names(
     width: int,
 ) -> tuple[tuple[str, ...], Inference]:
     """Return a name for every cell of a row."""
-    ends = [k for k, row in enumerate(rows) if len(row) == width and row[-1]]
-    trailing = not ends
+    filled = [k for k, row in enumerate(rows) if len(row) == width and row[-1]]
+    has_trailing = not filled
     if header is None:
-        names = tuple(str(k + 1) for k in range(width - trailing))
-        said = Inference("header", "none", "the first line is numbers: columns by number")
-        return names + ("",) * trailing, said
+        names = (*(str(k + 1) for k in range(width - has_trailing)), *[""] * has_trailing)
+        return names, Inference("header", "none", "the first line is numbers: columns by number")
     line, cells = header[0], [strip_apostrophe(cell) for cell in header[1]]
-    found = Inference("header", f"line {line}", "the last line of names before the numbers")
+    last_line = Inference("header", f"line {line}", "the last line of names before the numbers")
     if len(cells) == width:
-        return tuple(cells), found
+        return tuple(cells), last_line
     if len(cells) == width + 1 and not cells[-1]:
-        return tuple(cells[:-1]), found
-    if len(cells) == width - 1 and trailing:
-        return (*cells, ""), Inference("header", f"line {line}", "each row ends with a delimiter")
-    uncounted = _uncounted(rows, width)
-    if len(cells) == width - 1 and not uncounted:
-        return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
+        return tuple(cells[:-1]), last_line
     if len(cells) == width - 1:
-        _refuse_few(segment, lines, rows, uncounted, 0, f"a count, as before what line {line} names")
-        _refuse_few(segment, lines, rows, ends, -1, f"no cell behind what line {line} names")
+        if has_trailing:
+            return (*cells, ""), Inference("header", f"line {line}", "each row ends with a delimiter")
+        uncounted = _uncounted_rows(rows, width)
+        if not uncounted:
+            return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
+        # if few rows keep the others from being understood, each of them is named
+        for few, column, allowed in (
+            (uncounted, 0, f"a count, as before what line {line} names"),
+            (filled, -1, f"no cell behind what line {line} names"),
+        ):
+            if len(few) <= FEW * len(rows):
+                file = str(segment.path)
+                wrong = [(lines[k].number, format_value(rows[k][column])) for k in few]
+                findings = [Finding(file=file, line=n, found=cell, allowed=allowed) for n, cell in wrong]
+                raise LogError(*capped(findings, file))
     number = abs(len(cells) - width)
     remedy = f"{'add' if len(cells) < width else 'remove'} {format_count(number, 'name')}"
-    wrong = (
-        f"found {len(cells)} names over rows of {format_count(width, 'cell')}, allowed: one name per column;"
-    )
-    wrong += f" {remedy}, or delete line {line}: without names the columns are taken as joints in order"
-    raise LogError(Finding(wrong, file=str(segment.path), line=line))
+    wrong_count = f"found {len(cells)} names over rows of {format_count(width, 'cell')}"
+    remedy += f", or delete line {line}: without names the columns are taken as joints in order"
+    message = f"{wrong_count}, allowed: one name per column; {remedy}"
+    raise LogError(Finding(message, file=str(segment.path), line=line))
 
 
-def _uncounted(rows: Sequence[Row], width: int) -> list[int]:
-    """Return the rows that do not count up from 0 or 1 in their first cell; others may stand between."""
-    found, last, count = [], -2, -1
+def _uncounted_rows(rows: Sequence[Row], width: int) -> list[int]:
+    """Return the rows that do not count up from 0 or 1 in their first cell; other rows may be between."""
+    uncounted, last, count = [], -2, -1
     for k, row in enumerate(rows):
         if len(row) != width:
             continue
         cell = row[0]
-        if cell.isdecimal() and len(cell) <= COUNTED and 1 <= int(cell) - count <= k - last:
+        if cell.isdecimal() and len(cell) <= MAX_COUNT_DIGITS and 1 <= int(cell) - count <= k - last:
             last, count = k, int(cell)
         else:
-            found.append(k)
-    return found
+            uncounted.append(k)
+    return uncounted
 
 
-def _refuse_few(
-    segment: Segment,
-    lines: Sequence[HeadLine],
-    rows: Sequence[Row],
-    few: Sequence[int],
-    column: int,
-    allowed: str,
-) -> None:
-    """Raise with each of some rows if they are few: it is they that keep the others from being understood."""
-    if len(few) > FEW * len(rows):
-        return
-    wrong = [(lines[k].number, format_value(rows[k][column])) for k in few]
-    file = str(segment.path)
-    findings = [Finding(file=file, line=line, found=cell, allowed=allowed) for line, cell in wrong]
-    raise LogError(*capped(findings, file))
-
-
-def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[int], width: int) -> None:
-    """Raise if most lines below the first with numbers are no rows of the same width."""
-    if 2 * widths.count(width) < len(widths):
-        text = lines[0].text.strip()[:60]
-        message = f"found {text!r} and lines of {min(widths)} to {max(widths)} cells, allowed: a table"
-        raise LogError(Finding(message, file=str(segment.path), line=lines[0].number))
-
-
-def _no_rows(segment: Segment, body: Sequence[HeadLine], given: Mapping[str, str]) -> Finding:
-    """Say why no row of numbers was found with the signs that were given."""
-    file = str(segment.path)
+def _no_rows(segment: Segment, body: Sequence[HeadLine], options: Mapping[str, str]) -> Finding:
+    """Return why no row of numbers was found with the signs that were given."""
+    file, allowed = str(segment.path), "a table with one row per sample"
     if segment.has_more and len(body) < FEWEST_LINES:
         found = f"no row of numbers in the first {len(segment.head)} letters"
-        return Finding(file=file, found=found, allowed="a table with one row per sample")
+        return Finding(file=file, found=found, allowed=allowed)
     if not body:
-        return Finding("found no line with content, allowed: a table with one row per sample", file=file)
-    cells = [cell for line in body for cell in split_line(line.text, ",")]
+        return Finding(f"found no line with content, allowed: {allowed}", file=file)
+    line = body[0].number
+    cells = [cell for head_line in body for cell in split_line(head_line.text, ",")]
     if len(body) <= 2 and all(is_text(cell, ".") for cell in cells if cell):
-        return Finding(
-            "found a header and no rows, allowed: one row per sample", file=file, line=body[0].number
-        )
-    text = body[0].text.strip()[:60]
-    named = [f"{what} {_NAMES[_SIGNS.get(sign.lower(), sign)]}" for what, sign in given.items()]
-    found = f"{text!r} and no row of numbers below it" + (f" with {' and '.join(named)}" if named else "")
-    return Finding(file=file, line=body[0].number, found=found, allowed="a table with one row per sample")
+        return Finding("found a header and no rows, allowed: one row per sample", file=file, line=line)
+    signs = [f"{what} {_NAMES[_SIGNS.get(sign.lower(), sign)]}" for what, sign in options.items()]
+    found = f"{body[0].text.strip()[:60]!r} and no row of numbers below it"
+    found += f" with {' and '.join(signs)}" if signs else ""
+    return Finding(file=file, line=line, found=found, allowed=allowed)

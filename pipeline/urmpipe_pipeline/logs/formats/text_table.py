@@ -1,8 +1,12 @@
-"""Whole rows of a table: as they stand in the file, and as the CSV parser wants them.
+"""A table that is text: its rows in blocks, parsed together, or one by one where something is wrong.
 
-The numbers of whole rows, fast: pyarrow parses the columns that are needed straight into float64.
+1. `row_blocks`: whole rows as they are in the file; `to_parser`: as the CSV parser wants them.
+2. `BlockParser`: pyarrow parses the columns that are needed straight into float64, and those of the clock
+   into decimals, whose integers are [ns].
+3. `RowReader`: what the parser refuses, cell by cell: read, though it is unusual (blanks as missing samples,
+   1.5d0, comments), or reported with line and column. A block is halved until it is short.
 
-Rows that the parser refuses, cell by cell: read, or told with the line and column of what is wrong.
+The result does not depend on where blocks are cut.
 """
 
 from __future__ import annotations
@@ -15,15 +19,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
-from typing import Any, Self, TypeAlias
+from typing import Any, Self
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 from pyarrow import csv
 
 from urmpipe_models.display import format_count
-from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, IntArray
 from urmpipe_models.errors import Finding, Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import (
@@ -38,7 +41,6 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_nanoseconds,
 )
 from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, REPORTED
-from urmpipe_pipeline.logs.formats.form import Form, RowError, UnfitError, Value
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import (
     SHOWN_FINDINGS,
@@ -46,8 +48,23 @@ from urmpipe_pipeline.logs.formats.numbers import (
     Numbers,
     RowFault,
 )
+from urmpipe_pipeline.logs.formats.row_form import RowError, RowForm, Value
 from urmpipe_pipeline.logs.formats.text import COMMENTS, MOST_HEAD, Segment
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
+
+BLOCK_BYTES = 1 << 22  # read at once: enough rows for several threads to parse, few enough to keep memory low
+PARSED_BYTES = 1 << 20  # parsed at once by one thread
+READ_BY_ROW = 1 << 16  # bytes that are read row by row together if there is something wrong in them
+
+HEADER = "the header again"
+MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is missing"  # what a cell may hold
+
+_PRECISION = 38  # digits of a decimal128
+_MAX_SHOWN = 60  # characters of a cell or a line in a message
+_LAST_BYTES = 1 << 12  # of a file, which hold its last line
+_MIN_FIXED_ROWS = 100  # rows that show that a column has the same number of decimals
+_TO_POINTS = bytes.maketrans(b",.", b".~")
+_FROM_POINTS = np.frombuffer(bytes.maketrans(b".~", b",."), dtype=np.uint8)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -55,39 +72,43 @@ class TextTable(LogTable):
     """A table that is text.
 
     Attributes:
-        segment: Where it stands.
+        segment: Its place in a file.
         offset: Offset of its first row in bytes.
         form: How its rows become rows of plain cells, if they hold arrays or labels.
     """
 
     segment: Segment
     offset: int
-    form: Form | None = None
+    form: RowForm | None = None
 
     @property
     def path(self) -> Path:
-        """The file that it stands in."""
+        """The file that it is in."""
         return self.segment.path
+
+    @property
+    def byte_encoding(self) -> str:
+        """The encoding of blocks: UTF-8, or Latin-1, whose numbers are the same bytes in UTF-8."""
+        return "latin-1" if self.segment.encoding == "latin-1" else "utf-8"
+
+    @property
+    def has_decimal_commas(self) -> bool:
+        """Whether commas are decimal signs, and not the delimiter as well."""
+        return self.decimal == "," != self.delimiter
 
     def _read(
         self, columns: Sequence[int], clock: Sequence[ClockColumn], allowed: Mapping[int, str]
     ) -> Numbers:
-        """Return what `read` does.
-
-        Read row by row is also what the parser refuses though it is sound: blanks as missing samples, 1.5d0,
-        comments.
-        """
-        reader = RowReader(self, columns, clock, allowed)
-        scales = clock_scales(self, clock)
-        parts = [part for block in row_blocks(self) for part in _parts(reader, block, scales)]
-        reader.refuse_cut_row()
+        parser, reader = BlockParser(self, columns, clock), RowReader(self, columns, clock, allowed)
+        parts = [part for block in row_blocks(self) for part in _read_block(parser, reader, block)]
+        reader.check_last_row()
         values = [part.values for part in parts] or [np.empty((0, len(columns)))]
-        times = [_times(part) for part in parts] or [np.empty(0, dtype=np.int64)]
+        times = [np.zeros(len(p.values), np.int64) if p.clock is None else p.clock for p in parts]
         texts = zip(*(part.texts for part in parts), strict=True)
         numbers = replace(
-            reader.verdict(),
+            reader.summary(),
             values=np.concatenate(values),
-            clock=np.concatenate(times) if clock else None,
+            clock=np.concatenate([np.empty(0, dtype=np.int64), *times]) if clock else None,
             texts=tuple(TextCells.joined(cells) for cells in texts),
             left_out=sum(part.left_out for part in parts),
         )
@@ -95,228 +116,240 @@ class TextTable(LogTable):
             return numbers
         return numbers.at(self.rows[self.rows < len(numbers.values)])  # fewer if another header ends them
 
+    def data_lines(self, lines: Iterable[tuple[int, str]] | None = None) -> Iterator[tuple[int, str]]:
+        """Yield number and text of each line with a data row, not of blank lines and comments."""
+        lines = self.segment.lines() if lines is None else lines
+        lines = (line for line in lines if line[0] >= self.first_line)
+        for number, line in lines if self.form is None else self.form.rows(lines):
+            text = line.strip()
+            if not text or text.startswith(COMMENTS):
+                continue
+            for row in split_line(text, self.delimiter) if self.across else (line,):
+                yield number, row
+
     def count_rows(self) -> int:
         """Return the number of data rows."""
-        return sum(1 for _ in data_lines(self))
+        return sum(1 for _ in self.data_lines())
 
     def iter_cells(self) -> Iterator[list[str]]:
-        """Yield the cells of each row as text, without an empty one behind a trailing delimiter."""
-        for _, line in data_lines(self):
+        """Yield the cells of each row as text, without an empty one after a trailing delimiter."""
+        for _, line in self.data_lines():
             cells = split_line(line.strip("\r\n "), self.delimiter)
             yield cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
     def take(self, rows: IntArray, *inferences: Inference) -> Self:
         """Return the table of some of its rows, by index from 0, ascending, shape (k,)."""
         in_file = rows if self.rows is None else self.rows[rows]
-        sampled, texts = in_file[:MAX_SAMPLED_ROWS], list[str]()
-        chosen, last = frozenset(sampled.tolist()), int(sampled[-1])
-        for row, (_, text) in enumerate(islice(data_lines(self), last + 1)):
-            texts += [text] if row in chosen else []
+        sampled = in_file[:MAX_SAMPLED_ROWS].tolist()
+        chosen, lines = frozenset(sampled), islice(self.data_lines(), sampled[-1] + 1)
+        texts = [text for row, (_, text) in enumerate(lines) if row in chosen]
         if self.form is not None:
-            sample = self.form.sampled(self.form.readable(texts))
+            sample = self.form.read_cells(self.form.read_values(texts))
         else:
             sample = tuple(tuple(split_line(text, self.delimiter)) for text in texts)
         return replace(self, rows=in_file, sample=sample, inferences=(*self.inferences, *inferences))
 
     def lines_of(self, rows: Sequence[int]) -> dict[int, int]:
         """Return the line of the file of some data rows, both from 1."""
-        numbered = islice(enumerate(data_lines(self), start=1), max(rows, default=0))
-        return {row: line for row, (line, _) in numbered if row in {*rows}}
+        chosen, numbered = frozenset(rows), enumerate(self.data_lines(), start=1)
+        return {row: line for row, (line, _) in islice(numbered, max(rows, default=0)) if row in chosen}
+
+    def first_other_line(self) -> tuple[int, str]:
+        """Return number and beginning of the first line among labelled rows that is not a row."""
+        for number, text in self.segment.lines():
+            is_row = self.form is None or self.form.is_row(text)
+            if number >= self.first_line and text.strip() and not is_row:
+                return number, _shorten(text)
+        return self.first_line, ""
 
 
-BLOCK_BYTES = 1 << 22
-"""What is read at once: enough rows for several threads to parse, few enough to keep memory low."""
-
-_NEWLINES = b"\n\r"
-_GOES_ON = (b"", b" ", b"\t")  # nothing: what comes next is not read yet
-_TO_POINTS = bytes.maketrans(b",.", b".~")
-_FROM_POINTS = np.frombuffer(bytes.maketrans(b".~", b",."), dtype=np.uint8)
-
-
-def as_written(layout: TextTable, cells: Bytes) -> Bytes:
-    """Return cells of `converted` rows, shape (bytes,), with the signs that the file has."""
-    return _FROM_POINTS[cells] if layout.decimal == "," != layout.delimiter else cells
-
-
-def row_blocks(layout: TextTable) -> Iterator[bytes]:
-    """Yield the rows of a table as they stand in the file, some thousand at a time, in `byte_encoding`."""
-    segment = layout.segment
-    left = segment.end - layout.offset
-    wide = segment.encoding.startswith("utf-16")
-    decoder = codecs.getincrementaldecoder(segment.encoding)(errors="replace") if wide else None
+def row_blocks(table: TextTable) -> Iterator[bytes]:
+    """Yield the rows of a table as they are in the file, some thousand at a time, in `byte_encoding`."""
+    segment = table.segment
+    remaining = segment.end - table.offset
+    is_wide = segment.encoding.startswith("utf-16")
+    decoder = codecs.getincrementaldecoder(segment.encoding)(errors="replace") if is_wide else None
     cut_row = b""
     with segment.open() as file:
-        file.seek(layout.offset)
-        while left > 0:
-            raw = file.read(min(BLOCK_BYTES, left))
-            left -= len(raw) if raw else left
-            block = raw if decoder is None else decoder.decode(raw, final=left <= 0).encode("utf-8")
+        file.seek(table.offset)
+        while remaining > 0:
+            raw = file.read(min(BLOCK_BYTES, remaining))
+            remaining -= len(raw) if raw else remaining
+            block = raw if decoder is None else decoder.decode(raw, final=remaining <= 0).encode("utf-8")
             block = cut_row + block
-            end = end_of_rows(block, layout) if left > 0 else len(block)
+            end = _end_of_rows(block, table) if remaining > 0 else len(block)
             cut_row = block[end:]
             if end:
                 yield block[:end]
 
 
-def byte_encoding(layout: TextTable) -> str:
-    """Return the encoding of the blocks: UTF-8, or Latin-1, whose numbers are the same bytes in UTF-8."""
-    return "latin-1" if layout.segment.encoding == "latin-1" else "utf-8"
+def _end_of_rows(block: bytes, table: TextTable) -> int:
+    end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1
+    is_continued = table.form is not None and table.form.continued
+    while (
+        is_continued and end and block[end : end + 1] in (b"", b" ", b"\t")
+    ):  # b"": what comes is not read yet
+        end = block.rfind(b"\n", 0, end - 1) + 1
+    return end
 
 
-def converted(layout: TextTable, block: bytes) -> tuple[bytes, int]:
-    """Return whole rows as the parser wants them, in UTF-8 and with one space for a run of them.
+def _read_block(parser: BlockParser, reader: RowReader, block: bytes) -> Iterator[Numbers]:
+    """Yield the numbers of some whole rows: of all at once, or of either half."""
+    table, newline = parser.table, parser.table.segment.newline
+    numbers = None if reader.has_ended else parser.parse(block)
+    if numbers is not None:
+        signs = np.frombuffer(block, dtype=np.uint8)
+        reader.pass_over(len(numbers.values), int(np.count_nonzero(signs == ord(newline))))
+        yield numbers
+    elif len(block) > READ_BY_ROW and (end := _end_of_rows(block[: len(block) // 2], table)):
+        yield from _read_block(parser, reader, block[:end])
+        yield from _read_block(parser, reader, block[end:])
+    else:
+        text = block.decode(table.byte_encoding, errors="surrogateescape")
+        yield reader.read(text.removesuffix(newline).split(newline))
 
-    Lines among labelled rows that are none are left out; how many they are is the second value.
+
+def to_parser(table: TextTable, block: bytes) -> tuple[bytes, int] | None:
+    """Return whole rows as the parser wants them, in UTF-8, and the number of other lines among them.
 
     Decimal commas become points here, since pyarrow 26 parses decimals with another point wrongly in threads
     (they share a buffer); a point becomes a sign that no number has, so that 1.5 stays no number.
 
-    Raises:
-        UnfitError: If rows with arrays or labels are not written like the others.
+    Returns:
+        None if rows with arrays or labels are not written like the others.
     """
     left_out = 0
-    if layout.form is not None:
-        block, left_out = layout.form.flat(block, byte_encoding(layout))
-    if layout.decimal == "," != layout.delimiter:
+    if table.form is not None:
+        flat = table.form.flatten(block.decode(table.byte_encoding, "surrogateescape"))
+        if flat is None:
+            return None
+        block, left_out = flat[0].encode(table.byte_encoding, "surrogateescape"), flat[1]
+    if table.has_decimal_commas:
         block = block.translate(_TO_POINTS)
-    block = squeeze(block) if layout.delimiter == SPACE else block
-    return (block.replace(layout.delimiter.encode(), b"\n") if layout.across else block), left_out
-
-
-def end_of_rows(block: bytes, layout: TextTable) -> int:
-    """Return where the last whole row of a block ends."""
-    end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1
-    while layout.form is not None and layout.form.continued and end and block[end : end + 1] in _GOES_ON:
-        end = block.rfind(b"\n", 0, end - 1) + 1
-    return end
+    block = squeeze(block) if table.delimiter == SPACE else block
+    return (block.replace(table.delimiter.encode(), b"\n") if table.across else block), left_out
 
 
 def squeeze(block: bytes) -> bytes:
     """Return whole lines with every run of spaces and tabs as one space, and none at either end of a line."""
     signs: Bytes = np.frombuffer(block, dtype=np.uint8)
-    blank = (signs == ord(" ")) | (signs == ord("\t"))
-    ends = (signs == _NEWLINES[0]) | (signs == _NEWLINES[1])
-    skipped = np.zeros_like(blank)
-    skipped[:1] = blank[:1]
-    skipped[1:] = blank[1:] & (blank[:-1] | ends[:-1])
-    if not (skipped.any() or (blank[:-1] & ends[1:]).any() or b"\t" in block or block[-1:] == b" "):
+    is_blank = (signs == ord(" ")) | (signs == ord("\t"))
+    is_end = (signs == ord("\n")) | (signs == ord("\r"))
+    is_skipped = np.zeros_like(is_blank)
+    is_skipped[:1] = is_blank[:1]
+    is_skipped[1:] = is_blank[1:] & (is_blank[:-1] | is_end[:-1])
+    before_end = bool((is_blank[:-1] & is_end[1:]).any()) or block[-1:] == b" "
+    if not (is_skipped.any() or before_end or b"\t" in block):
         return block
-    result: bytes = np.where(blank, np.uint8(ord(" ")), signs)[~skipped].tobytes()
-    for end in (b"\r", b"\n"):
-        result = result.replace(b" " + end, end)
-    return result.removesuffix(b" ")
+    result: bytes = np.where(is_blank, np.uint8(ord(" ")), signs)[~is_skipped].tobytes()
+    return result.replace(b" \r", b"\r").replace(b" \n", b"\n").removesuffix(b" ")
 
 
-PARSED_BYTES = 1 << 20
-"""What one thread parses at once."""
+class BlockParser:
+    """Parses blocks of whole rows with pyarrow.
 
-_PRECISION = 38  # digits of a decimal128
-
-Scales: TypeAlias = tuple[tuple[int, ...], ...]
-"""How many decimals of each column of numbers of a clock are read: as few as may do, then all."""
-
-
-def clock_scales(layout: TextTable, clock: Sequence[ClockColumn]) -> Scales:
-    """Return how many decimals of a clock are read, the same for all blocks of a table."""
-    numeric = [part for part in clock if not part.forms]
-    both = (tuple(_scale(layout, part, exact) for part in numeric) for exact in (False, True))
-    return tuple(dict.fromkeys(both))
-
-
-def parse_block(
-    layout: TextTable, columns: Sequence[int], clock: Sequence[ClockColumn], block: bytes, scales: Scales
-) -> Numbers | None:
-    """Return the numbers of some columns, or None if the parser stumbles over a row or a cell.
-
-    The block is some whole rows as they stand in the file, the scales are those of `clock_scales`. The values
-    of the clock in [ns] are added; if they are text, their cells are read as they are.
+    Args:
+        table: The table.
+        columns: The columns of numbers.
+        clock: The columns of the clock: numbers are added up in [ns]; the cells of text are read as they are.
     """
-    texts = [part for part in clock if part.forms]
-    numeric = [part for part in clock if not part.forms]
-    try:
-        rows, left_out = converted(layout, block)
-    except UnfitError:
+
+    def __init__(self, table: TextTable, columns: Sequence[int], clock: Sequence[ClockColumn]) -> None:
+        self.table = table
+        self._columns = columns
+        self._texts = [part for part in clock if part.forms]
+        self._clock = [part for part in clock if not part.forms]
+        scales = (
+            tuple(self._choose_scale(part, exact=exact) for part in self._clock) for exact in (False, True)
+        )
+        self._scales = tuple(dict.fromkeys(scales))  # decimals of the clock: as few as may do, then all
+
+    def parse(self, block: bytes) -> Numbers | None:
+        """Return the numbers of whole rows, None if the parser stumbles over a row or a cell."""
+        plain = to_parser(self.table, block)
+        if plain is None:
+            return None
+        for scales in self._scales:
+            try:
+                parsed = self._parse(plain[0], scales)
+                numbers = self._to_numbers(parsed, scales)
+            except (pa.ArrowException, OverflowError):
+                # Of any kind: pyarrow 26 was seen to lose a chunk of sound numbers among its threads, once in
+                # hundreds of files ("failed converting for an unknown reason"). The halves are tried then.
+                continue
+            texts = tuple(self._text_cells(parsed.column(str(part.column))) for part in self._texts)
+            return replace(numbers, texts=texts, left_out=plain[1])
         return None
-    for decimals in scales:
-        try:
-            table = _parse(layout, columns, numeric, decimals, texts, rows)
-            numbers = _numbers(table, columns, numeric, decimals)
-        except (pa.ArrowException, OverflowError):
-            # Of any kind: pyarrow 26 was seen to lose a chunk of sound numbers among its threads, once in
-            # hundreds of files ("failed converting for an unknown reason"). Who gets None tries the halves.
-            continue
-        cells = tuple(_text_cells(table, layout, part) for part in texts)
-        return replace(numbers, texts=cells, left_out=left_out)
-    return None
+
+    def _choose_scale(self, part: ClockColumn, *, exact: bool) -> int:
+        """Return how many decimals of the clock are read.
+
+        As many as reach [ns] if the sampled cells have no more: then the parsed integers are [ns]. Else as
+        many as fit with the digits before the point (and two more, since the clock continues).
+        """
+        cells = list(self.table.number_texts(part.column))
+        decimals = max((len(cell.partition("e")[0].partition(".")[2]) for cell in cells), default=0)
+        if not exact and decimals <= part.exponent:
+            return part.exponent
+        values = [abs(to_float(cell, ".") or 0.0) for cell in cells]
+        digits = max((len(str(int(value))) for value in values if math.isfinite(value)), default=1)
+        return max(part.exponent, _PRECISION - digits - 2)
+
+    def _parse(self, rows: bytes, scales: Sequence[int]) -> pa.Table:
+        """Return the columns as pyarrow parses them: float64, decimals for the clock, bytes for its texts."""
+        table = self.table
+        types: dict[str, Any] = {str(column): pa.float64() for column in self._columns}
+        for part, scale in zip(self._clock, scales, strict=True):
+            types[str(part.column)] = pa.decimal128(_PRECISION, scale)
+        types |= {str(part.column): pa.binary() for part in self._texts}
+        names = [str(column) for column in range(len(table.names))]
+        quoted_commas = table.delimiter == table.decimal  # "0,5","1,5": `to_parser` leaves them
+        return csv.read_csv(
+            pa.BufferReader(rows),
+            csv.ReadOptions(column_names=names, block_size=PARSED_BYTES, use_threads=not quoted_commas),
+            csv.ParseOptions(delimiter=table.delimiter),
+            csv.ConvertOptions(
+                column_types=types,
+                include_columns=list(types),
+                null_values=_spell_missing(),
+                decimal_point=table.decimal if quoted_commas else ".",
+            ),
+            memory_pool=pa.system_memory_pool(),  # the default one keeps what it once had
+        )
+
+    def _to_numbers(self, parsed: pa.Table, scales: Sequence[int]) -> Numbers:
+        """Return a parsed table as arrays, batch by batch, so that the rows filled stay in the cache."""
+        values = np.empty((parsed.num_rows, len(self._columns)))
+        times = np.zeros(parsed.num_rows, dtype=np.int64)
+        start = 0
+        for batch in parsed.to_batches():
+            rows = slice(start, start + batch.num_rows)
+            for k, column in enumerate(self._columns):
+                chunk = batch.column(str(column))
+                place = slice(chunk.offset, chunk.offset + len(chunk))
+                values[rows, k] = np.frombuffer(chunk.buffers()[1], dtype="<f8")[place]
+                if chunk.null_count:
+                    values[rows, k][find_missing(chunk)] = np.nan
+            for part, scale in zip(self._clock, scales, strict=True):
+                _add_time(times[rows], batch.column(str(part.column)), part.exponent, scale)
+            start += batch.num_rows
+        return Numbers(values, times if self._clock or self._texts else None)
+
+    def _text_cells(self, column: pa.ChunkedArray) -> TextCells:
+        """Return a parsed column of bytes: offsets of 32 bits, and the bytes between them."""
+        cells = column.combine_chunks(pa.system_memory_pool())
+        _, offsets, content = cells.buffers()
+        starts = np.frombuffer(offsets, dtype="<i4")[cells.offset : cells.offset + len(cells) + 1]
+        data = np.frombuffer(content or b"", dtype=np.uint8)
+        data = _FROM_POINTS[data] if self.table.has_decimal_commas else data
+        return TextCells(data, starts.astype(np.int64))
 
 
 @lru_cache
-def _nulls() -> list[str]:
+def _spell_missing() -> list[str]:
     """Return the words for a missing sample in the usual spellings; read row by row, all are taken."""
     words = vocabulary().missing
     return sorted({spelled for word in words for spelled in (word, word.upper(), word.capitalize(), "NaN")})
-
-
-def _numbers(
-    table: pa.Table, columns: Sequence[int], clock: Sequence[ClockColumn], scales: Sequence[int]
-) -> Numbers:
-    """Return a parsed table as arrays, block by block, so that the rows being filled stay in the cache."""
-    values = np.empty((table.num_rows, len(columns)))
-    times = np.zeros(table.num_rows, dtype=np.int64)
-    start = 0
-    for batch in table.to_batches():
-        rows = slice(start, start + batch.num_rows)
-        for j, column in enumerate(columns):
-            _fill(values[rows, j], batch.column(str(column)))
-        for part, scale in zip(clock, scales, strict=True):
-            _add_time(times[rows], batch.column(str(part.column)), part.exponent, scale)
-        start += batch.num_rows
-    return Numbers(values, times if clock else None)
-
-
-def _parse(
-    layout: TextTable,
-    columns: Sequence[int],
-    clock: Sequence[ClockColumn],
-    scales: Sequence[int],
-    texts: Sequence[ClockColumn],
-    rows: bytes,
-) -> pa.Table:
-    """Return the columns as pyarrow parses them: float64, decimals for the clock, bytes for its texts."""
-    types: dict[str, Any] = {str(column): pa.float64() for column in columns}
-    for part, scale in zip(clock, scales, strict=True):
-        types[str(part.column)] = pa.decimal128(_PRECISION, scale)
-    types |= {str(part.column): pa.binary() for part in texts}
-    names = [str(column) for column in range(len(layout.names))]
-    quoted_commas = layout.delimiter == layout.decimal  # "0,5","1,5": `converted` leaves them
-    return csv.read_csv(
-        pa.BufferReader(rows),
-        csv.ReadOptions(column_names=names, block_size=PARSED_BYTES, use_threads=not quoted_commas),
-        csv.ParseOptions(delimiter=layout.delimiter),
-        csv.ConvertOptions(
-            column_types=types,
-            include_columns=list(types),
-            null_values=_nulls(),
-            decimal_point=layout.decimal if quoted_commas else ".",
-        ),
-        memory_pool=pa.system_memory_pool(),  # the default one keeps what it once had
-    )
-
-
-def _text_cells(table: pa.Table, layout: TextTable, part: ClockColumn) -> TextCells:
-    """Return the cells of a parsed column of bytes: offsets of 32 bits, and the bytes between them."""
-    cells = table.column(str(part.column)).combine_chunks(pa.system_memory_pool())
-    _, offsets, content = cells.buffers()
-    starts = np.frombuffer(offsets, dtype="<i4")[cells.offset : cells.offset + len(cells) + 1]
-    data = np.frombuffer(content or b"", dtype=np.uint8)
-    return TextCells(as_written(layout, data), starts.astype(np.int64))
-
-
-def _fill(target: FloatArray, chunk: pa.Array) -> None:
-    """Copy a chunk of float64, with NaN where it has no value."""
-    target[:] = np.frombuffer(chunk.buffers()[1], dtype="<f8")[chunk.offset : chunk.offset + len(chunk)]
-    if chunk.null_count:
-        target[_missing(chunk)] = np.nan
 
 
 def _add_time(target: IntArray, chunk: pa.Array, exponent: int, scale: int) -> None:
@@ -328,7 +361,7 @@ def _add_time(target: IntArray, chunk: pa.Array, exponent: int, scale: int) -> N
     Raises:
         OverflowError: If a time is beyond what 64 bits hold.
     """
-    missing = (target == NO_TIME) | (_missing(chunk) if chunk.null_count else False)
+    is_without = (target == NO_TIME) | (find_missing(chunk) if chunk.null_count else False)
     if scale > exponent:
         from pyarrow import compute
 
@@ -336,87 +369,19 @@ def _add_time(target: IntArray, chunk: pa.Array, exponent: int, scale: int) -> N
         chunk = rounded.cast(pa.decimal128(_PRECISION, exponent))
     words = np.frombuffer(chunk.buffers()[1], dtype="<i8").reshape(-1, 2)
     low, high = words[chunk.offset : chunk.offset + len(chunk)].T
-    if (((low >> 63) != high) & ~missing).any():
+    if (((low >> 63) != high) & ~is_without).any():
         raise OverflowError
     target += low
-    target[missing] = NO_TIME
+    target[is_without] = NO_TIME
 
 
-def _missing(chunk: pa.Array) -> NDArray[np.bool_]:
-    """Return where a chunk has no value: its validity bits, the first row in the lowest bit, turned round.
+def find_missing(chunk: pa.Array) -> BoolArray:
+    """Return where a chunk has no value, shape (n,): its validity bits, the first row in the lowest bit.
 
     Read from the buffer, since `to_numpy` and `is_null` load pandas and pyarrow.compute first.
     """
-    bits = np.frombuffer(chunk.buffers()[0], dtype=np.uint8)
-    valid = np.unpackbits(bits, bitorder="little")[chunk.offset : chunk.offset + len(chunk)]
-    missing: NDArray[np.bool_] = valid == 0
-    return missing
-
-
-def _scale(layout: TextTable, part: ClockColumn, exact: bool) -> int:
-    """Return how many decimals of the clock are read.
-
-    As many as reach [ns] if the sampled cells have no more: then the parsed integers are [ns]. Else as
-    many as fit beside the digits before the point (and two more, since the clock goes on).
-    """
-    cells = list(layout.number_texts(part.column))
-    decimals = max((len(cell.partition("e")[0].partition(".")[2]) for cell in cells), default=0)
-    if not exact and decimals <= part.exponent:
-        return part.exponent
-    values = [abs(to_float(cell, ".") or 0.0) for cell in cells]
-    before = max((len(str(int(value))) for value in values if math.isfinite(value)), default=1)
-    return max(part.exponent, _PRECISION - before - 2)
-
-
-_SHOWN_TEXT = 60
-_LAST_BYTES = 1 << 12
-_FIXED_ROWS = 100
-"""So many rows tell that a column is written with the same number of decimals."""
-
-HEADER = "the header again"
-
-MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is missing"
-"""What a cell of a log may hold."""
-
-
-def data_lines(
-    layout: TextTable, lines: Iterable[tuple[int, str]] | None = None
-) -> Iterator[tuple[int, str]]:
-    """Yield number and text of each line with a data row, not of blank lines and comments."""
-    lines = layout.segment.lines() if lines is None else lines
-    lines = (line for line in lines if line[0] >= layout.first_line)
-    for number, line in lines if layout.form is None else layout.form.rows(lines):
-        text = line.strip()
-        if not text or text.startswith(COMMENTS):
-            continue
-        for row in split_line(text, layout.delimiter) if layout.across else (line,):
-            yield number, row
-
-
-def first_left_out(layout: LogTable) -> tuple[int, str]:
-    """Return number and beginning of the first line among labelled rows that is none."""
-    assert isinstance(layout, TextTable)
-    form, lines = layout.form, layout.segment.lines()
-    others = ((n, text) for n, text in lines if n >= layout.first_line and text.strip())
-    number, text = next((n, text) for n, text in others if form is not None and not form.is_row(text))
-    return number, _shown(text)
-
-
-def cut_cell(layout: TextTable) -> str | None:
-    """Return the last cell of a file if it is cut: no line end is behind it, and it lacks decimals."""
-    segment, usual = layout.segment, layout.cells(len(layout.names) - 1)
-    if layout.form is not None or layout.across or len(usual) < _FIXED_ROWS:
-        return None
-    with segment.open() as file:
-        file.seek(max(segment.start, segment.end - _LAST_BYTES))
-        text = file.read(segment.end - file.tell()).decode(segment.encoding, errors="replace")
-    last = text.rpartition(segment.newline)[2]
-    cells = split_line(last, layout.delimiter)
-    if last.lstrip().startswith(COMMENTS) or len(cells) != len(layout.names):
-        return None
-    found, *others = {len(one.partition(layout.decimal)[2]) for one in usual}
-    cut = not others and len(cells[-1].partition(layout.decimal)[2]) < found
-    return cells[-1] if cut and is_number(cells[-1], layout.decimal) else None
+    bits = np.unpackbits(np.frombuffer(chunk.buffers()[0], dtype=np.uint8), bitorder="little")
+    return np.asarray(bits[chunk.offset : chunk.offset + len(chunk)] == 0)
 
 
 @dataclass(slots=True)
@@ -431,46 +396,41 @@ class _Fault:
     hints: tuple[Hint, ...] = ()
 
     def finding(self, file: str) -> Finding:
-        """Return it as a finding."""
-        more = f" (and so {self.more} more row{'s' if self.more > 1 else ''} below it)" if self.more else ""
+        more = f" (and so {self.more} more row{'s' * (self.more > 1)} below it)" if self.more else ""
         return Finding(self.message + more, file, self.line, self.row, self.column, hints=self.hints)
 
 
 class RowReader:
     """Goes through rows one by one and keeps the first findings.
 
-    Attributes:
-        layout: How the table is written.
+    Args:
+        table: The table.
         columns: Which columns hold numbers.
         clock: The columns of its clock.
         allowed: What a cell of a column may hold, for messages, where it is not as in a log.
-        ended: Whether the next rows are not to be read: they are those of a second log.
+
+    Attributes:
+        has_ended: Whether the next rows are not to be read: they are those of a second log.
     """
 
     def __init__(
         self,
-        layout: TextTable,
+        table: TextTable,
         columns: Sequence[int],
         clock: Sequence[ClockColumn],
         allowed: Mapping[int, str] | None = None,
     ) -> None:
-        self.layout = layout
-        self.columns = columns
-        self.clock = clock
-        self.allowed = allowed or {}
+        self.has_ended = False
+        self._table, self._columns, self._clock, self._allowed = table, columns, clock, allowed or {}
+        self._text_parts = [part for part in clock if part.forms]
+        self._used = (*columns, *(part.column for part in clock))
+        self._rows_read = None if table.rows is None else frozenset(table.rows.tolist())
+        self._next_line, self._line, self._row = table.first_line, 0, 0
         self._faults: list[_Fault] = []
         self._lasting: list[_Fault] = []
-        self._wrong = 0
         self._last: _Fault | None = None
+        self._wrong = 0
         self._unread: dict[int, list[RowFault]] = {}
-        self._next_line = layout.first_line
-        self._line = 0
-        self._row = 0
-        self._text_parts = [part for part in clock if part.forms]
-        self._texts: list[list[str]] = []
-        self.ended = False
-        self._wanted = (*columns, *(part.column for part in clock))
-        self._rows_read = None if layout.rows is None else frozenset(layout.rows.tolist())
 
     def pass_over(self, rows: int, lines: int) -> None:
         """Count rows and lines that were read otherwise."""
@@ -482,25 +442,30 @@ class RowReader:
         numbered = list(enumerate((line.rstrip("\r\n") for line in lines), start=self._next_line))
         self._next_line += len(lines)
         values, times, rows = array("d"), array("q"), 0
-        self._texts = [[] for _ in self._text_parts]
-        for time, row in self._rows(numbered):
-            times.append(time)
-            values.extend(row)
-            rows += 1
-        form = self.layout.form
-        others = sum(bool(line.strip()) and not form.is_row(line) for _, line in numbered) if form else 0
+        texts: list[list[str]] = [[] for _ in self._text_parts]
+        for line, text in self._table.data_lines(numbered):
+            if self.has_ended:
+                break
+            self._line, self._row, rows = line, self._row + 1, rows + 1
+            cells = self._read_cells(text) if self._is_read() else None
+            for column_texts, part in zip(texts, self._text_parts, strict=True):
+                column_texts.append("" if cells is None else cells[part.column])
+            times.append(REPORTED if cells is None else self._read_time(cells))
+            values.extend([math.nan] * len(self._columns) if cells is None else self._read_values(cells))
+        form = self._table.form
+        other_lines = sum(bool(line.strip()) and not form.is_row(line) for _, line in numbered) if form else 0
         return Numbers(
-            np.array(values).reshape(rows, len(self.columns)),
-            np.array(times, dtype=np.int64) if self.clock else None,
-            left_out=others,
-            texts=tuple(TextCells.of(texts) for texts in self._texts),
+            np.array(values).reshape(rows, len(self._columns)),
+            np.array(times, dtype=np.int64) if self._clock else None,
+            left_out=other_lines,
+            texts=tuple(TextCells.of(column_texts) for column_texts in texts),
         )
 
-    def verdict(self) -> Numbers:
+    def summary(self) -> Numbers:
         """Return what was found to be wrong, without numbers."""
-        file = self.layout.file
+        file = self._table.file
         return Numbers(
-            np.empty((0, len(self.columns))),
+            np.empty((0, len(self._columns))),
             None,
             findings=tuple(fault.finding(file) for fault in self._faults),
             wrong=self._wrong,
@@ -508,118 +473,114 @@ class RowReader:
             unread=self._unread,
         )
 
-    def _rows(self, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, list[float]]]:
-        """Yield time in [ns] and values of each row."""
-        nothing = [math.nan] * len(self.columns)
-        for line, text in data_lines(self.layout, lines):
-            if self.ended:
-                return
-            self._line, self._row = line, self._row + 1
-            cells = self._cells(text) if self._is_read() else None
-            for texts, part in zip(self._texts, self._text_parts, strict=True):
-                texts.append("" if cells is None else cells[part.column])
-            yield (REPORTED, nothing) if cells is None else (self._time(cells), self._values(cells))
+    def check_last_row(self) -> None:
+        """Report the last row if the file ends within its last cell, which then lacks decimals."""
+        table = self._table
+        usual = table.cells(len(table.names) - 1)
+        is_plain = table.form is None and not table.across and len(table.names) - 1 in self._used
+        if not is_plain or len(usual) < _MIN_FIXED_ROWS or self.has_ended or not self._is_read():
+            return
+        with table.segment.open() as file:
+            file.seek(max(table.segment.start, table.segment.end - _LAST_BYTES))
+            raw = file.read(table.segment.end - file.tell())
+        text = raw.decode(table.segment.encoding, errors="replace").rpartition(table.segment.newline)[2]
+        cells = split_line(text, table.delimiter)
+        decimals, *further = {len(cell.partition(table.decimal)[2]) for cell in usual}
+        if text.lstrip().startswith(COMMENTS) or len(cells) != len(table.names) or further:
+            return
+        if is_number(cells[-1], table.decimal) and len(cells[-1].partition(table.decimal)[2]) < decimals:
+            self._line = table.lines_of([self._row])[self._row]
+            allowed = "as many decimals as in the other rows"
+            self._report(f"found {cells[-1]!r} where the file ends, allowed: {allowed}")
 
     def _is_read(self) -> bool:
-        """Return whether this row is among those that are read."""
         return self._rows_read is None or self._row - 1 in self._rows_read
 
-    def _values(self, cells: Sequence[str]) -> list[float]:
-        wanted = [cells[j] for j in self.columns]
-        if self.layout.decimal == "." and not any("_" in cell for cell in wanted):  # float() takes 1_000
-            try:
-                return [float(cell) for cell in wanted]
-            except ValueError:
-                pass
-        return [self._value(cells, j) for j in self.columns]
-
-    def _cells(self, text: str) -> list[str] | None:
+    def _read_cells(self, text: str) -> list[str] | None:
         """Return the cells of a row; None if it is not written like the others, or has no numbers at all."""
-        form = self.layout.form
+        table, form = self._table, self._table.form
         if len(text) > MOST_HEAD:
-            self._report(f"found a line of {len(text)} letters, allowed: {len(self.layout.names)} cells")
+            self._report(f"found a line of {len(text)} letters, allowed: {len(table.names)} cells")
             return None
         try:
-            values: list[Value] = (
-                [*split_line(text, self.layout.delimiter)] if form is None else form.values(text)
-            )
-            if not self._is_whole(text, values):
+            values: list[Value] = [*split_line(text, table.delimiter)] if form is None else form.values(text)
+            if not self._has_all(text, values):
                 return None
             cells = [str(value) for value in values] if form is None else form.spread(values)
         except RowError as error:
             self._report(error.message, error.name)
             return None
-        if len(self._wanted) > 1 and all(is_text(cells[j], self.layout.decimal) for j in self._wanted):
-            self._report(f"found {_shown(text)}, allowed: a row of numbers")
+        if len(self._used) > 1 and all(is_text(cells[column], table.decimal) for column in self._used):
+            self._report(f"found {_shorten(text)}, allowed: a row of numbers")
             return None
         return cells
 
-    def _is_whole(self, text: str, values: list[Value]) -> bool:
+    def _has_all(self, text: str, values: list[Value]) -> bool:
         """Return whether a row has as many values as the others, having reported what it is if not."""
-        names = self.layout.form.names if self.layout.form else self.layout.names
+        names = self._table.form.names if self._table.form else self._table.names
         width = len(names)
         if again := self._header_again(text, values, names):
             self._report(f"found {again}, allowed: one log per file; a second log begins here", lasting=True)
-            if self._last and not self.allowed:  # a table of targets has no such option
+            if self._last and not self._allowed:  # a table of targets has no such option
                 first = 1 + min(self._rows_read or [0])
                 parts = [f"{first}:{self._row - 1}", f"{self._row + 1}:-1"][: 2 if again == HEADER else 1]
                 self._last.hints = tuple(Hint("rows", part, "reads these rows") for part in parts)
-            self.ended = True
+            self.has_ended = True
             return False
         if len(values) == width - 1 and not names[-1]:
             values.append("")  # a row without the trailing delimiter that the others have
         if len(values) != width and any([*values[width:], len(values) < width]):
-            numbers = any(not isinstance(v, str) or is_number(v, self.layout.decimal) for v in values)
-            shown = "" if numbers else f" ({_shown(text)})"
+            numbers = any(not isinstance(v, str) or is_number(v, self._table.decimal) for v in values)
+            shown = "" if numbers else f" ({_shorten(text)})"
             self._report(f"found {format_count(len(values), 'cell')}{shown}, allowed: {width}")
             return False
         del values[width:]
         return True
 
     def _header_again(self, text: str, values: Sequence[Value], names: Sequence[str]) -> str | None:
-        """Return what to call a row that is the header again, perhaps in other units; None if it is none."""
-        if self.layout.header is None or not any(names):
+        """Return what to call a row that is the header again, perhaps in other units; None if it is not."""
+        if self._table.header is None or not any(names):
             return None
         if tuple(values[: len(names)]) == tuple(names):
             return HEADER
-        if any(not isinstance(value, str) or is_number(value, self.layout.decimal) for value in values):
+        if any(not isinstance(value, str) or is_number(value, self._table.decimal) for value in values):
             return None
         known = {split_unit(name)[0].lower() for name in names if name}
-        alike = [str(value) for value in values if split_unit(str(value))[0].lower() in known]
-        return f"another header, {_shown(text)}" if len(alike) > 1 and 2 * len(alike) >= len(names) else None
+        count = sum(split_unit(str(value))[0].lower() in known for value in values)
+        return f"another header, {_shorten(text)}" if count > 1 and 2 * count >= len(names) else None
 
-    def refuse_cut_row(self) -> None:
-        """Report the last row if the file ends within its last cell."""
-        layout = self.layout
-        cut = cut_cell(layout) if len(layout.names) - 1 in self._wanted else None
-        if cut is not None and not self.ended and self._is_read():
-            self._line = layout.lines_of([self._row])[self._row]
-            self._report(f"found {cut!r} where the file ends, allowed: as many decimals as in the other rows")
+    def _read_values(self, cells: Sequence[str]) -> list[float]:
+        used = [cells[column] for column in self._columns]
+        if self._table.decimal == "." and not any("_" in cell for cell in used):  # float() takes 1_000
+            try:
+                return [float(cell) for cell in used]
+            except ValueError:
+                pass
+        values = []
+        for column, cell in zip(self._columns, used, strict=True):
+            value = to_float(cell, self._table.decimal)
+            if value is None:
+                allowed = self._allowed.get(column, MAY_BE_MISSING)
+                self._report(f"found {_shorten(cell)}, allowed: {allowed}", self._table.names[column])
+            values.append(math.nan if value is None else value)
+        return values
 
-    def _time(self, cells: Sequence[str]) -> int:
+    def _read_time(self, cells: Sequence[str]) -> int:
         total = 0
-        for part in () if self._text_parts else self.clock:
+        for part in () if self._text_parts else self._clock:
             cell = cells[part.column]
-            time = to_nanoseconds(cell, self.layout.decimal, part.exponent)
+            time = to_nanoseconds(cell, self._table.decimal, part.exponent)
             if time is None and is_missing(cell):
                 return NO_TIME
             if time is None:
-                name = self.layout.names[part.column]
-                self._report(f"found {_shown(cell)}, allowed: a number in every row", name)
+                name = self._table.names[part.column]
+                self._report(f"found {_shorten(cell)}, allowed: a number in every row", name)
                 return REPORTED
             total += time
         return total
 
-    def _value(self, cells: Sequence[str], column: int) -> float:
-        value = to_float(cells[column], self.layout.decimal)
-        if value is not None:
-            return value
-        allowed = self.allowed.get(column, MAY_BE_MISSING)
-        self._report(f"found {_shown(cells[column])}, allowed: {allowed}", self.layout.names[column])
-        return math.nan
-
     def _report(self, message: str, column: str | None = None, *, lasting: bool = False) -> None:
-        """Keep a finding about this row: a lasting one stays without it, the same in rows on end is one."""
+        """Keep a finding about this row: a lasting one stays without it, repeated ones are counted."""
         if not lasting:
             fault = RowFault(message, (column,) if column else ())
             self._unread.setdefault(self._row - 1, []).append(fault)
@@ -635,32 +596,6 @@ class RowReader:
             self._lasting.append(self._last)
 
 
-def _shown(text: str) -> str:
+def _shorten(text: str) -> str:
     text = text.strip()
-    return repr(text if len(text) <= _SHOWN_TEXT else text[: _SHOWN_TEXT - 3] + "...")
-
-
-READ_BY_ROW = 1 << 16
-"""Bytes that are read row by row together if there is something wrong in them."""
-
-
-def _times(part: Numbers) -> IntArray:
-    """Return the times of a part; none yet where they are text, which is read of all parts at once."""
-    return np.zeros(len(part.values), dtype=np.int64) if part.clock is None else part.clock
-
-
-def _parts(reader: RowReader, block: bytes, scales: Scales) -> Iterator[Numbers]:
-    """Yield the numbers of some whole rows: of all at once, or of either half."""
-    layout = reader.layout
-    newline = layout.segment.newline
-    numbers = None if reader.ended else parse_block(layout, reader.columns, reader.clock, block, scales)
-    if numbers is not None:
-        signs = np.frombuffer(block, dtype=np.uint8)
-        reader.pass_over(len(numbers.values), int(np.count_nonzero(signs == ord(newline))))
-        yield numbers
-    elif len(block) > READ_BY_ROW and (end := end_of_rows(block[: len(block) // 2], layout)):
-        for half in (block[:end], block[end:]):
-            yield from _parts(reader, half, scales)
-    else:
-        text = block.decode(byte_encoding(layout), errors="surrogateescape")
-        yield reader.read(text.removesuffix(newline).split(newline))
+    return repr(text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "...")
