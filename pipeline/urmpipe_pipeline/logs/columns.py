@@ -1,8 +1,9 @@
 """The columns of a log: those of all its tables in a row, with names, units and places.
 
-Part of a table by names of columns: a side (commanded, measured, one of several arms) or a topic.
-
-What is asked where columns do not tell what they are: first of all which are the joints.
+1. `Column`, `columns_of`: a column, and what its name says; names in the cells beside it replace numbers.
+2. `find_column`, `chosen_columns`, `given_units`: the columns that the user means, by name, number or range.
+3. `columns_of_side`, `select_side`, `side_of`, `columns_of_topic`: part of a table by words in the names.
+4. `which_joints`, `take`: the question which columns are the joints, and its choices; hints about units.
 """
 
 from __future__ import annotations
@@ -32,15 +33,29 @@ from urmpipe_pipeline.logs.vocabulary import (
     vocabulary,
 )
 
+REST = "rest"  # all columns without the other side's word
+OTHER_UNIT = {"rad": "deg", "deg": "rad", "m": "mm", "mm": "m", "cm": "m"}  # what a wrong unit most likely is
+UNKNOWN = "columns that are known to be joints"  # allowed, where nothing shows which columns they are
+MAX_LISTED = 8  # words in a message, those of most columns
+MAX_TWINS = 12  # numbers of columns with one name in a message
+MAX_CHOICES = 9  # groups of columns that a question offers
+MAX_SIDE_WORDS = 3  # words that select a group of columns
+
+RECORD = Hint("", effect="record the missing one")
+OTHER_ROBOT = Hint("robot", None, "gives another arm")
+NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
+TIMES_OF_ANOTHER = Hint("", effect="times of another log: read that one with --time FILE:COLUMN")
+
 _UNIT_WORDS = re.compile(
     r"_(rad(ian)?s?|deg(ree)?s?|grad)(_(per_)?s(ec)?2?)?(?=_|$)|_(mm|cm|m|met(er|re)s?|millimet(er|re)s?)$"
 )
 _RANGE = re.compile(r"(?P<first>\d{1,5})-(?P<last>\d{1,5})")
 _NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
-SHOWN_TWINS = 12
-"""Columns of one name that are told by their numbers."""
-
 _NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
+_ARMS = (frozenset(("left", "l")), frozenset(("right", "r")))
+
+
+# 1. Columns
 
 
 class Kind(IntEnum):
@@ -63,7 +78,7 @@ class Column:
         table: Index of its table.
         index: Its index in that table.
         header: Its name as the file has it.
-        name: The same without the unit in brackets, told apart from those of other tables.
+        name: The same without the unit in brackets, different from those of other tables.
         key: The name for comparison with the vocabulary.
         unit_text: Its unit as the file has it, None if it has none.
         text: Whether it holds text instead of numbers.
@@ -118,13 +133,6 @@ class Column:
         return marked.measured | marked.commanded | frozenset(marked.key.split("_"))
 
     @property
-    def words_of_side(self) -> frozenset[str]:
-        """The words of its name that are of a side: measured, commanded, or one of several arms."""
-        marked = self.marked
-        arms = frozenset(word for word in marked.key.split("_") if vocabulary().arms.fullmatch(word))
-        return marked.measured | marked.commanded | arms
-
-    @property
     def kind(self) -> Kind:
         """Whether its values were measured or commanded, as far as its name says so."""
         return kind_of(self.marked.measured, self.marked.commanded)
@@ -151,55 +159,121 @@ class Column:
         return self.name if has_name else str(self.number)
 
 
-def columns_of(layouts: Sequence[LogTable], titles: Sequence[str]) -> tuple[Column, ...]:
+def columns_of(tables: Sequence[LogTable], titles: Sequence[str]) -> tuple[Column, ...]:
     """Return the columns of some tables.
 
+    A column that is named in the cells beside it has this name: rostopic echo -p writes name0, name1, ...
+    with a joint's name in each row, and position0, position1, ...: position0 becomes position.NAME.
+
     Args:
-        layouts: The tables.
-        titles: A title for each, told before the name where two tables have columns of one name,
+        tables: The tables.
+        titles: A title for each, written before the name where two tables have columns of one name,
             other than a time.
     """
-    result: list[Column] = []
-    for table, layout in enumerate(layouts):
-        refuse_wide(len(layout.names), layout.file, layout.header_line)
-        earlier = {column.name for column in result}
-        for index, header in enumerate(layout.names):
-            label, unit = split_unit(header) if layout.header else (header, None)
-            if layout.units and index < len(layout.units):
-                unit = layout.units[index].strip("[]() ") or unit
-            time = any(pattern.search(key(label)) for pattern in vocabulary().time)
-            name = f"{titles[table]}/{label}" if label in earlier and not time else label
-            text = _holds_text(layout.cells(index), layout.decimal)
-            number = len(result) + 1
-            name = name or f"column {number}"
-            shares_name = layout.names.count(header) > 1
-            result.append(
-                Column(number, table, index, header, name, key(label), unit, text, shares_name=shares_name)
-            )
-    return _named_in_cells(result, layouts)
-
-
-def _named_in_cells(columns: Sequence[Column], layouts: Sequence[LogTable]) -> tuple[Column, ...]:
-    """Return the columns, those named in the cells beside them by these names.
-
-    rostopic echo -p writes name0, name1, ... with a joint's name in each row, and position0, position1, ...:
-    position0 becomes position.NAME, whatever the order in which the joints were published.
-    """
+    columns: list[Column] = []
+    for number, table in enumerate(tables):
+        refuse_wide(len(table.names), table.file, table.header_line)
+        earlier = {column.name for column in columns}
+        for index, header in enumerate(table.names):
+            label, unit = split_unit(header) if table.header else (header, None)
+            if table.units and index < len(table.units):
+                unit = table.units[index].strip("[]() ") or unit
+            is_time = any(pattern.search(key(label)) for pattern in vocabulary().time)
+            name = f"{titles[number]}/{label}" if label in earlier and not is_time else label
+            cells = [cell for cell in table.cells(index) if not is_missing(cell)]
+            is_text = 2 * count_numbers(cells, table.decimal) < len(cells)
+            name = name or f"column {len(columns) + 1}"
+            place = (len(columns) + 1, number, index)
+            twin = table.names.count(header) > 1
+            columns.append(Column(*place, header, name, key(label), unit, is_text, shares_name=twin))
     names: dict[tuple[int, str, str], str] = {}
     for column in columns:
-        match = _NAME_COLUMN.match(column.key)
-        cells = set(layouts[column.table].cells(column.index)) if match and column.text else set()
-        if match and len(cells) == 1:
-            names[column.table, match["before"], match["n"]] = cells.pop()
-    result = []
+        match = _NAME_COLUMN.match(column.key) if column.text else None
+        texts = set(tables[column.table].cells(column.index)) if match else set()
+        if match and len(texts) == 1:
+            names[column.table, match["before"], match["n"]] = texts.pop()
+    for k, column in enumerate(columns) if names else ():
+        match = None if column.text else _NUMBERED.match(column.key)
+        if match and (joint := names.get((column.table, match["before"], match["n"]))):
+            label = f"{column.name.rstrip('0123456789')}.{joint}"
+            columns[k] = replace(column, name=label, key=key(label))
+    return tuple(columns)
+
+
+def listed(columns: Sequence[Column], most: int = 24) -> str:
+    """Return the names of columns in a row, as the user may give them; the middle of many is left out."""
+    names = [column.header or f"column {column.number}" for column in columns]
+    if len(names) > most:
+        names = [*names[: most - 2], f"... {len(names) - most + 1} more ...", names[-1]]
+    return ", ".join(names)
+
+
+def find_numbers(names: Sequence[str]) -> list[int] | None:
+    """Return the last number in each name, if the names are the same without it and the numbers differ."""
+    matches = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
+    parts = [match.groups() for match in matches if match]
+    numbers = [int(number) for _, number, _ in parts]
+    same = len({(before, after) for before, _, after in parts}) == 1
+    return numbers if same and len(set(numbers)) == len(names) else None
+
+
+def refuse_twins(
+    used: Sequence[Column], columns: Sequence[Column], tables: Sequence[LogTable], remedy: Hint
+) -> None:
+    """Raise if a column that is to be used shares its name with another one.
+
+    A rate of the same name is no duplicate, nor is an angle "t (rad)" one of the time "t (s)".
+
+    Raises:
+        LogError: With a finding for each such column.
+    """
+
+    def may_be_equal(first: Column, other: Column) -> bool:
+        if first.unit and other.unit and first.unit.quantity != other.unit.quantity:
+            return False
+        return (first.unit.order if first.unit else 0) == (other.unit.order if other.unit else 0)
+
+    by_key: dict[str, list[Column]] = {}
     for column in columns:
-        match = _NUMBERED.match(column.key)
-        name = names.get((column.table, match["before"], match["n"])) if match and not column.text else None
-        if match and name:
-            label = f"{column.name.rstrip('0123456789')}.{name}"
-            column = replace(column, name=label, key=key(label))  # noqa: PLW2901
-        result.append(column)
-    return tuple(result)
+        if column.key and not column.text:
+            by_key.setdefault(column.key, []).append(column)
+    findings = []
+    for column in used:
+        twins = [c for c in by_key.get(column.key, ()) if c is not column and may_be_equal(c, column)]
+        if twins:
+            numbers = sorted(twin.number for twin in (column, *twins))
+            more = f" and {len(numbers) - MAX_TWINS} more" if len(numbers) > MAX_TWINS else ""
+            message = f"found as columns {', '.join(map(str, numbers[:MAX_TWINS]))}{more}, allowed: once"
+            table = tables[column.table]
+            place = (table.file, table.header_line, None, column.header)
+            findings.append(Finding(message, *place, hints=(remedy,)))
+    if findings:
+        raise LogError(*capped(findings, tables[used[0].table].file))
+
+
+def columns_named(
+    columns: Sequence[Column], tables: Sequence[LogTable], patterns: Mapping[str, Patterns]
+) -> dict[str, Column]:
+    """Return the columns whose names match patterns, by what the patterns are of.
+
+    Raises:
+        LogError: If several match the same, each of them named.
+    """
+    matches = {
+        what: [column for column in columns if any(pattern.search(column.key) for pattern in alike)]
+        for what, alike in patterns.items()
+    }
+    several = [
+        Finding(f"found {listed(group)}, allowed: one of them", tables[group[0].table].file)
+        for group in matches.values()
+        if len(group) > 1
+    ]
+    if several:
+        raise LogError(*several)
+    return {what: group[0] for what, group in matches.items() if group}
+
+
+# 2. Columns that the user means
 
 
 def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
@@ -230,51 +304,29 @@ def columns_called(columns: Sequence[Column], text: str) -> list[Column]:
     return matches or [column for column in columns if text == str(column.number)]
 
 
-def lacks_columns(columns: Sequence[Column], texts: Sequence[str]) -> bool:
-    """Return whether no column has one of some names, or one of some numbers is beyond the columns."""
-    called = {text: columns_called(columns, text) for name in texts for text in _each(columns, name)}
-    numbers = [text for text in called if text.isdigit()]
-    return not any(called.values()) or (len(numbers) == len(called) and not all(called.values()))
-
-
 def chosen_columns(columns: Sequence[Column], texts: Sequence[str], **place: str) -> tuple[Column, ...]:
     """Return the columns that the user means by names or numbers, of which 2-7 are six.
 
     Raises:
         LogError: If no column or more than one is meant.
     """
-    return tuple(find_column(columns, one, **place) for text in texts for one in _each(columns, text))
+    return tuple(find_column(columns, name, **place) for text in texts for name in _expand(columns, text))
 
 
-def _each(columns: Sequence[Column], text: str) -> Sequence[str]:
+def lacks_columns(columns: Sequence[Column], texts: Sequence[str]) -> bool:
+    """Return whether no column has one of some names, or one of some numbers is beyond the columns."""
+    called = {name: columns_called(columns, name) for text in texts for name in _expand(columns, text)}
+    numbers = [text for text in called if text.isdigit()]
+    return not any(called.values()) or (len(numbers) == len(called) and not all(called.values()))
+
+
+def _expand(columns: Sequence[Column], text: str) -> Sequence[str]:
     """Return the numbers that a range means; anything else as it is."""
     ends = _RANGE.fullmatch(text)
     if ends is None or columns_called(columns, text):
         return (text,)
     first, last = int(ends["first"]), int(ends["last"])
     return [str(number) for number in range(first, min(last, columns[-1].number + 1) + 1)] or (text,)
-
-
-def columns_named(
-    columns: Sequence[Column], layouts: Sequence[LogTable], patterns: Mapping[str, Patterns]
-) -> dict[str, Column]:
-    """Return the columns whose names match patterns, by what the patterns are of.
-
-    Raises:
-        LogError: If several match the same, each of them named.
-    """
-    found = {
-        what: [column for column in columns if any(pattern.search(column.key) for pattern in alike)]
-        for what, alike in patterns.items()
-    }
-    several = [
-        Finding(f"found {listed(some)}, allowed: one of them", layouts[some[0].table].file)
-        for some in found.values()
-        if len(some) > 1
-    ]
-    if several:
-        raise LogError(*several)
-    return {what: some[0] for what, some in found.items() if some}
 
 
 def given_units(columns: Sequence[Column], options: LogMap) -> dict[int, Unit]:
@@ -284,7 +336,7 @@ def given_units(columns: Sequence[Column], options: LogMap) -> dict[int, Unit]:
         OptionError: If a text is no unit, or that of every angle is none of one.
         LogError: If there is no such column.
     """
-    given = {}
+    units = {}
     for text, unit_text in options.unit.items():
         unit = vocabulary().unit(unit_text)
         quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
@@ -293,67 +345,11 @@ def given_units(columns: Sequence[Column], options: LogMap) -> dict[int, Unit]:
             raise OptionError(Finding(parameter="unit", found=format_value(unit_text), allowed=allowed))
         if text and options.shared and not columns_called(columns, text):
             continue
-        given[find_column(columns, text, parameter="unit").number if text else 0] = unit
-    return given
+        units[find_column(columns, text, parameter="unit").number if text else 0] = unit
+    return units
 
 
-def listed(columns: Sequence[Column], most: int = 24) -> str:
-    """Return the names of columns in a row, as the user may give them; the middle of many is left out."""
-    names = [column.header or f"column {column.number}" for column in columns]
-    if len(names) > most:
-        names = [*names[: most - 2], f"... {len(names) - most + 1} more ...", names[-1]]
-    return ", ".join(names)
-
-
-def refuse_twins(
-    used: Sequence[Column], columns: Sequence[Column], layouts: Sequence[LogTable], remedy: Hint
-) -> None:
-    """Raise if a column that is to be used shares its name with another one.
-
-    A rate of the same name is no duplicate, nor is an angle "t (rad)" one of the time "t (s)": the unit
-    states what it is.
-
-    Raises:
-        LogError: With a finding for each such column.
-    """
-    named: dict[str, list[Column]] = {}
-    for column in columns:
-        if column.key and not column.text:
-            named.setdefault(column.key, []).append(column)
-    findings = []
-    for column in used:
-        duplicates = [
-            other
-            for other in named.get(column.key, ())
-            if other is not column and _may_be_equal(other, column)
-        ]
-        if duplicates:
-            numbers = sorted(c.number for c in (column, *duplicates))
-            more = f" and {len(numbers) - SHOWN_TWINS} more" if len(numbers) > SHOWN_TWINS else ""
-            message = f"found as columns {', '.join(map(str, numbers[:SHOWN_TWINS]))}{more}, allowed: once"
-            layout = layouts[column.table]
-            place = (layout.file, layout.header_line, None, column.header)
-            findings.append(Finding(message, *place, hints=(remedy,)))
-    if findings:
-        raise LogError(*capped(findings, layouts[used[0].table].file))
-
-
-def _may_be_equal(first: Column, other: Column) -> bool:
-    """Return whether two columns may hold the same quantity, by their units or without them."""
-    if first.unit and other.unit and first.unit.quantity != other.unit.quantity:
-        return False
-    return (first.unit.order if first.unit else 0) == (other.unit.order if other.unit else 0)
-
-
-def _holds_text(cells: Sequence[str], decimal: str) -> bool:
-    """Return whether less than half of the cells with content are numbers."""
-    cells = [cell for cell in cells if not is_missing(cell)]
-    return 2 * count_numbers(cells, decimal) < len(cells)
-
-
-REST = "rest"  # all columns without the other side's word
-
-MAX_LISTED = 8  # words in a message, those of most columns
+# 3. Sides and topics
 
 
 def columns_of_side(columns: Sequence[Column], options: LogMap, file: str) -> list[Column]:
@@ -371,31 +367,25 @@ def columns_of_side(columns: Sequence[Column], options: LogMap, file: str) -> li
     if options.side is not None:
         chosen = select_side(columns, options.side)
         if not chosen and not options.shared:
-            raise _no_column(columns, f"with {_quoted(options.side)}", "side", file)
+            raise _no_side_error(columns, f"with {_quote(options.side)}", "side", file)
     if options.pair is not None:
         side, other = map(_words, options.pair)
-        every = side == {REST}
-        chosen = [
-            column for column in chosen if not other <= column.words and (every or side <= column.words)
-        ]
+        is_rest = side == {REST}
+        chosen = [c for c in chosen if not other <= c.words and (is_rest or side <= c.words)]
         if not chosen:
-            own = "" if every else f"with {_quoted(options.pair[0])} and "
-            raise _no_column(columns, f"{own}without {options.pair[1]}", "sides", file)
-        if not every:
+            words = "" if is_rest else f"with {_quote(options.pair[0])} and "
+            raise _no_side_error(columns, f"{words}without {options.pair[1]}", "sides", file)
+        if not is_rest:
             chosen = [_without_words(column, side) for column in chosen]
     return chosen or list(columns)
 
 
 def without_other_side(columns: Sequence[Column], options: LogMap) -> tuple[Column, ...]:
-    """Return the columns without those of another side, unless no time is left."""
+    """Return the columns without those of another side, unless no time remains."""
     other = _words(options.pair[1]) if options.pair else frozenset((REST,))
-    own = {column.number for column in select_side(columns, options.side or "")}
-    kept = tuple(
-        column
-        for column in columns
-        if column.number in own and (other == {REST} or not other <= column.words)
-    )
-    return kept if any(column.is_time for column in kept) else tuple(columns)
+    of_side = {column.number for column in select_side(columns, options.side or "")}
+    rest = tuple(c for c in columns if c.number in of_side and (other == {REST} or not other <= c.words))
+    return rest if any(column.is_time for column in rest) else tuple(columns)
 
 
 def select_side(columns: Sequence[Column], side: str) -> list[Column]:
@@ -405,25 +395,26 @@ def select_side(columns: Sequence[Column], side: str) -> list[Column]:
     """
     if not (words := _words(side)):
         return list(columns)
-    own = {
-        column: replace(_without_words(column, words), side=words)
-        for column in columns
-        if words <= column.words
-    }
-    quantities = {(column.quantity, column.unit_text) for column in own.values()}
-    names = [column.marked.key.split("_") for column in own]
+    of_side = {c: replace(_without_words(c, words), side=words) for c in columns if words <= c.words}
+    quantities = {(column.quantity, column.unit_text) for column in of_side.values()}
+    names = [column.marked.key.split("_") for column in of_side]
     places = {tuple(k for k, word in enumerate(name) if word in words) for name in names} - {()}
-    forms = {_masked(name, place) for name in names for place in places}
+
+    def blank(name: Sequence[str], place: Sequence[int]) -> tuple[str, ...]:
+        return tuple("" if k in place else word for k, word in enumerate(name))
+
+    forms = {blank(name, place) for name in names for place in places}
 
     def is_shared(column: Column) -> bool:
-        name = column.marked.key.split("_")
-        return bool(own) and not (
-            column.words_of_side - words
+        name, marked = column.marked.key.split("_"), column.marked
+        arms = {word for word in name if vocabulary().arms.fullmatch(word)}
+        return bool(of_side) and not (
+            (marked.measured | marked.commanded | arms) - words
             or (column.quantity, column.unit_text) in quantities
-            or any(_masked(name, place) in forms for place in places)
+            or any(blank(name, place) in forms for place in places)
         )
 
-    return [own.get(column, column) for column in columns if column in own or is_shared(column)]
+    return [of_side.get(column, column) for column in columns if column in of_side or is_shared(column)]
 
 
 def side_of(group: Sequence[Column], groups: Sequence[Sequence[Column]]) -> str | None:
@@ -434,48 +425,38 @@ def side_of(group: Sequence[Column], groups: Sequence[Sequence[Column]]) -> str 
     first, *rest = (list(dict.fromkeys(re.split(r"[\W_]+", column.marked.key))) for column in group)
     common = [word for word in first if word in group[0].words and all(word in other for other in rest)]
     common = [word for word in common if not word.isdigit() and vocabulary().unit(word) is None]
-    everything = [column for some in groups for column in some]
-    for count in (1, 2, 3):
+    columns = [column for other in groups for column in other]
+    numbers = [column.number for column in columns if column in group]
+    for count in range(1, MAX_SIDE_WORDS + 1):
         for words in combinations(common, count):
-            numbers = [column.number for column in select_side(everything, "_".join(words))]
-            if numbers == [column.number for column in everything if column in group]:
+            if [column.number for column in select_side(columns, "_".join(words))] == numbers:
                 return "_".join((*sorted(group[0].side), *words))
     return None
-
-
-def _masked(name: Sequence[str], places: Sequence[int]) -> tuple[str, ...]:
-    """Return the words of a name with those at some places left blank."""
-    return tuple("" if k in places else word for k, word in enumerate(name))
 
 
 def _words(side: str) -> frozenset[str]:
     return frozenset(re.findall(r"[^\W_]+", side.lower()))
 
 
-def _quoted(side: str) -> str:
+def _quote(side: str) -> str:
     return f"the word {side}" if len(_words(side)) == 1 else f"the words {', '.join(sorted(_words(side)))}"
 
 
 def _without_words(column: Column, words: frozenset[str]) -> Column:
     """Return a column that is matched without some words of its name, of which some remain."""
-    words = words - vocabulary().stems
-    label = column.matched or split_unit(column.header)[0]
-    parts = re.findall(r"[^\W_]+|[\W_]+", label)
-    matched = "".join(part for part in parts if part.lower() not in words).strip(" _-./")
+    parts = re.findall(r"[^\W_]+|[\W_]+", column.matched or split_unit(column.header)[0])
+    dropped = words - vocabulary().stems
+    matched = "".join(part for part in parts if part.lower() not in dropped).strip(" _-./")
     return replace(column, matched=matched) if re.search(r"[^\W_]", matched) else column
 
 
-def _no_column(columns: Sequence[Column], wanted: str, parameter: str, file: str) -> LogError:
+def _no_side_error(columns: Sequence[Column], missing: str, parameter: str, file: str) -> LogError:
     count = Counter(word for column in columns for word in column.words if word.isalpha())
     shared = [word for word, columns_with in count.most_common(MAX_LISTED) if columns_with > 1]
-    allowed = (
-        f"words in the names of columns, such as {', '.join(shared)}"
-        if shared
-        else "a table with names of columns"
-    )
-    return LogError(
-        Finding(f"found no column {wanted} in its name, allowed: {allowed}", file, parameter=parameter)
-    )
+    words = f"words in the names of columns, such as {', '.join(shared)}"
+    allowed = words if shared else "a table with names of columns"
+    message = f"found no column {missing} in its name, allowed: {allowed}"
+    return LogError(Finding(message, file, parameter=parameter))
 
 
 def columns_of_topic(columns: Sequence[Column], options: LogMap, file: str) -> list[Column]:
@@ -491,8 +472,8 @@ def columns_of_topic(columns: Sequence[Column], options: LogMap, file: str) -> l
     """
     topic = options.topic or ""
     start = topic.strip("/")
-    is_whole = re.compile(rf"/?{re.escape(start)}(?!\w)")
-    chosen = [column for column in columns if is_whole.match(column.header)]
+    is_topic = re.compile(rf"/?{re.escape(start)}(?!\w)")
+    chosen = [column for column in columns if is_topic.match(column.header)]
     chosen = chosen or [column for column in columns if column.header.lstrip("/").startswith(start)]
     if not chosen and not options.shared:
         parts = (re.match(r"(/?\w+)[/.]", column.header) for column in columns)
@@ -501,56 +482,28 @@ def columns_of_topic(columns: Sequence[Column], options: LogMap, file: str) -> l
     return chosen
 
 
-RECORD = Hint("", effect="record the missing one")
-OTHER_ROBOT = Hint("robot", None, "gives another arm")
-NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
-
-TIMES_OF_ANOTHER = Hint("", effect="times of another log: read that one with --time FILE:COLUMN")
-
-_SIDES = (frozenset(("left", "l")), frozenset(("right", "r")))
-
-OTHER_UNIT = {"rad": "deg", "deg": "rad", "m": "mm", "mm": "m", "cm": "m"}
-"""The unit that a wrong one would most likely be."""
-
-UNKNOWN = "columns that are known to be joints"
-"""What is allowed where nothing tells which columns they are."""
-
-MOST_ANSWERS = 9
-"""Groups of columns that a question offers."""
-
-
-def take(columns: Sequence[Column], does: str = "takes these", *, parameter: str = "joints") -> Hint:
-    """Return the hint that takes columns as the joints, or as the position: by number if a name repeats."""
-    numbers = [column.number for column in columns]
-    if all(column.called == str(column.number) for column in columns) and len(columns) > 1:
-        row = numbers == list(range(numbers[0], numbers[-1] + 1))
-        return Hint(parameter, [f"{numbers[0]}-{numbers[-1]}"] if row else [*map(str, numbers)], does)
-    names = [column.called for column in columns]
-    alone = all("," not in name and names.count(name) == 1 for name in names)
-    return Hint(parameter, names if alone else [*map(str, numbers)], does)
-
-
 def by_arm(columns: Sequence[Column]) -> list[list[Column]]:
-    """Return the columns of several arms apart, whose names differ by a side or by their first word.
+    """Return the columns by arm, where their names differ by left and right or by their first word.
 
     All together if there are no such two.
     """
-    sides = [[column for column in columns if column.words & words] for words in _SIDES]
     first: dict[str, list[Column]] = {}
     for column in columns:
         first.setdefault(column.key.split("_")[0], []).append(column)
+    sides = [[column for column in columns if column.words & words] for words in _ARMS]
+
+    def without_arm(column: Column) -> str:
+        words, of_arms = column.key.split("_"), frozenset().union(*_ARMS)
+        return "_".join([w for w in words if w not in of_arms] if column.words & of_arms else words[1:])
+
     for arms in (sides, list(first.values())):
-        names = [frozenset(map(_without_arm, arm)) for arm in arms]
+        names = [frozenset(map(without_arm, arm)) for arm in arms]
         if len(arms) > 1 and len(set(names)) == 1 and names[0] and "" not in names[0]:
             return arms
     return [list(columns)]
 
 
-def _without_arm(column: Column) -> str:
-    """Return the name of a column without the word that says whose it is: a side, else the first one."""
-    words = column.key.split("_")
-    sides = frozenset().union(*_SIDES)
-    return "_".join([w for w in words if w not in sides] if column.words & sides else words[1:])
+# 4. Questions and hints
 
 
 def which_joints(
@@ -565,21 +518,39 @@ def which_joints(
 
     Args:
         file: The file.
-        found: What was found, and why it does not tell.
+        found: What was found, and why it does not decide.
         groups: Columns that may be all joints; the likeliest first.
         allowed: What is allowed.
         hints: What else helps.
         by_side: Whether the words of a side select a group, where there are such words.
     """
     different = list(dict.fromkeys(tuple(group) for group in groups if group))
-    sides = {group: side_of(group, different) for group in different} if by_side else {}
-    answers = [
-        Hint("side", side, "takes these") if (side := sides.get(group)) else take(group)
-        for group in different[:MOST_ANSWERS]
-    ]
+    names = Counter(column.called for column in {column for group in different for column in group})
+    choices = []
+    for group in different[:MAX_CHOICES]:
+        side = side_of(group, different) if by_side else None
+        is_unique = all(names[column.called] == 1 for column in group)
+        choices.append(Hint("side", side, "takes these") if side else take(group, by_number=not is_unique))
     return LogError(
-        Finding(f"found {found}, allowed: {allowed}", file, hints=(*hints, *answers, NAME_JOINTS))
+        Finding(f"found {found}, allowed: {allowed}", file, hints=(*hints, *choices, NAME_JOINTS))
     )
+
+
+def take(
+    columns: Sequence[Column],
+    does: str = "takes these",
+    *,
+    parameter: str = "joints",
+    by_number: bool = False,
+) -> Hint:
+    """Return the hint that takes columns as the joints, or as the position: by number if a name repeats."""
+    numbers = [column.number for column in columns]
+    names = [column.called for column in columns]
+    if all(name == str(number) for name, number in zip(names, numbers, strict=True)) and len(columns) > 1:
+        is_range = numbers == list(range(numbers[0], numbers[-1] + 1))
+        return Hint(parameter, [f"{numbers[0]}-{numbers[-1]}"] if is_range else [*map(str, numbers)], does)
+    is_clear = not by_number and all("," not in name and names.count(name) == 1 for name in names)
+    return Hint(parameter, names if is_clear else [*map(str, numbers)], does)
 
 
 def unit_hints(columns: Sequence[Column], unit: str, does: str = "overrides this") -> tuple[Hint, ...]:
@@ -589,16 +560,14 @@ def unit_hints(columns: Sequence[Column], unit: str, does: str = "overrides this
 
 def which_unit(columns: Sequence[Column], unit: str, *, every: bool) -> tuple[Hint, ...]:
     """Return the hints that give some columns the other unit or confirm theirs, as every angle's or each."""
-    given = [
-        {"": one} if every else {column.called: one for column in columns} for one in (OTHER_UNIT[unit], unit)
-    ]
-    return tuple(Hint("unit", one, "specifies it") for one in given)
+    names = [""] if every else [column.called for column in columns]
+    return tuple(Hint("unit", dict.fromkeys(names, u), "specifies it") for u in (OTHER_UNIT[unit], unit))
 
 
 def unit_inference(
     columns: Sequence[Column], unit: str, evidence: str, basis: Basis, *, every: bool
 ) -> Inference:
-    """Return what is said of the unit of some columns, and why; with the other unit that it may be.
+    """Return the inference of the unit of some columns, with the other unit that it may be.
 
     What is given for every angle reaches some columns, and others are given one by one, as the first is.
     """
@@ -606,12 +575,3 @@ def unit_inference(
     every = every and len(columns) > 1 and unit in ("rad", "deg")
     hints = (Hint("unit", {"" if every else columns[0].called: other}),) if other else ()
     return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints, basis)
-
-
-def find_numbers(names: Sequence[str]) -> list[int] | None:
-    """Return the last number in each name, if the names are the same without it and the numbers differ."""
-    matches = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
-    parts = [match.groups() for match in matches if match]
-    numbers = [int(number) for _, number, _ in parts]
-    same = len({(before, after) for before, _, after in parts}) == 1
-    return numbers if same and len(set(numbers)) == len(names) else None

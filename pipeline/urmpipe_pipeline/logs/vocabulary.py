@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 from urmpipe_models.math3d import RotationForm
 
 Quantity = Literal["angle", "length", "time", "date", "ratio", "other"]  # other: torque, force, current, ...
 Patterns = tuple[re.Pattern[str], ...]
 
-SURELY_SECONDS = 0.05
-"""A time between samples of so much or less is in s: in ms it would be one of 20 kHz or more."""
+SURELY_SECONDS = 0.05  # a time between samples of so much or less is in s: in ms it would be 20 kHz or more
 
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
 _INSIDE = re.compile(
@@ -74,65 +73,93 @@ class KnownSource:
         return bool(self.columns) and all(any(p.search(n) for n in names) for p in self.columns)
 
 
-@dataclass(frozen=True, slots=True)
-class Container:
+class Container(NamedTuple):
     """A kind of file that is no text, and how it becomes a CSV file."""
 
     what: str
     suffixes: tuple[str, ...]
     magic: tuple[bytes, ...]
     advice: str
-    parameters: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class RotationWords:
+class RotationWords(NamedTuple):
     """Names of the columns of an orientation, and the forms that such names are used for."""
 
     patterns: Patterns
     forms: tuple[RotationForm, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class Vocabulary:
     """All words, as vocabulary.toml has them."""
 
-    time: Patterns
-    dates: Patterns
-    period: Patterns
-    long_times: frozenset[str]
-    months: Mapping[str, int]
-    time_seconds: re.Pattern[str]
-    time_rests: Mapping[str, re.Pattern[str]]
-    durations: Patterns
-    index: Patterns
-    episode: tuple[str, ...]
-    joint: Mapping[str, Patterns]
-    joint_words: Mapping[str, frozenset[str]]
-    marks: frozenset[str]
-    orders: tuple[tuple[str, ...], ...]
-    other: frozenset[str]
-    grippers: frozenset[str]
-    measured_markers: frozenset[str]
-    commanded: frozenset[str]
-    goals: frozenset[str]
-    arms: re.Pattern[str]
-    stems: frozenset[str]
-    present: re.Pattern[str]
-    marked: re.Pattern[str]
-    glued: re.Pattern[str]
-    tcp_position: Patterns
-    measured: Patterns
-    outside: frozenset[str]
-    tcp_counted: Patterns
-    tcp_pose_vector: Patterns
-    tcp_matrix: Patterns
-    tcp_rotations: tuple[RotationWords, ...]
-    path: Mapping[str, Patterns]
-    units: Mapping[str, Unit]
-    missing: frozenset[str]
-    sources: tuple[KnownSource, ...]
-    containers: tuple[Container, ...]
+    def __init__(self, data: Mapping[str, Any]) -> None:
+        time, joint, tcp = data["time"], data["joint"], data["tcp"]
+        self.time = _compiled(time["patterns"])
+        self.dates = _compiled(time["dates"])
+        self.period = _compiled(time["period"])
+        self.long_times = frozenset[str](time["long"])
+        self.months = {word: k for k, words in enumerate(time["months"], start=1) for word in words}
+        self.time_seconds = re.compile(time["seconds"])
+        self.time_rests = {rest["unit"]: re.compile(rest["pattern"]) for rest in time["rests"]}
+        self.durations = _compiled(time["durations"])
+        self.index = _compiled(data["index"]["patterns"])
+        self.episode = tuple[str, ...](data["episode"]["names"])
+        roles = ("position", "rate", "acceleration")
+        self.joint = {role: _compiled(joint[role]) for role in roles}
+        self.joint_words = {role: frozenset[str](joint[f"{role}_words"]) for role in roles}
+        self.marks = frozenset[str](joint["marks"])
+        self.orders = tuple(tuple[str, ...](order) for order in joint["orders"])
+        self.other = frozenset[str]((*joint["other"], *joint["grippers"]))
+        self.grippers = frozenset[str](joint["grippers"])
+        self.measured_markers = frozenset[str](joint["measured"])
+        self.commanded = frozenset[str](joint["commanded"])
+        self.goals = frozenset[str](joint["goals"])
+        self.arms = re.compile(joint["arms"])
+        self.stems = frozenset[str](joint["stems"])
+        self.present = re.compile(joint["present"])
+        words = sorted(self.measured_markers | self.commanded, key=len, reverse=True)
+        marks, longer = "|".join(words), "|".join(word for word in words if len(word) > 1)  # dq is a rate
+        stems = "|".join(joint["stems"])
+        self.marked = re.compile(rf"{_BEGINS}({marks}){_ENDS}")
+        glued = rf"{_BEGINS}(({stems})(?=({longer}){_ENDS})|({longer})(?=({stems}){_ENDS}))"
+        self.glued = re.compile(glued)
+        self.tcp_position = _compiled(tcp["position"])
+        self.measured = _compiled(tcp["measured"])
+        self.outside = frozenset[str](tcp["outside"])
+        self.tcp_counted = _compiled(tcp["counted"])
+        self.tcp_pose_vector = _compiled(tcp["pose_vector"])
+        self.tcp_matrix = _compiled(tcp["matrix"])
+        self.tcp_rotations = tuple(
+            RotationWords(_compiled(words["patterns"]), tuple(words["forms"])) for words in tcp["rotation"]
+        )
+        self.path = {name: _compiled(patterns) for name, patterns in data["path"].items()}
+        self.units = {
+            word: Unit(name, cast("Quantity", quantity), entry["factor"])
+            for quantity, of_quantity in data["units"].items()
+            for name, entry in of_quantity.items()
+            for word in entry["words"]
+        }
+        self.missing = frozenset[str](data["missing"]["words"])
+        self.sources = tuple(
+            KnownSource(
+                source["name"],
+                _compiled(source["columns"]),
+                {quantity: self.units[unit] for quantity, unit in source["units"].items()},
+                source.get("own", False),
+            )
+            for source in data["source"]
+        )
+        self.containers = tuple(
+            Container(
+                kind["what"],
+                tuple(kind["suffixes"]),
+                tuple(magic.encode("latin-1") for magic in kind["magic"]),
+                kind["advice"],
+                kind.get("parameters", {}),
+            )
+            for kind in data["container"]
+        )
 
     def unit(self, text: str) -> Unit | None:
         """Return the unit that a text means, such as deg, "°", mm or rad/s^2; None if it means none."""
@@ -152,72 +179,15 @@ class Vocabulary:
         return next((source for source in self.sources if source.name == name), None)
 
 
+def _compiled(patterns: Sequence[str]) -> Patterns:
+    return tuple(re.compile(pattern) for pattern in patterns)
+
+
 @lru_cache
 def vocabulary() -> Vocabulary:
     """Return the words that are shipped with urmpipe."""
-    data = tomllib.loads(files(__package__).joinpath("vocabulary.toml").read_text(encoding="utf-8"))
-    time, joint, tcp, units = data["time"], data["joint"], data["tcp"], dict(_units(data["units"]))
-    roles = ("position", "rate", "acceleration")
-    words = sorted((*joint["measured"], *joint["commanded"]), key=len, reverse=True)
-    marks, longer = "|".join(words), "|".join(word for word in words if len(word) > 1)  # dq is a rate
-    stems = "|".join(joint["stems"])
-    return Vocabulary(
-        time=_compiled(time["patterns"]),
-        dates=_compiled(time["dates"]),
-        period=_compiled(time["period"]),
-        long_times=frozenset(time["long"]),
-        months={word: k for k, words in enumerate(time["months"], start=1) for word in words},
-        time_seconds=re.compile(time["seconds"]),
-        time_rests={rest["unit"]: re.compile(rest["pattern"]) for rest in time["rests"]},
-        durations=_compiled(time["durations"]),
-        index=_compiled(data["index"]["patterns"]),
-        episode=tuple(data["episode"]["names"]),
-        joint={role: _compiled(joint[role]) for role in roles},
-        joint_words={role: frozenset(joint[f"{role}_words"]) for role in roles},
-        marks=frozenset(joint["marks"]),
-        orders=tuple(tuple(order) for order in joint["orders"]),
-        other=frozenset((*joint["other"], *joint["grippers"])),
-        grippers=frozenset(joint["grippers"]),
-        measured_markers=frozenset(joint["measured"]),
-        commanded=frozenset(joint["commanded"]),
-        goals=frozenset(joint["goals"]),
-        arms=re.compile(joint["arms"]),
-        stems=frozenset(joint["stems"]),
-        present=re.compile(joint["present"]),
-        marked=re.compile(rf"{_BEGINS}({marks}){_ENDS}"),
-        glued=re.compile(rf"{_BEGINS}(({stems})(?=({longer}){_ENDS})|({longer})(?=({stems}){_ENDS}))"),
-        tcp_position=_compiled(tcp["position"]),
-        measured=_compiled(tcp["measured"]),
-        outside=frozenset(tcp["outside"]),
-        tcp_counted=_compiled(tcp["counted"]),
-        tcp_pose_vector=_compiled(tcp["pose_vector"]),
-        tcp_matrix=_compiled(tcp["matrix"]),
-        tcp_rotations=tuple(
-            RotationWords(_compiled(one["patterns"]), tuple(one["forms"])) for one in tcp["rotation"]
-        ),
-        path={name: _compiled(patterns) for name, patterns in data["path"].items()},
-        units=units,
-        missing=frozenset(data["missing"]["words"]),
-        sources=tuple(
-            KnownSource(
-                one["name"],
-                _compiled(one["columns"]),
-                {of: units[u] for of, u in one["units"].items()},
-                one.get("own", False),
-            )
-            for one in data["source"]
-        ),
-        containers=tuple(
-            Container(
-                one["what"],
-                tuple(one["suffixes"]),
-                tuple(magic.encode("latin-1") for magic in one["magic"]),
-                one["advice"],
-                one.get("parameters", {}),
-            )
-            for one in data["container"]
-        ),
-    )
+    text = files(__package__).joinpath("vocabulary.toml").read_text(encoding="utf-8")
+    return Vocabulary(tomllib.loads(text))
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
@@ -274,18 +244,7 @@ def mark_name(label: str) -> MarkedName:
         words.glued.sub(r"\1_", key(words.present.sub("present_", key(text))))
         for text in (label, _CAPITAL.sub("_", label))
     )
-    text = max(plain, parted, key=lambda one: len(words.marked.findall(one)))  # the first of equals
+    text = max(plain, parted, key=lambda name: len(words.marked.findall(name)))  # the first of equals
     marks = frozenset(match.group() for match in words.marked.finditer(text))
     bare = key(words.marked.sub("_", text))
     return MarkedName(text, bare, marks & words.measured_markers, marks & words.commanded)
-
-
-def _compiled(patterns: Sequence[str]) -> Patterns:
-    return tuple(re.compile(pattern) for pattern in patterns)
-
-
-def _units(data: Mapping[Quantity, Mapping[str, Any]]) -> Iterator[tuple[str, Unit]]:
-    for quantity, of_quantity in data.items():
-        for name, entry in of_quantity.items():
-            for word in entry["words"]:
-                yield word, Unit(name, quantity, entry["factor"])
