@@ -1,1 +1,12 @@
-"""Files as tables: encoding, delimiter, header, rows, and what is wrong with them."""
+"""Formats: a file becomes a `LogTable`, columns with names, units and cells. Nothing here knows a joint.
+
+`opening` selects the format of each file, by its first bytes, and which source wrote it.
+
+- Text: `text` (bytes, compression, encoding), `merge_conflict`, `sniff` (delimiter, header, units), `cells`,
+  `sniff_rows` and `row_form` (labels, arrays in cells), `coppeliasim` (several tables), `text_table` (rows).
+- Typed columns: `parquet`, `matlab` (MAT, HDF5), `arrays` (NumPy, Python), `bag` and `bag_table` (MCAP, ROS),
+  `memory` over `arrow_columns`.
+- Other files: `json`, `workbook`, `programs` and `program_text` (robots, PLCs), `urmpipe_tables`.
+- Any table: `shape` (joints as rows, flat arrays), `row_choice` (rows, episodes), `padding`; `log_table` with
+  `numbers`, and times in the forms of `clock_forms`. `files` has access to files and optional libraries.
+"""
