@@ -4,11 +4,12 @@
 
 1. Table (`formats.opening` selects the format): columns with names, units and cells; no joints yet.
 2. Columns: joints and rates by their names (`columns`, `names`, `roles`) or by numbers (`unnamed`, `rates`),
-   the recorded tool (`pose_columns`), the clock (`clock`, `clock_columns`). `plan` joins them.
+   the recorded tool (`pose_columns`), the clock (`clock`, `clock_columns`). `plan` joins them; `coverage`
+   warns of similar columns that are not read.
 3. Rows (`rows`): times in ns (`timestamps`), values in the file's own units, checked and joined.
 4. Units (`units`) and the form of orientations (`rotation`): stated, proved by the numbers (`proofs`),
    assumed with a warning, or asked.
-5. Log (`read_log`): joints in rad or m, recorded tool, warnings, and each decision with its evidence.
+5. Log (`convert`, `read`): joints in rad or m, recorded tool, warnings, and each decision with its evidence.
 6. Map (`log_map`, `map_file`): the same decisions as options, keywords and TOML, which read the next log.
 
 What is not known is a question: a `LogError` whose hints are the options that answer it. The words of names,
