@@ -39,7 +39,7 @@ from urmpipe_pipeline.logs.clock_columns import (
     runs_evenly,
 )
 from urmpipe_pipeline.logs.columns import Column, find_column, unit_hints
-from urmpipe_pipeline.logs.formats.cells import LONGEST_NS, TextCells
+from urmpipe_pipeline.logs.formats.cells import MAX_NS, TextCells
 from urmpipe_pipeline.logs.formats.clock_forms import (
     DATE,
     DENSE_DATE,
@@ -247,7 +247,7 @@ def _wrong_unit(column: Column, unit: Unit, allowed: str) -> OptionError:
 def _check_range(time: Column, table: LogTable, unit: str) -> None:
     """Raise if 64 bits cannot store the times in [ns]: they are in another unit."""
     for value in table.numbers(time.index)[:1]:
-        if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
+        if abs(value) * 10.0 ** EXPONENTS[unit] >= MAX_NS:
             of_epoch = [u for u, e in EXPONENTS.items() if EPOCH[0] <= value * 10.0 ** (e - 9) <= EPOCH[1]]
             hint = Hint("unit", {time.called: (*of_epoch, "ns")[0]}, "applies this")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
@@ -479,8 +479,8 @@ def even_clock(
         allowed = "a positive time of 1e-9 s or more"
         raise OptionError(Finding(parameter=given_by, found=f"{period:g} s", allowed=allowed))
     step = DEFAULT_PERIOD if period is None else period
-    if rows * step * 1e9 >= LONGEST_NS:
-        allowed = f"less than {LONGEST_NS / 1e9 / rows:g} s for {rows} rows"
+    if rows * step * 1e9 >= MAX_NS:
+        allowed = f"less than {MAX_NS / 1e9 / rows:g} s for {rows} rows"
         raise OptionError(Finding(parameter=given_by, found=f"{step:g} s", allowed=allowed))
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
     basis: Basis = "assumed" if period is None else "given"

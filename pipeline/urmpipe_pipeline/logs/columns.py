@@ -20,7 +20,7 @@ from urmpipe_pipeline.joint_log import Basis, Inference
 from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
-from urmpipe_pipeline.logs.formats.text import refuse_wide
+from urmpipe_pipeline.logs.formats.text import check_width
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import (
     MarkedName,
@@ -172,7 +172,7 @@ def columns_of(tables: Sequence[LogTable], titles: Sequence[str]) -> tuple[Colum
     """
     columns: list[Column] = []
     for number, table in enumerate(tables):
-        refuse_wide(len(table.names), table.file, table.header_line)
+        check_width(len(table.names), table.file, table.header_line)
         earlier = {column.name for column in columns}
         for index, header in enumerate(table.names):
             label, unit = split_unit(header) if table.header else (header, None)

@@ -21,10 +21,10 @@ from urmpipe_pipeline.joint_log import GAP, Inference, LogWarning, has_gap_after
 from urmpipe_pipeline.logs.clock import Clock
 from urmpipe_pipeline.logs.clock_columns import OTHER_CLOCK, OTHER_TIME
 from urmpipe_pipeline.logs.columns import Column, unit_hints
-from urmpipe_pipeline.logs.formats.cells import LONGEST_CELL
+from urmpipe_pipeline.logs.formats.cells import MAX_CELL_LENGTH
 from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS, NO_TIME, UNREADABLE
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import SHOWN_FINDINGS, Numbers
+from urmpipe_pipeline.logs.formats.numbers import MAX_FINDINGS, Numbers
 from urmpipe_pipeline.logs.formats.padding import without_padding
 from urmpipe_pipeline.logs.formats.row_choice import ROWS_READ
 from urmpipe_pipeline.logs.formats.text_table import TextTable
@@ -154,11 +154,11 @@ def _skip_unread(
         allowed = f"{MAX_SKIPPED:.0%} of them"
         return numbers, warnings, [Finding(unread, table.file, parameter="skip_bad", allowed=allowed)]
     faults = sorted((numbers.file_row(row + 1), texts) for row, texts in numbers.unread.items())
-    for row, texts in faults[:SHOWN_FINDINGS]:
+    for row, texts in faults[:MAX_FINDINGS]:
         message = f"data row {row} of the file is left out: {'; '.join(map(str, texts))}"
         warnings.append(LogWarning(SKIPPED, message, row))
-    if len(faults) > SHOWN_FINDINGS:
-        warnings.append(LogWarning(SKIPPED, f"{len(faults) - SHOWN_FINDINGS} more rows are left out"))
+    if len(faults) > MAX_FINDINGS:
+        warnings.append(LogWarning(SKIPPED, f"{len(faults) - MAX_FINDINGS} more rows are left out"))
     rows, lasting = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread)), numbers.lasting
     return replace(numbers.at(rows), findings=lasting, wrong=len(lasting)), warnings, []
 
@@ -245,7 +245,7 @@ def find_row_errors(table: LogTable, numbers: Numbers, names: Sequence[str], clo
     errors = [*_iter_clock_errors(numbers, clock), *_iter_infinities(numbers, names)]
     total = numbers.wrong + len(errors)
     errors.sort(key=lambda error: (error.row or 0, error.column or "", error.message))
-    rows = [numbers.file_row(error.row or 0) for error in errors[:SHOWN_FINDINGS]]
+    rows = [numbers.file_row(error.row or 0) for error in errors[:MAX_FINDINGS]]
     lines, file = table.lines_of(rows), table.file
     placed = [
         replace(error, file=file, line=lines.get(row), row=row)
@@ -255,7 +255,7 @@ def find_row_errors(table: LogTable, numbers: Numbers, names: Sequence[str], clo
     for error in numbers.findings:
         is_of_clock = error.column in times and not error.hints
         placed.append(replace(error, hints=OTHER_TIME) if is_of_clock else error)
-    listed = sorted(placed, key=lambda error: error.line or 0)[:SHOWN_FINDINGS]
+    listed = sorted(placed, key=lambda error: error.line or 0)[:MAX_FINDINGS]
     more = total - len(listed)
     return [*listed, *([Finding(f"{more} more findings", file=file)] if more > 0 else [])]
 
@@ -303,7 +303,7 @@ def unknown_times(numbers: Numbers, clock: Clock) -> Iterator[Finding]:
         yield Finding(message, row=k + 1, column=name, hints=OTHER_TIME)
     for k in np.flatnonzero(numbers.clock == UNREADABLE).tolist():
         text = " ".join(cells.text(k).strip() for cells in numbers.texts)
-        message = f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
+        message = f"found {text[:MAX_CELL_LENGTH]!r}, allowed: times as in the other rows"
         yield Finding(message, row=k + 1, column=name, hints=OTHER_TIME)
 
 

@@ -113,7 +113,7 @@ def _faults(table: PoseTable, of_curve: Iterable[Finding]) -> Iterator[Finding]:
         allowed = ", or ".join(f"{name} where a row is {meaning}" for name, meaning in MEANINGS.items())
         yield Finding(file=layout.file, line=layout.header, found=both, allowed=f"one of them: {allowed}")
     found = [
-        Finding(fault.said, row=row, column=", ".join(fault.columns) or None)
+        Finding(fault.message, row=row, column=", ".join(fault.columns) or None)
         for row, faults in table.faults.items()
         for fault in faults
     ]

@@ -19,13 +19,13 @@ from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import read_log
-from urmpipe_pipeline.logs.formats.text import LONGEST_LINE, MOST_COLUMNS
+from urmpipe_pipeline.logs.formats.text import MAX_LINE_BYTES, MAX_TABLE_COLUMNS
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
 
 A_ROW = "write one row per sample, one column per joint"
-WIDE = f"found more than {MOST_COLUMNS} columns, allowed: as many as that; {A_ROW}"
+WIDE = f"found more than {MAX_TABLE_COLUMNS} columns, allowed: as many as that; {A_ROW}"
 PLC = "VAR\n x : ARRAY[1..{}] OF REAL := [{}];\nEND_VAR\n"
 
 
@@ -58,7 +58,7 @@ def test_a_line_of_too_many_columns(wrong: Wrong, text: str) -> None:
 
 @pytest.mark.slow
 def test_too_many_names(wrong: Wrong) -> None:
-    assert wrong(_table(MOST_COLUMNS + 1)) == [f"log.csv:1: {WIDE}"]
+    assert wrong(_table(MAX_TABLE_COLUMNS + 1)) == [f"log.csv:1: {WIDE}"]
 
 
 def test_too_many_joints(wrong: Wrong) -> None:
@@ -71,7 +71,7 @@ def test_too_many_joints(wrong: Wrong) -> None:
 
 def test_a_line_that_is_too_long(wrong: Wrong) -> None:
     """It is found where it begins, wherever that is."""
-    text = _table(7) + "0.05," + "1" * LONGEST_LINE + "\n" + _table(7)
+    text = _table(7) + "0.05," + "1" * MAX_LINE_BYTES + "\n" + _table(7)
     assert wrong(text) == [f"log.csv:7: found a line of more than 8 MiB, allowed: shorter lines; {A_ROW}"]
 
 
@@ -191,8 +191,8 @@ def test_roles_that_others_wrote(tmp_path: Path) -> None:
 
 
 def test_lists_that_would_be_too_many_columns(tmp_path: Path) -> None:
-    kind = pa.list_(pa.float64(), MOST_COLUMNS + 1)
-    lists = pa.array([np.zeros(MOST_COLUMNS + 1)] * 2, kind)
+    kind = pa.list_(pa.float64(), MAX_TABLE_COLUMNS + 1)
+    lists = pa.array([np.zeros(MAX_TABLE_COLUMNS + 1)] * 2, kind)
     pq.write_table(pa.table({"t": [0.0, 0.1], "q": lists}), path := tmp_path / "log.parquet")
     assert refusal(LogError, read_log, [path]) == f"{path}: {WIDE}"
 

@@ -41,7 +41,7 @@ from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import ROLE, UNIT, arrow_column
 from urmpipe_pipeline.logs.formats.parquet import is_table
 from urmpipe_pipeline.logs.formats.row_form import spread_names
-from urmpipe_pipeline.logs.formats.text import refuse_unpacked, refuse_wide
+from urmpipe_pipeline.logs.formats.text import check_unpacked_size, check_width
 from urmpipe_pipeline.logs.formats.urmpipe_tables import FORM, GIVEN
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
@@ -88,7 +88,7 @@ def make_array_table(
         is_named: Whether the columns have names; None: unless all are entries of one array.
     """
     columns = list(columns)
-    refuse_wide(len(columns), str(path))
+    check_width(len(columns), str(path))
     shared = 0
     if "topic" not in choice.applied:
         groups = zip(*(name[:-1] for name, _, _ in columns), strict=False)
@@ -234,8 +234,8 @@ def _iter_stored(path: Path) -> Iterator[tuple[str, Array | None]]:
             return
     with ZipFile(path) as archive:
         members = archive.infolist()
-        refuse_wide(len(members), str(path))
-        refuse_unpacked(path, sum(member.file_size for member in members))
+        check_width(len(members), str(path))
+        check_unpacked_size(path, sum(member.file_size for member in members))
         for member in members:
             with archive.open(member) as header, archive.open(member) as data:
                 yield member.filename.removesuffix(".npy"), _read_array(header, data, member.file_size)

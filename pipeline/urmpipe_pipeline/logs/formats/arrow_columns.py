@@ -20,7 +20,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.logs.formats.cells import Bytes, printable
 from urmpipe_pipeline.logs.formats.numbers import UNIT, arrow_column, is_number
 from urmpipe_pipeline.logs.formats.row_form import spread_names
-from urmpipe_pipeline.logs.formats.text import MOST_COLUMNS, refuse_wide
+from urmpipe_pipeline.logs.formats.text import MAX_TABLE_COLUMNS, check_width
 
 EXPONENTS = {b"s": 9, b"ms": 6, b"us": 3, b"ns": 0}  # powers of ten from units of times to [ns]
 USUAL_SHARE = 0.9  # of the lists of a column that have one length, where the others are damaged
@@ -61,8 +61,8 @@ def plain_table(table: pa.Table, place: str) -> pa.Table:
     """
     pairs = zip(table.schema, table.columns, strict=True)
     flat = (plain for field, column in pairs for plain in _flatten(field, column, place))
-    columns = list(islice(flat, MOST_COLUMNS + 1))
-    refuse_wide(len(columns), place)
+    columns = list(islice(flat, MAX_TABLE_COLUMNS + 1))
+    check_width(len(columns), place)
     fields = [
         pa.field(printable(field.name.strip()), column.type, metadata=field.metadata)
         for field, column in columns
@@ -108,7 +108,7 @@ def _flatten(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[N
             found, allowed = f"{lengths[other[0]]} entries", f"{usual}, as in the other rows"
             row = int(other[0]) + 1
             raise LogError(Finding(file=place, row=row, column=field.name, found=found, allowed=allowed))
-        refuse_wide(usual, place)
+        check_width(usual, place)
         for k, name in enumerate(spread_names([field.name], [usual])):
             yield from _flatten(field.with_name(name), pc.list_element(column, k), place)
 

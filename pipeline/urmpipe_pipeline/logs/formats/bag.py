@@ -32,7 +32,7 @@ from urllib.parse import quote
 import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError, format_value
-from urmpipe_pipeline.logs.formats.text import refuse_unpacked, unpacked_limit
+from urmpipe_pipeline.logs.formats.text import check_unpacked_size, unpacked_limit
 
 MAGIC = {b"\x89MCAP": ".mcap", b"SQLite format 3\0": ".db3", b"#ROSBAG V": ".bag"}
 METADATA = "metadata.yaml"
@@ -173,7 +173,7 @@ def _opened(file: Path) -> Iterator[tuple[Path, str]]:
                         size += target.write(block)
             except (pa.ArrowException, OSError) as error:
                 raise _DamageError(f"cannot be unpacked ({_reason(error)})") from error
-            refuse_unpacked(packed, size)
+            check_unpacked_size(packed, size)
         with file.open("rb") as stream:
             head = stream.read(16)
         kind = next((suffix for magic, suffix in MAGIC.items() if head.startswith(magic)), None)

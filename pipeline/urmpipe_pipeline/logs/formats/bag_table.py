@@ -25,7 +25,7 @@ from urmpipe_pipeline.logs.formats.bag import Message, make_decoder, open_bag
 from urmpipe_pipeline.logs.formats.files import choice_error, question
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import JOINT, ROLE, UNIT
-from urmpipe_pipeline.logs.formats.text import refuse_wide
+from urmpipe_pipeline.logs.formats.text import check_width
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import key, vocabulary
 
@@ -354,7 +354,7 @@ def _build_table(
         if twice := [name for name, count in Counter(names).items() if count > 1]:
             message = f"message {places[0] + 1} of {topic} has {twice[0]} twice, allowed: each name once"
             raise LogError(Finding(message, str(path)))
-        refuse_wide(len({*columns, *names}), str(path))
+        check_width(len({*columns, *names}), str(path))
         for name, values in zip(names, zip(*block, strict=True), strict=True):
             column = columns.setdefault(name, [None] * len(rows))
             for place, value in zip(places, values, strict=True):

@@ -25,8 +25,8 @@ SPACE = " "  # as a delimiter it stands for any run of spaces and tabs
 DELIMITERS = (",", ";", "\t", SPACE, "|")
 DECIMALS = (".", ",")
 MAX_COARSE_DIGITS = 6  # significant digits of a format that is worth telling: its steps show in derivatives
-LONGEST_NS = 1 << 62  # times in [ns] stay below, 146 years: then their differences fit into 64 bits as well
-LONGEST_CELL = 64  # no form of a clock has more signs
+MAX_NS = 1 << 62  # times in [ns] stay below, 146 years: then their differences fit into 64 bits as well
+MAX_CELL_LENGTH = 64  # no form of a clock has more signs
 BLOCK = 1 << 15  # cells read at once: their bytes stay in the processor's cache
 _CACHED_CELLS = 1 << 14  # those of a file's head are looked at many times
 
@@ -114,7 +114,7 @@ def to_nanoseconds(cell: str, decimal: str, exponent: int) -> int | None:
         exact = Decimal(plain(cell, decimal)).scaleb(exponent)
     except DecimalException:  # an exponent of millions
         return None
-    return int(exact.to_integral_value(ROUND_HALF_EVEN)) if abs(exact) < LONGEST_NS else None
+    return int(exact.to_integral_value(ROUND_HALF_EVEN)) if abs(exact) < MAX_NS else None
 
 
 def grouped_number(text: str) -> str | None:
@@ -194,9 +194,9 @@ class TextCells:
         """
         for first in range(0, len(self), BLOCK):
             starts = self.starts[first : first + BLOCK + 1]
-            lengths = np.minimum(np.diff(starts), LONGEST_CELL)
+            lengths = np.minimum(np.diff(starts), MAX_CELL_LENGTH)
             for length in np.flatnonzero(np.bincount(lengths)).tolist():
-                if not 0 < length < LONGEST_CELL:
+                if not 0 < length < MAX_CELL_LENGTH:
                     continue
                 rows = np.flatnonzero(lengths == length)
                 if len(rows) == len(lengths):

@@ -21,8 +21,8 @@ import numpy as np
 from urmpipe_models.elementwise import BoolArray, IntArray
 from urmpipe_pipeline.logs.formats.cells import (
     DECIMALS,
-    LONGEST_CELL,
-    LONGEST_NS,
+    MAX_CELL_LENGTH,
+    MAX_NS,
     Bytes,
     TextCells,
     is_missing,
@@ -169,7 +169,7 @@ def _read_shape(cells: Bytes, form: ClockForm) -> IntArray | int:
             times += days * DAY_NS - parts.sign("ahead") * minutes * (60 * SECOND_NS)
         else:
             days = parts.number("days")
-            is_valid &= days < LONGEST_NS // DAY_NS
+            is_valid &= days < MAX_NS // DAY_NS
             times = parts.sign("days_sign") * days * DAY_NS + parts.sign("sign") * times
     return np.where(is_valid, times, UNREADABLE)
 
@@ -183,7 +183,7 @@ def _read_date(parts: _Parts) -> tuple[IntArray, BoolArray]:
     dates = first.astype("datetime64[D]") + (day - 1)
     is_date = (month >= 1) & (month <= 12) & (dates.astype("datetime64[M]") == first)
     days = dates.astype(np.int64)
-    return days, is_date & (np.abs(days) < LONGEST_NS // DAY_NS)
+    return days, is_date & (np.abs(days) < MAX_NS // DAY_NS)
 
 
 def _read_time_of_day(parts: _Parts, unit: str) -> tuple[IntArray, BoolArray]:
@@ -208,7 +208,7 @@ def _read_duration(parts: _Parts) -> tuple[IntArray, BoolArray]:
     decimals, divisor = parts.decimals("decimals") * max(unit // SECOND_NS, 1), max(SECOND_NS // unit, 1)
     low, rest = decimals // divisor, decimals % divisor
     low += (2 * rest > divisor) | ((2 * rest == divisor) & (low % 2 == 1))
-    is_valid = integer < LONGEST_NS // unit
+    is_valid = integer < MAX_NS // unit
     return parts.sign("sign") * (np.where(is_valid, integer, 0) * unit + low), is_valid
 
 
@@ -302,7 +302,7 @@ def expand_exponent(cell: str) -> str:
 
 def is_clock_text(cell: str) -> bool:
     """Return whether the text of a cell may be a time; a number without a unit is not."""
-    if len(cell) >= LONGEST_CELL or cell[:1] not in "+-0123456789":
+    if len(cell) >= MAX_CELL_LENGTH or cell[:1] not in "+-0123456789":
         return False
     if any(is_number(cell, decimal) for decimal in DECIMALS):
         return False

@@ -30,7 +30,7 @@ from urmpipe_pipeline.logs.formats.arrays import ask_for_arrays
 from urmpipe_pipeline.logs.formats.cells import is_number, printable
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.text import Segment, head_lines, refuse_wide, text_segment
+from urmpipe_pipeline.logs.formats.text import Segment, check_width, head_lines, text_segment
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap
 
@@ -63,7 +63,7 @@ def sniff_json_lines(segment: Segment) -> TextTable | None:
             continue
         if record.keys() != names.keys():
             names |= dict.fromkeys(record)
-            refuse_wide(len(names), str(segment.path))
+            check_width(len(names), str(segment.path))
             usual = [*names]
         is_usual = [*record] == usual
         row = "\t".join(record.values() if is_usual else [record.get(name, "") for name in names])
@@ -193,7 +193,7 @@ def _columns(name: str, array: Sequence[Any], file: str) -> dict[str, list[str]]
     """Return the cells of the entries of an array by name."""
     records = [_add_cells(entry, name, {}) for entry in array]
     names = dict.fromkeys(key for record in records for key in record)
-    refuse_wide(len(names), file)
+    check_width(len(names), file)
     return {key: [record.get(key, "") for record in records] for key in names}
 
 

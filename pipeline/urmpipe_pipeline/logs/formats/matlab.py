@@ -26,7 +26,7 @@ from urmpipe_pipeline.logs.formats.arrow_columns import EXPONENTS, decimals
 from urmpipe_pipeline.logs.formats.files import read_separately
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
 from urmpipe_pipeline.logs.formats.numbers import UNIT, arrow_column
-from urmpipe_pipeline.logs.formats.text import refuse_unpacked, unpacked_limit
+from urmpipe_pipeline.logs.formats.text import check_unpacked_size, unpacked_limit
 from urmpipe_pipeline.logs.formats.urmpipe_tables import ORDERS, POINT, RECORDED, with_roles
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.outputs import EXPORT_HEADER
@@ -44,7 +44,7 @@ def read_mat(path: Path, head: bytes, options: LogMap) -> MemoryTable:
         LogError: If it is damaged, or has no numbers with one row per sample; with a question if it has
             several episodes, or arrays of several lengths.
     """
-    refuse_unpacked(path, _unpacked_size(path))
+    check_unpacked_size(path, _unpacked_size(path))
     variables = read_separately(path, "a MAT file", "mat")
     if EXPORT_HEADER.encode() in head:
         run, simulated = variables.get("run"), variables.get("simulation")
@@ -61,7 +61,7 @@ def read_hdf5(path: Path, options: LogMap) -> MemoryTable:
     most = str(unpacked_limit(path.stat().st_size))
     arguments = (most, options.episode or "", options.topic or "")
     contents = read_separately(path, "an HDF5 file", "hdf5", *arguments)
-    refuse_unpacked(path, contents.size)
+    check_unpacked_size(path, contents.size)
     if contents.variables is not None:
         return _make_variable_table(path, contents.variables, options)
     if isinstance(contents.choice, Question):

@@ -16,7 +16,7 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, format_value
 from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
 from urmpipe_pipeline.logs.formats.cells import (
-    LONGEST_NS,
+    MAX_NS,
     TextCells,
     is_text,
     to_float,
@@ -25,7 +25,7 @@ from urmpipe_pipeline.logs.formats.cells import (
 from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, UNREADABLE
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import (
-    SHOWN_FINDINGS,
+    MAX_FINDINGS,
     UNIT,
     ClockColumn,
     Numbers,
@@ -102,12 +102,12 @@ class ArrowTable(LogTable):
                 message = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
                 faults.setdefault(row, []).append(RowFault(message, (self.names[column],)))
         findings = tuple(
-            Finding(fault.said, self.file, row=self.file_row(row + 1), column=fault.columns[0])
-            for row in sorted(faults)[:SHOWN_FINDINGS]
+            Finding(fault.message, self.file, row=self.file_row(row + 1), column=fault.columns[0])
+            for row in sorted(faults)[:MAX_FINDINGS]
             for fault in faults[row]
         )
         rows = None if self.rows is None else self.rows + 1
-        faulty = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
+        faulty = (findings[:MAX_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
         if not clock:
             return Numbers(values, None, *faulty)
         texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)
@@ -268,13 +268,13 @@ def _nanoseconds(column: pa.ChunkedArray, exponent: int) -> IntArray:
         integers, missing = (
             _values(column, np.uint64) if unsigned else _values(column.cast(pa.int64()), np.int64)
         )
-        far = np.abs(integers.astype(np.float64)) * 10.0**exponent >= LONGEST_NS
+        far = np.abs(integers.astype(np.float64)) * 10.0**exponent >= MAX_NS
         times = np.where(far | missing, 0, integers).astype(np.int64) * 10**exponent
         return np.where(missing, NO_TIME, np.where(far, UNREADABLE, times))
     values, wrong = numbers_of(column)
     missing = np.isnan(values)
     missing[list(wrong)] = False
-    readable = np.abs(values) * 10.0**exponent < LONGEST_NS
+    readable = np.abs(values) * 10.0**exponent < MAX_NS
     times = np.where(missing, NO_TIME, UNREADABLE)
     times[readable] = _rounded(_at(column, readable), values[readable], exponent)
     return times

@@ -55,7 +55,7 @@ class Marker(NamedTuple):
     is_comment: bool
 
 
-def refuse_conflict(segment: Segment) -> list[Marker]:
+def find_markers(segment: Segment) -> list[Marker]:
     """Return the lines of a file that are markers if they are among its rows: single lines of =.
 
     Raises:
@@ -73,7 +73,7 @@ def refuse_conflict(segment: Segment) -> list[Marker]:
     raise _conflict_error(segment, markers[first:end])
 
 
-def refuse_among_rows(table: TextTable, markers: Sequence[Marker]) -> None:
+def check_rows_for_markers(table: TextTable, markers: Sequence[Marker]) -> None:
     """Raise a `LogError` if lines that may be markers are below the first row of a table."""
     among = [marker for marker in markers if marker.line >= table.first_line]
     if among:

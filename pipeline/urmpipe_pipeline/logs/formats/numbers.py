@@ -50,13 +50,13 @@ def arrow_column(values: npt.NDArray[Any]) -> pa.Array:
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), buffers)
 
 
-SHOWN_FINDINGS = 20  # findings that are listed; further ones are counted
+MAX_FINDINGS = 20  # findings that are listed; further ones are counted
 
 
 def capped(findings: Sequence[Finding], file: str) -> list[Finding]:
     """Return the first of many findings about a file, and one that counts the others."""
-    more = len(findings) - SHOWN_FINDINGS
-    return [*findings[:SHOWN_FINDINGS], *([Finding(f"{more} more findings", file)] if more > 0 else [])]
+    more = len(findings) - MAX_FINDINGS
+    return [*findings[:MAX_FINDINGS], *([Finding(f"{more} more findings", file)] if more > 0 else [])]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,17 +79,17 @@ class RowFault:
     """The fault of a row that cannot be used.
 
     Attributes:
-        said: What was found, and what is allowed.
+        message: What was found, and what is allowed.
         columns: The columns in which it was found; none for the row as a whole.
     """
 
-    said: str
+    message: str
     columns: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         if not self.columns:
-            return self.said
-        return f"column{'s' * (len(self.columns) > 1)} {', '.join(self.columns)}: {self.said}"
+            return self.message
+        return f"column{'s' * (len(self.columns) > 1)} {', '.join(self.columns)}: {self.message}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,13 +24,13 @@ from urmpipe_pipeline.logs.formats.files import first_bytes, import_optional
 from urmpipe_pipeline.logs.formats.json import read_json, sniff_json_lines
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.merge_conflict import refuse_among_rows, refuse_conflict
+from urmpipe_pipeline.logs.formats.merge_conflict import check_rows_for_markers, find_markers
 from urmpipe_pipeline.logs.formats.programs import read_program
 from urmpipe_pipeline.logs.formats.row_choice import choose_rows
 from urmpipe_pipeline.logs.formats.shape import orient_table
 from urmpipe_pipeline.logs.formats.sniff import GIVEN, across, sniff
 from urmpipe_pipeline.logs.formats.sniff_rows import name_echoed_columns, sniff_arrays, sniff_labels
-from urmpipe_pipeline.logs.formats.text import Segment, open_text, refuse_long_lines
+from urmpipe_pipeline.logs.formats.text import Segment, check_line_lengths, open_text
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.formats.urmpipe_tables import is_in_si
 from urmpipe_pipeline.logs.formats.workbook import read_workbook
@@ -94,7 +94,7 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
     if options.sheet is not None and not options.shared and not any(text.delimiter for text in texts):
         sheet = format_value(options.sheet)
         raise OptionError(Finding(parameter="sheet", found=sheet, allowed="with a workbook"))
-    markers = map_collecting_errors(refuse_conflict, texts)
+    markers = map_collecting_errors(find_markers, texts)
     titles = tuple(log_stem(file) if isinstance(file, Path) else file.name for file in files)
     graphs: list[tuple[str, Segment]] = []
     is_export = options.source == COPPELIASIM
@@ -105,7 +105,7 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
         titles, contents = tuple(title for title, _ in graphs), [segment for _, segment in graphs]
     tables = map_collecting_errors(lambda content: _sniff(content, options, sniff_plain), contents)
     text_tables = [table for table in tables if isinstance(table, TextTable)]
-    map_collecting_errors(lambda pair: refuse_among_rows(*pair), zip(text_tables, markers, strict=False))
+    map_collecting_errors(lambda pair: check_rows_for_markers(*pair), zip(text_tables, markers, strict=False))
     if len(files) > 1:
         tables = [across(table) for table in tables]
     if sniff_plain is sniff:
@@ -146,7 +146,7 @@ def _open_file(file: Path | MemoryTable, options: LogMap) -> Segment | MemoryTab
     text = open_text(file, any_suffix=options.source is not None)
     table = read_program(text, options) or read_json(text, options)
     if table is None:
-        refuse_long_lines(text)
+        check_line_lengths(text)
     return table or text
 
 

@@ -27,7 +27,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.logs.formats.arrow_columns import exact_times, is_list
 from urmpipe_pipeline.logs.formats.files import choice_error, question
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.text import refuse_unpacked
+from urmpipe_pipeline.logs.formats.text import check_unpacked_size
 from urmpipe_pipeline.logs.formats.urmpipe_tables import (
     MARK,
     mark_result,
@@ -155,7 +155,7 @@ def read_parquet(path: Path, head: bytes, options: LogMap) -> MemoryTable:
             chunks = (group.column(k) for group in groups for k in range(group.num_columns))
             # Of repeated values a file holds one.
             sizes = (max(chunk.total_uncompressed_size, 8 * chunk.num_values) for chunk in chunks)
-            refuse_unpacked(path, sum(sizes))
+            check_unpacked_size(path, sum(sizes))
             if EPISODE not in file.schema_arrow.names:
                 return file.read()
             columns = [field.name for field in file.schema_arrow if not _is_image(field.type)]
@@ -184,7 +184,7 @@ def read_feather(path: Path) -> MemoryTable:
             for number in range(file.num_record_batches):
                 batches.append(file.get_batch(number))
                 size += batches[-1].nbytes
-                refuse_unpacked(path, size)
+                check_unpacked_size(path, size)
             return pa.Table.from_batches(batches, file.schema)
 
     return _read_file(path, read, "Feather", ())

@@ -33,7 +33,7 @@ from urmpipe_pipeline.logs.formats.cells import (
 from urmpipe_pipeline.logs.formats.clock_forms import is_clock_text
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
-from urmpipe_pipeline.logs.formats.text import FEWEST_LINES, HeadLine, Segment, head_lines
+from urmpipe_pipeline.logs.formats.text import MIN_LINES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.text import strip_apostrophe
@@ -405,7 +405,7 @@ def _uncounted_rows(rows: Sequence[Row], width: int) -> list[int]:
 def _no_rows(segment: Segment, body: Sequence[HeadLine], options: Mapping[str, str]) -> Finding:
     """Return why no row of numbers was found with the signs that were given."""
     file, allowed = str(segment.path), "a table with one row per sample"
-    if segment.has_more and len(body) < FEWEST_LINES:
+    if segment.has_more and len(body) < MIN_LINES:
         found = f"no row of numbers in the first {len(segment.head)} letters"
         return Finding(file=file, found=found, allowed=allowed)
     if not body:

@@ -23,14 +23,16 @@ from urmpipe_models.files import suggest_path
 from urmpipe_pipeline.joint_log import Inference, SourceFile
 from urmpipe_pipeline.logs.vocabulary import Container, vocabulary
 
-MOST_COLUMNS = 10_000  # of a table: a hundred times those of the widest recorders of robots
-LONGEST_LINE = 8 << 20  # bytes of a line of text: 800,000 times in one row
+MAX_TABLE_COLUMNS = 10_000  # of a table: a hundred times those of the widest recorders of robots
+MAX_LINE_BYTES = 8 << 20  # bytes of a line of text: 800,000 times in one row
 UNPACKED = 64 << 20  # bytes that any file may unpack to
 RATIO = 50  # x its size, that a larger file may unpack to: logs of doubles unpack to 2 to 10 times theirs
 MEMORY_LIMIT = 4 << 30  # bytes that a compressed text may unpack to: they are kept in memory
 HEAD_BYTES = 64 * 1024  # that show how a file is written
-MOST_HEAD = 1 << 20  # bytes of the head where that holds few lines: they are long, or below many comments
-FEWEST_LINES = 4  # without comments: they show a header, units and rows
+MAX_HEAD_BYTES = (
+    1 << 20
+)  # bytes of the head where that holds few lines: they are long, or below many comments
+MIN_LINES = 4  # without comments: they show a header, units and rows
 COMMENTS = ("#", "%", "//")
 LOGS = (".csv", ".txt", ".tsv", ".dat", ".log", ".rrd")  # how most logs are called, and their recordings
 
@@ -46,10 +48,10 @@ _BYTE_ORDER_MARKS = (
 _ROW_PER_SAMPLE = Hint("", effect="write one row per sample, one column per joint")
 
 
-def refuse_wide(columns: int, file: str, line: int | None = None) -> None:
+def check_width(columns: int, file: str, line: int | None = None) -> None:
     """Raise a `LogError` if a table has more columns than it may have."""
-    if columns > MOST_COLUMNS:
-        found, allowed = f"more than {MOST_COLUMNS} columns", "as many as that"
+    if columns > MAX_TABLE_COLUMNS:
+        found, allowed = f"more than {MAX_TABLE_COLUMNS} columns", "as many as that"
         raise LogError(Finding(file=file, line=line, found=found, allowed=allowed, hints=(_ROW_PER_SAMPLE,)))
 
 
@@ -58,7 +60,7 @@ def unpacked_limit(size: int) -> int:
     return max(UNPACKED, RATIO * size)
 
 
-def refuse_unpacked(path: Path, unpacked: int) -> None:
+def check_unpacked_size(path: Path, unpacked: int) -> None:
     """Raise a `LogError` if a file unpacks to more bytes than its size lets expect."""
     size = path.stat().st_size
     limit = unpacked_limit(size)
@@ -181,7 +183,7 @@ class Segment:
         """Return the segment with its head: its first lines, enough of them to show what they are."""
         head, size, length = "", HEAD_BYTES, self.end - self.start
         with self.open() as file:
-            while size <= MOST_HEAD:
+            while size <= MAX_HEAD_BYTES:
                 file.seek(self.start)
                 decoder = codecs.getincrementaldecoder(self.encoding)(self.errors)
                 head = decoder.decode(file.read(min(size, length)))
@@ -190,7 +192,7 @@ class Segment:
                     head = head[:cut] if cut else head
                 lines = (line.lstrip() for line in head.splitlines())
                 content = (line for line in lines if line and not line.startswith(COMMENTS))
-                if size >= length or len([*islice(content, FEWEST_LINES)]) == FEWEST_LINES:
+                if size >= length or len([*islice(content, MIN_LINES)]) == MIN_LINES:
                     return replace(self, head=head)
                 size *= 4
         return replace(self, head=head if "\n" in head or "\r" in head else head[:HEAD_BYTES])
@@ -288,19 +290,19 @@ def text_segment(path: Path, text: str, delimiter: str, inferences: tuple[Infere
     return Segment(path, "utf-8", 0, len(data), 1, "", data, delimiter, inferences).with_head()
 
 
-def refuse_long_lines(segment: Segment) -> None:
+def check_line_lengths(segment: Segment) -> None:
     """Raise a `LogError` if a line is too long for a table.
 
     Such a line spans blocks of which the next holds no end of a line, as is quickly seen.
     """
-    if segment.end <= LONGEST_LINE:
+    if segment.end <= MAX_LINE_BYTES:
         return
     sign, length, lines = segment.newline.encode(), 0, 1
     with segment.open() as file:
-        while block := file.read(LONGEST_LINE // 8):
+        while block := file.read(MAX_LINE_BYTES // 8):
             first = block.find(sign)
-            if length + (len(block) if first < 0 else first) > LONGEST_LINE:
-                found, allowed = f"a line of more than {LONGEST_LINE >> 20} MiB", "shorter lines"
+            if length + (len(block) if first < 0 else first) > MAX_LINE_BYTES:
+                found, allowed = f"a line of more than {MAX_LINE_BYTES >> 20} MiB", "shorter lines"
                 hints, file_name = (_ROW_PER_SAMPLE,), str(segment.path)
                 raise LogError(Finding(file=file_name, line=lines, found=found, allowed=allowed, hints=hints))
             length = length + len(block) if first < 0 else len(block) - 1 - block.rfind(sign)

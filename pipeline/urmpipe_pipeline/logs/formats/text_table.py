@@ -43,13 +43,13 @@ from urmpipe_pipeline.logs.formats.cells import (
 from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, REPORTED
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import (
-    SHOWN_FINDINGS,
+    MAX_FINDINGS,
     ClockColumn,
     Numbers,
     RowFault,
 )
 from urmpipe_pipeline.logs.formats.row_form import RowError, RowForm, Value
-from urmpipe_pipeline.logs.formats.text import COMMENTS, MOST_HEAD, Segment
+from urmpipe_pipeline.logs.formats.text import COMMENTS, MAX_HEAD_BYTES, Segment
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
 
 BLOCK_BYTES = 1 << 22  # read at once: enough rows for several threads to parse, few enough to keep memory low
@@ -499,7 +499,7 @@ class RowReader:
     def _read_cells(self, text: str) -> list[str] | None:
         """Return the cells of a row; None if it is not written like the others, or has no numbers at all."""
         table, form = self._table, self._table.form
-        if len(text) > MOST_HEAD:
+        if len(text) > MAX_HEAD_BYTES:
             self._report(f"found a line of {len(text)} letters, allowed: {len(table.names)} cells")
             return None
         try:
@@ -590,7 +590,7 @@ class RowReader:
             return
         self._last = _Fault(message, self._line, self._row, column)
         self._wrong += 1
-        if len(self._faults) < SHOWN_FINDINGS:
+        if len(self._faults) < MAX_FINDINGS:
             self._faults.append(self._last)
         if lasting:
             self._lasting.append(self._last)

@@ -28,7 +28,7 @@ from urmpipe_pipeline.logs.formats.files import (
     question,
     read_separately,
 )
-from urmpipe_pipeline.logs.formats.text import Segment, refuse_unpacked, text_segment
+from urmpipe_pipeline.logs.formats.text import Segment, check_unpacked_size, text_segment
 from urmpipe_pipeline.logs.log_map import LogMap
 
 _ZIP, _OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
@@ -76,7 +76,7 @@ def _is_zipped_workbook(path: Path) -> bool:
                 "mimetype" in names and archive.read("mimetype").startswith(_OPEN_DOCUMENT)
             )
             if is_book:
-                refuse_unpacked(path, sum(part.file_size for part in archive.infolist()))
+                check_unpacked_size(path, sum(part.file_size for part in archive.infolist()))
             return is_book
     except (BadZipFile, OSError, ValueError, NotImplementedError, RuntimeError, EOFError, zlib.error):
         return path.suffix.lower() in _SUFFIXES
