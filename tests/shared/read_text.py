@@ -96,16 +96,18 @@ def evidence(what: str, texts: Texts, robot: Robot = None, **options: Any) -> st
 
 def follow(texts: Texts, robot: Robot = None, **options: Any) -> str:
     """Return what each answer that a question or a warning prints leads to: a log without this complaint."""
-    messages = _messages(texts, robot, options)
     lines = []
-    for hint in [hint for one in messages for hint in one.hints if hint.parameter and hint.value is not None]:
-        try:
-            log = log_of(texts, robot, **_with(options, hint.parameter, hint.value))
-            assert not {one.message for one in messages} & {one.message for one in log.warnings}, str(hint)
-            columns = [f"{column.name} [{column.unit}]" for column in log.columns]
-            lines.append(f"{hint}: {log.rows} rows, {' '.join(columns)}")
-        except UrmpipeError as error:
-            lines.append(f"{hint}: {error}")
+    for message in _messages(texts, robot, options):
+        for hint in message.hints:
+            if not hint.parameter or hint.value is None:
+                continue
+            try:
+                log = log_of(texts, robot, **_with(options, hint.parameter, hint.value))
+                assert message.message not in [one.message for one in log.warnings], str(hint)
+                columns = [f"{column.name} [{column.unit}]" for column in log.columns]
+                lines.append(f"{hint}: {log.rows} rows, {' '.join(columns)}")
+            except UrmpipeError as error:
+                lines.append(f"{hint}: {error}")
     return "\n".join(lines)
 
 

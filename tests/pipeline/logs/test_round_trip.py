@@ -1,33 +1,34 @@
-"""Random tables, written in random ways, come back as they were; the fast way and the careful one agree."""
+"""Laws of reading: tables, times, dates, coarse clocks, motions and poses come back as they were written."""
 
 from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from decimal import ROUND_HALF_EVEN, Decimal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.formats.numbers import ClockColumn
-from urmpipe_pipeline.logs.formats.sniff import sniff
-from urmpipe_pipeline.logs.formats.text import open_text
-from urmpipe_pipeline.logs.formats.text_table import (
-    BlockParser,
-    RowReader,
-    row_blocks,
-    squeeze,
-)
-
-Floats = NDArray[np.float64]
 
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "latin-1")
 STYLES = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), (" ", "."), ("   ", ","), ("|", "."))
+
+
+def read(text: bytes, **options: Any) -> JointLog:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        path.write_bytes(text)
+        return read_log([path], LogMap(**options))
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Written:
     """A table and how it is written."""
 
     times: list[int]
-    joints: Floats
+    joints: FloatArray
     style: tuple[str, str]
     encoding: str
     newline: str
@@ -44,7 +45,7 @@ class Written:
     order: tuple[int, ...]
     unit: str
 
-    def text(self) -> str:
+    def text(self) -> bytes:
         delimiter, decimal = self.style
         spaces = not delimiter.strip(" ")
         titles = ["t [ns]", *(f"q{k + 1} [{self.unit}]" for k in range(self.joints.shape[1]))]
@@ -53,8 +54,8 @@ class Written:
         for time, values in zip(self.times, self.joints.tolist(), strict=True):
             cells = ["nan" if math.isnan(value) else repr(value).replace(".", decimal) for value in values]
             rows.append([str(time), *(cell.replace("nan", missing) for cell in cells)])
-        end = delimiter if self.trailing and not spaces else ""
-        return "".join(delimiter.join(row[k] for k in self.order) + end + self.newline for row in rows)
+        end = (delimiter if self.trailing and not spaces else "") + self.newline
+        return "".join(delimiter.join(row[k] for k in self.order) + end for row in rows).encode(self.encoding)
 
 
 @st.composite
@@ -67,8 +68,7 @@ def tables(draw: st.DrawFn) -> Written:
     row = st.lists(numbers, min_size=joints, max_size=joints)
     values = np.array(draw(st.lists(row, min_size=rows, max_size=rows)))
     sure = st.floats(0.5, 3) if unit == "rad" else st.floats(7, 30)  # within a turn deg might be rad
-    full = st.lists(sure, min_size=joints, max_size=joints)
-    values[0] = draw(full)  # no joint without any value
+    values[0] = draw(st.lists(sure, min_size=joints, max_size=joints))  # no joint without any value
     steps = draw(st.lists(st.integers(1, 10**10), min_size=rows - 1, max_size=rows - 1))
     start = draw(st.integers(-(10**9), 2 * 10**18))
     return Written(
@@ -88,10 +88,7 @@ def tables(draw: st.DrawFn) -> Written:
 @settings(max_examples=100, deadline=None)
 @given(tables())
 def test_tables_come_back_as_they_were(table: Written) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "log.csv"
-        path.write_bytes(table.text().encode(table.encoding))
-        log = read_log([path])
+    log = read(table.text())
     factor = 1.0 if table.unit == "rad" else np.pi / 180
     assert log.joints == tuple(f"q{k + 1}" for k in range(table.joints.shape[1]))
     np.testing.assert_array_equal(log.q, table.joints * factor)
@@ -100,54 +97,89 @@ def test_tables_come_back_as_they_were(table: Written) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(st.decimals(0, 10**6, allow_nan=False, places=12), min_size=3, max_size=20, unique=True))
 def test_decimal_times_are_rounded_once(times: list[object]) -> None:
     """Any text with up to 12 decimals: the nearest nanosecond, as Python's exact decimals say."""
-    from decimal import ROUND_HALF_EVEN, Decimal
-
     exact = sorted(Decimal(str(time)) for time in times)
     nanoseconds = [int((time * 10**9).to_integral_value(ROUND_HALF_EVEN)) for time in exact]
-    if len(set(nanoseconds)) < len(nanoseconds):
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "log.csv"
-        path.write_text("t [s],q1\n" + "".join(f"{time:f},1\n" for time in exact))
-        log = read_log([path])
-    assert log.t_ns.tolist() == [time - nanoseconds[0] for time in nanoseconds]
+    if len(set(nanoseconds)) == len(nanoseconds):
+        log = read(("t [s],q1\n" + "".join(f"{time:f},1\n" for time in exact)).encode())
+        assert log.t_ns.tolist() == [time - nanoseconds[0] for time in nanoseconds]
+
+
+WRITERS: dict[str, tuple[str, Callable[[datetime], str]]] = {
+    "iso": ("", lambda t: t.isoformat(" ")),
+    "iso zone": ("", lambda t: t.replace(tzinfo=UTC).isoformat()),
+    "us": ("mdy", lambda t: t.strftime("%m/%d/%Y %I:%M:%S.%f %p")),
+    "german": ("dmy", lambda t: t.strftime("%d.%m.%Y %H:%M:%S.%f")),
+    "dense": ("", lambda t: t.strftime("%Y%m%d_%H%M%S.%f")),
+    "matlab": ("", lambda t: t.strftime("%d-%b-%Y %H:%M:%S.%f")),
+    "counted": ("us", lambda t: t.strftime("%Y-%m-%d %H:%M:%S:") + str(t.microsecond)),
+}
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
-@given(tables())
-def test_rows_are_read_alone_as_they_are_parsed_together(table: Written) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "log.csv"
-        path.write_bytes(table.text().encode(table.encoding))
-        layout = sniff(open_text(path))
-        clock = (ClockColumn(table.order.index(0), 0),)
-        columns = [table.order.index(k + 1) for k in range(table.joints.shape[1])]
-        block, reader = b"".join(row_blocks(layout)), RowReader(layout, columns, clock)
-    parsed = BlockParser(layout, columns, clock).parse(block)
-    by_row = reader.read(block.decode(layout.byte_encoding).split("\n"))
-    assert parsed is not None
-    assert not reader.summary().findings
-    np.testing.assert_array_equal(parsed.values, by_row.values)
-    np.testing.assert_array_equal(parsed.clock, by_row.clock)
+@settings(max_examples=60, deadline=None)
+@given(
+    st.datetimes(datetime(1900, 1, 1), datetime(2000, 1, 1)),
+    st.lists(st.integers(1, 10**12), min_size=2, max_size=30),
+    st.sampled_from(sorted(WRITERS)),
+)
+def test_dates_are_exact(start: datetime, steps: list[int], writer: str) -> None:
+    """Steps of 1 us to 11 days, written by Python's own clock."""
+    exact = [start + timedelta(microseconds=int(us)) for us in np.cumsum([0, *steps])]
+    order, write = WRITERS[writer]
+    text = "stamp,q1 [rad]\n" + "".join(f"{write(time)},1.5\n" for time in exact)
+    log = read(text.encode(), unit={"stamp": order} if order else {})
+    since = [(time - datetime(1970, 1, 1)) // timedelta(microseconds=1) * 1000 for time in exact]
+    assert [log.clock_start_ns + t for t in log.t_ns.tolist()] == since
 
 
-NUMBERS = st.lists(st.sampled_from(["1", "-2.5", "3e4"]), min_size=1, max_size=4)
-BLANKS = st.lists(st.sampled_from([" ", "  ", "\t", " \t "]), min_size=1, max_size=3)
+def coarse(step: int, period: float, rows: int, phase: float) -> Sequence[int]:
+    """Return stamps in [ms] of a regular clock, cut to whole steps."""
+    return ((np.arange(rows) + phase) * period // step * step).astype(int).tolist()
 
 
-@given(st.lists(NUMBERS, min_size=1, max_size=5), BLANKS, st.sampled_from(["\n", "\r\n", "\r"]))
-def test_squeezing_keeps_the_cells(rows: list[list[str]], blanks: list[str], newline: str) -> None:
-    blank = blanks[0].join(blanks[1:]) or blanks[0]
-    text = "".join(blank + blank.join(row) + blank + newline for row in rows)
-    assert squeeze(text.encode()) == "".join(" ".join(row) + newline for row in rows).encode()
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.02, 0.7), st.integers(60, 200), st.floats(0, 1), st.sampled_from([10, 1000]))
+def test_a_regular_clock_is_found_behind_coarse_stamps(
+    share: float, ticks: int, phase: float, step: int
+) -> None:
+    """Its period is as exact as the changes of the stamps, which are seen up to one period late at either end."""
+    stamps = coarse(step, share * step, int(ticks / share), phase)
+    rows = "".join(f"{time},{0.3 * math.sin(k / 30):.6f}\n" for k, time in enumerate(stamps))
+    log = read(f"t [ms],q1 [rad]\n{rows}".encode())
+    assert "clock-rebuilt" in [one.kind for one in log.warnings]
+    assert log.period == pytest.approx(share * step / 1e3, rel=2.0 / ticks)
+    assert np.abs(log.t + log.clock_start - np.array(stamps) / 1e3).max() <= step / 1e3
 
 
-def test_times_of_an_option_are_exact_too(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text("when,q1\n0.1,1\n0.30000000000000004,2\n")
-    assert read_log([path], LogMap(time="when")).t_ns.tolist() == [0, 200_000_000]
+def csv(q: FloatArray) -> bytes:
+    return "\n".join(["q1,q2,q3,q4,q5,q6", *(",".join(map(repr, row)) for row in q.tolist()), ""]).encode()
+
+
+def motion(rows: int, shortest: float, seed: int) -> FloatArray:
+    """Return joints that swing and wrap, with so many samples in their shortest period."""
+    rng = np.random.default_rng(seed)
+    rates = 2 * np.pi / (shortest * rng.uniform(1.0, 6.0, (3, 6)))
+    phases, sizes = rng.uniform(0, 2 * np.pi, (3, 6)), rng.uniform(0.2, 3.0, (3, 6))
+    q = (sizes * np.sin(rates * np.arange(rows)[:, None, None] + phases)).sum(axis=1)
+    return np.remainder(q + np.pi, 2 * np.pi) - np.pi
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32), rows=st.integers(3, 300), shortest=st.floats(10.0, 400.0))
+@example(seed=0, rows=300, shortest=10.0)
+def test_smooth_motions_are_never_poses(seed: int, rows: int, shortest: float) -> None:
+    assert read(csv(motion(rows, shortest, seed)), unit={"": "rad"}).timed
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32), rows=st.integers(12, 300), reach=st.floats(0.5, 6.2))
+def test_random_configurations_always_are(seed: int, rows: int, reach: float) -> None:
+    q = np.random.default_rng(seed).uniform(-reach, reach, (rows, 6))
+    assert not read(csv(q), unit={"": "rad"}).timed
