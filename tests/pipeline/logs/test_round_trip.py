@@ -147,7 +147,7 @@ def coarse(step: int, period: float, rows: int, phase: float) -> Sequence[int]:
 def test_a_regular_clock_is_found_behind_coarse_stamps(
     share: float, ticks: int, phase: float, step: int
 ) -> None:
-    """Its period is as exact as the changes of the stamps, which are seen up to one period late at either end."""
+    """Its period is as exact as the changes of the stamps are: seen up to one period late at either end."""
     stamps = coarse(step, share * step, int(ticks / share), phase)
     rows = "".join(f"{time},{0.3 * math.sin(k / 30):.6f}\n" for k, time in enumerate(stamps))
     log = read(f"t [ms],q1 [rad]\n{rows}".encode())
