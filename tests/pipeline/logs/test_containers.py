@@ -24,7 +24,6 @@ from urmpipe_pipeline.logs.log_map import read_options
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 Write = Callable[[Path], object]
-Wrong = Callable[..., list[str]]
 
 ROWS = 60
 T = np.arange(ROWS) * 0.01
@@ -102,39 +101,6 @@ def test_every_container_has_a_command_that_runs_here() -> None:
         assert suffixed or any(word in one.what for word in others), one.what
 
 
-@pytest.mark.parametrize(
-    ("name", "head", "what"),
-    [
-        ("a.zip", b"PK\x03\x04\x14\x00\x01\x00", "a zip archive"),
-        ("a.txt", b"\xff\xd8\xff\xe0\x00\x10JFIF", "a picture"),
-        ("a.pdf", b"%PDF-1.7\n", "a PDF"),
-        ("a.slx", b"PK\x03\x04\x14\x00", "a Simulink model"),
-    ],
-)
-def test_known_by_suffix_and_first_bytes(wrong: Wrong, name: str, head: bytes, what: str) -> None:
-    (said,) = wrong(head, name=name)
-    assert said.startswith(f"{name}: found {what}, allowed: a text table; ")
-
-
-@pytest.mark.parametrize("name", ["a.xlsx", "a.bag", "a.npz", "a.mat", "a.csv"])
-def test_an_empty_file_is_empty_whatever_it_is_called(wrong: Wrong, name: str) -> None:
-    assert wrong(b"", name=name) == [f"{name}: found an empty file, allowed: a table with one row per sample"]
-
-
-def test_numpy_files_are_read(tmp_path: Path) -> None:
-    fields = np.zeros(ROWS, dtype=[("t", "f8"), ("q", ">f4", (6,))])
-    fields["t"], fields["q"] = T, Q
-    np.save(tmp_path / "a.npy", np.column_stack([T, Q]))
-    np.save(tmp_path / "b.npy", fields)
-    np.savez(tmp_path / "a.npz", **ARRAYS, robot=np.array("ur5"), other=np.array([{}], dtype=object))
-    np.savez_compressed(tmp_path / "b.npz", **{"run/t": T, "run/q": Q})
-    for name in ("a.npy", "b.npy", "a.npz", "b.npz"):
-        log = read_log([tmp_path / name])
-        single = name == "b.npy"
-        np.testing.assert_allclose(log.q, Q, rtol=2**-24 if single else 0)  # half a unit of the last bit
-        assert (log.period, log.rows) == (0.01, ROWS)
-
-
 def test_numpy_arrays_of_several_episodes_and_lengths_are_questions(tmp_path: Path) -> None:
     demos = {"demo_0/q": Q, "demo_0/t": T, "demo_1/q": Q[:40], "demo_1/t": T[:40]}
     for arrays in (demos, {"q": Q, "t": T, "force": Q[:40, :3], "limits": Q[:6]}):
@@ -145,12 +111,3 @@ def test_numpy_arrays_of_several_episodes_and_lengths_are_questions(tmp_path: Pa
         assert str(hint) == ("--episode demo_0" if arrays is demos else "--topic q")
         log = read_log([tmp_path / "log.npz"], read_options({hint.parameter: hint.value}))
         np.testing.assert_array_equal(log.q, Q)
-
-
-@pytest.mark.parametrize("name", ["a.npy", "a.npz"])
-@pytest.mark.parametrize("kept", [8, 100, 700])
-def test_truncated_numpy_files(tmp_path: Path, name: str, kept: int) -> None:
-    path = tmp_path / name
-    np.save(path, Q) if name == "a.npy" else np.savez(path, **ARRAYS)
-    path.write_bytes(path.read_bytes()[:kept])
-    assert re.match(rf"{path}: cannot be read: [^\n]+$", refusal(LogError, read_log, [path]))
