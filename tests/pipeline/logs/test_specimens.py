@@ -388,39 +388,3 @@ def test_a_specimen_that_wraps_goes_on(name: str) -> None:
     run = ingest_log(paths(SPECIMENS[name]), read=LogMap(**case.options))
     turns = (run.q[: len(truth.t)] - truth.turned) / (2 * np.pi)
     np.testing.assert_allclose(turns, np.rint(turns[:1]).repeat(len(truth.t), axis=0), rtol=0, atol=1e-3)
-
-
-def test_every_specimen_stands_in_one_table() -> None:
-    names = [_case(case).name for case in (*GOOD, *WRONG)]
-    assert sorted(names) == sorted(SPECIMENS)
-    assert [one.name for one in SPECIMENS.values() if one.folder == "wrong"] == sorted(
-        (_case(case).name for case in WRONG), key=list(SPECIMENS).index
-    )
-
-
-def left_out(log: JointLog) -> int:
-    """Return how many rows of the file are left out, as inferences and warnings count them."""
-    counts = [re.fullmatch(r"(\d+) of (\d+)", one.value) for one in log.inferences if one.what == "rows read"]
-    ends = [
-        re.search(r"data rows? (\d+)(?: to (\d+))?", w.message) for w in log.warnings if w.kind == "end-rows"
-    ]
-    others = [re.match(r"(\d+) lines? without the labels", w.message) for w in log.warnings]
-    return (
-        sum(int(count[2]) - int(count[1]) for count in counts if count)
-        + sum(int(end[2] or end[1]) - int(end[1]) + 1 for end in ends if end)
-        + sum(int(other[1]) for other in others if other)
-    )
-
-
-ROW_BY_LINE = [
-    case for case in map(_case, GOOD) if case.name not in ("pandas_array_cells", "coppeliasim_three_graphs")
-]
-
-
-@pytest.mark.parametrize("case", ROW_BY_LINE, ids=_name)
-def test_rows_of_the_file_are_those_of_the_log_and_those_left_out(case: Good) -> None:
-    path, log = paths(SPECIMENS[case.name])[0], read(case)
-    encoding = next((one.value for one in log.inferences if one.what == "encoding"), "utf-8")
-    lines = path.read_text(encoding).splitlines()[log.first_line - 1 :]
-    rows = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "%", "//"))]
-    assert len(rows) == log.rows + left_out(log)

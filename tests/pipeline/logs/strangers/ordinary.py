@@ -56,11 +56,9 @@ def well_written() -> Iterator[Stranger]:
     yield table(ur, "t q tip turn", tip, robot="ur5e", writer=TABS)
     yield table(ur, "t q", {"t": "time", "q": UR}, writer=PANDAS)
     yield table(
-        ur,
-        "t q qd tau",
-        {"t": "time", "q": "actual_q_{}", "qd": "actual_qd_{}", "tau": "target_moment_{}"},
-        writer=SAVETXT,
-    )
+        ur, "t q qd tau",
+        {"t": "time", "q": "actual_q_{}", "qd": "actual_qd_{}", "tau": "target_moment_{}"}, writer=SAVETXT,
+    )  # fmt: skip
     yield table(
         sines(times(200), 7, 542),
         "t q qd tau",
@@ -72,13 +70,9 @@ def well_written() -> Iterator[Stranger]:
     )  # fmt: skip
     ms = unit_clock(1e-3, whole=True)
     yield table(
-        sines(times(200), 6, 544),
-        "t q",
-        {"t": "time_ms", "q": "joint{}_deg"},
-        clock=ms,
-        unit="deg",
+        sines(times(200), 6, 544), "t q", {"t": "time_ms", "q": "joint{}_deg"}, clock=ms, unit="deg",
         writer=COMMA,
-    )
+    )  # fmt: skip
     ns = unit_clock(1e-9, 1.6e9, whole=True)
     yield table(
         sines(times(200), 6, 545), "t q", {"t": "stamp_ns", "q": "joint{}_rad"}, clock=ns, writer=TABS
@@ -94,10 +88,8 @@ def well_written() -> Iterator[Stranger]:
         unit="deg", writer=GERMAN,
     )  # fmt: skip
     yield table(
-        sines(times(200), 6, 549),
-        "t q gripper",
-        {"t": "time", "q": "joint_{}", "gripper": "gripper_width"},
-        writer=FIXED,
-    )
+        sines(times(200), 6, 549), "t q gripper",
+        {"t": "time", "q": "joint_{}", "gripper": "gripper_width"}, writer=FIXED,
+    )  # fmt: skip
     yield table(sines(times(200), 6, 550).rising(2), "t q", {"t": "time", "q": "joint_{}"}, writer=SIX)
     assert np.isfinite(ur.tip).all()

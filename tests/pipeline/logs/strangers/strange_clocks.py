@@ -54,18 +54,13 @@ def clock_behind_other_columns() -> Iterator[Stranger]:
     yield table(sines(times(150, 0.04, 0.5, 12), 6, 12), "q t", writer=SEMICOLON, arm=6)
     yield table(moves(times(260), 7, 13), "q t tau", NAMED, writer=TABS)
     yield table(
-        sines(times(200, 0.03), 6, 14),
-        "index q t",
-        {"index": "frame", "q": "joint_{}", "t": "elapsed"},
+        sines(times(200, 0.03), 6, 14), "index q t", {"index": "frame", "q": "joint_{}", "t": "elapsed"},
         writer=PANDAS,
-    )
+    )  # fmt: skip
     yield table(
-        sines(times(200, 0.03, 0.2, 15), 6, 15),
-        "q t",
-        clock=unit_clock(start=EPOCH),
-        writer=SAVETXT,
+        sines(times(200, 0.03, 0.2, 15), 6, 15), "q t", clock=unit_clock(start=EPOCH), writer=SAVETXT,
         unit="deg",
-    )
+    )  # fmt: skip
 
 
 @strangers
@@ -73,12 +68,9 @@ def clock_beside_a_counter() -> Iterator[Stranger]:
     yield table(sines(times(150, 0.04, 0.3, 17), 6, 17), "index t q")
     yield table(sines(times(150, 0.04), 7, 18), "t index q", writer=SAVETXT)
     yield table(
-        sines(times(200, 0.03), 6, 19),
-        "index t q",
-        writer=SEMICOLON,
-        clock=unit_clock(1e-3, EPOCH, True),
+        sines(times(200, 0.03), 6, 19), "index t q", writer=SEMICOLON, clock=unit_clock(1e-3, EPOCH, True),
         arm=6,
-    )
+    )  # fmt: skip
     named = {"index": "Nr", "t": "Zeit_ms", "q": "Achse{}"}
     clock = unit_clock(1e-3, whole=True)
     yield table(moves(times(200, 0.03), 6, 20), "index t q", named, writer=GERMAN, clock=clock)
@@ -156,20 +148,13 @@ def clock_in_two_columns() -> Iterator[Stranger]:
     ns, us = two_columns(1e-9, EPOCH + 0.93), two_columns(1e-6, 41.7)
     yield table(sines(times(150, 0.04, 0.3, 41), 6, 41), "t q", named("sec", "nanosec"), clock=ns)
     yield table(
-        sines(times(150, 0.04), 6, 42),
-        "t q qd",
-        named("seconds", "nseconds"),
-        clock=two_columns(1e-9, 0.0),
-        writer=PANDAS,
-    )
+        sines(times(150, 0.04), 6, 42), "t q qd", named("seconds", "nseconds"),
+        clock=two_columns(1e-9, 0.0), writer=PANDAS,
+    )  # fmt: skip
     yield table(
-        sines(times(150, 0.04), 7, 43),
-        "t q",
-        named("tv_sec", "tv_usec"),
-        clock=us,
-        writer=SEMICOLON,
+        sines(times(150, 0.04), 7, 43), "t q", named("tv_sec", "tv_usec"), clock=us, writer=SEMICOLON,
         unit="deg",
-    )
+    )  # fmt: skip
     yield table(
         sines(times(150, 0.04), 6, 44), "t q", named("header.stamp.secs", "header.stamp.nsecs"), clock=ns
     )
@@ -247,42 +232,26 @@ def duration_a_row() -> Iterator[Stranger]:
 
     yield table(sines(times(150, 0.04, 0.3, 91), 6, 91), "t q", named("dt"), clock=durations())
     yield table(
-        sines(times(150, 0.04, 0.3, 92), 6, 92),
-        "q t",
-        named("duration"),
-        clock=durations(first=0.04),
+        sines(times(150, 0.04, 0.3, 92), 6, 92), "q t", named("duration"), clock=durations(first=0.04),
         writer=TABS,
-    )
+    )  # fmt: skip
     yield table(
-        sines(times(150, 0.04, 0.3, 93), 7, 93),
-        "t q",
-        named("dt [ms]"),
-        clock=durations(1e-3, 0.04),
+        sines(times(150, 0.04, 0.3, 93), 7, 93), "t q", named("dt [ms]"), clock=durations(1e-3, 0.04),
         writer=SEMICOLON,
-    )
+    )  # fmt: skip
     yield table(
-        sines(times(150, 0.04), 6, 94),
-        "t q qd",
-        named("duration"),
-        clock=durations(first=0.04),
+        sines(times(150, 0.04), 6, 94), "t q qd", named("duration"), clock=durations(first=0.04),
         writer=PANDAS,
-    )
+    )  # fmt: skip
 
 
 def beside(motion: Motion, name: str, column: str, text: str, writer: Writer = CSV) -> Stranger:
     """Return joints in one file, and their times in a column of another that is named."""
     named = {"q": "q{}"}
     return table(
-        motion,
-        "q",
-        named,
-        writer=writer,
-        t=motion.t,
-        t_within=1e-6,
-        more={name: text.encode()},
-        beside=(name,),
-        options={"time": f"{{folder}}/{name}:{column}"},
-    )
+        motion, "q", named, writer=writer, t=motion.t, t_within=1e-6, more={name: text.encode()},
+        beside=(name,), options={"time": f"{{folder}}/{name}:{column}"},
+    )  # fmt: skip
 
 
 @strangers

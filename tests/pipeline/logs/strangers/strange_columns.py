@@ -114,15 +114,9 @@ def two_header_lines() -> Iterator[Stranger]:
     )
     yield grouped(m, "t q qd", ["pos", "vel"], [f"J{k}" for k in range(1, 7)], trailing=True)
     yield grouped(
-        m,
-        "t q tau",
-        ["angle", "torque"],
-        [f"A{k}" for k in range(1, 7)],
-        "once",
-        sign=";",
-        writer=SEMICOLON,
-        unit="deg",
-    )
+        m, "t q tau", ["angle", "torque"], [f"A{k}" for k in range(1, 7)], "once", sign=";",
+        writer=SEMICOLON, unit="deg",
+    )  # fmt: skip
     yield grouped(
         m, "t qd q", ["velocity", "position"], [f"joint{k}" for k in range(1, 7)], sign="\t", writer=TABS
     )
@@ -153,15 +147,9 @@ def poses(
 ) -> Stranger:
     """Return poses of the tool: no joints."""
     return table(
-        motion,
-        blocks,
-        names,
-        q=np.empty((len(motion.t), 0)),
-        qd=None,
-        position=motion.tip,
-        turn=motion.turn,
-        **own,
-    )
+        motion, blocks, names, q=np.empty((len(motion.t), 0)), qd=None, position=motion.tip,
+        turn=motion.turn, **own,
+    )  # fmt: skip
 
 
 @strangers

@@ -89,12 +89,9 @@ def arrays_of_a_plc() -> Iterator[Stranger]:
     phi, names = np.degrees(m.q), [f"phi_{k}" for k in range(1, 7)]
     yield stranger(m, plc(names, phi, array, head), "target.txt", 6, unit=DEG)
     yield stranger(
-        m,
-        plc([f"q{k}" for k in range(1, 7)], m.q, "{name} : ARRAY[0..299] OF LREAL"),
-        "q.txt",
-        6,
+        m, plc([f"q{k}" for k in range(1, 7)], m.q, "{name} : ARRAY[0..299] OF LREAL"), "q.txt", 6,
         timed=False,
-    )
+    )  # fmt: skip
     timed = np.column_stack((m.t, m.q))
     text = plc(["time", *(f"rAxis{k}" for k in range(1, 7))], timed, array)
     yield stranger(m, f"VAR\n{text}END_VAR\n", "vars.st", 6)

@@ -196,23 +196,11 @@ def episode(seed: int, writer: Writer = PANDAS, **names: str) -> Stranger:
     names = {"state": "observation.state", "action": "action", **names}
     index = np.arange(200)
     columns: list[Column] = [
-        lists(ahead),
-        lists(motion.q),
-        motion.t,
-        index,
-        0 * index,
-        index + 400,
-        0 * index,
-    ]
+        lists(ahead), lists(motion.q), motion.t, index, 0 * index, index + 400, 0 * index,
+    ]  # fmt: skip
     header = [
-        names["action"],
-        names["state"],
-        "timestamp",
-        "frame_index",
-        "episode_index",
-        "index",
-        "task_index",
-    ]
+        names["action"], names["state"], "timestamp", "frame_index", "episode_index", "index", "task_index",
+    ]  # fmt: skip
     text = writer.text(header, columns)
     own = table(motion, "t q", q_within=1e-6, answers=(ahead,))
     return replace(own, files={"episode_000000.csv": text.encode()})
@@ -228,13 +216,9 @@ def names_of_lerobot() -> Iterator[Stranger]:
         motion = made(354 + k, 5)
         both = np.column_stack((motion.q, motion.gripper))
         yield table(
-            motion,
-            "t q gripper",
-            names,
-            writer=(CSV, TABS, PANDAS)[k],
-            answers=(both,),
+            motion, "t q gripper", names, writer=(CSV, TABS, PANDAS)[k], answers=(both,),
             unit="deg" if k else "rad",
-        )
+        )  # fmt: skip
     state = suffixed([f"observation.state.{name}" for name in LEROBOT], ".pos")
     yield table(made(357, 5), "t q", {"t": "timestamp", "q": state})
     motion, ahead = followed(made(359, 5))
@@ -280,17 +264,10 @@ def units_inside_names() -> Iterator[Stranger]:
         yield table(made(371 + k), "t q", {"t": "time_s", "q": pattern}, unit=unit, writer=writer)
     ms = unit_clock(1e-3, whole=True)
     yield table(
-        made(390),
-        "t q qd",
-        {"t": "time_ms", "q": "q_rad_{}", "qd": "qd_rad_s_{}"},
-        clock=ms,
-        writer=TABS,
+        made(390), "t q qd", {"t": "time_ms", "q": "q_rad_{}", "qd": "qd_rad_s_{}"}, clock=ms, writer=TABS,
         t_within=1e-3,
-    )
+    )  # fmt: skip
     yield table(
-        of_robot("ur5e", times(100, 0.05), 391),
-        "t q tip",
-        {"t": "t_s", "q": "q{}_deg", "tip": ("x_m", "y_m", "z_m")},
-        unit="deg",
-        robot="ur5e",
-    )
+        of_robot("ur5e", times(100, 0.05), 391), "t q tip",
+        {"t": "t_s", "q": "q{}_deg", "tip": ("x_m", "y_m", "z_m")}, unit="deg", robot="ur5e",
+    )  # fmt: skip

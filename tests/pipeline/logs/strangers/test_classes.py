@@ -49,12 +49,6 @@ def test_a_well_written_file_gets_no_question(name: str, tmp_path: Path) -> None
     assert verdict.kind == "right", verdict
 
 
-def test_there_are_enough_of_each_class() -> None:
-    kinds = [one.kind for one in STRANGERS.values()]
-    assert [kind for kind in set(kinds) if kinds.count(kind) < 3] == []
-    assert len(ORDINARY) >= 30
-
-
 def with_times(cells: Sequence[str], head: str) -> str:
     motion = sines(times(len(cells), 0.05), 6, 601)
     rows = [",".join([cell, *(f"{v:.6f}" for v in row)]) for cell, row in zip(cells, motion.q, strict=True)]

@@ -174,7 +174,6 @@ NO_LOGS = (
     "plotjuggler/turtle.csv",
     "panda-matlab-ascii/frankaEmikaPanda.urdf",
 )
-OTHERS = ("youbot-vrep-scene8/configurations.csv", "plotjuggler/simple_parse_timestamp.csv")
 
 
 @pytest.mark.slow
@@ -204,8 +203,3 @@ def test_the_wheels_of_a_youbot_are_asked_about_before_any_unit() -> None:
     assert "joints" in about and "unit" not in about, first.said
     verdict = judge([path], youbot(path), LogMap(joints=("4", "5", "6", "7", "8")), None)
     assert verdict.good, verdict
-
-
-def test_every_file_has_its_test() -> None:
-    held = {str(path.relative_to(LOGS)) for path in LOGS.glob("*/*") if not path.name.startswith("LICEN")}
-    assert held == {*LOGS_READ, *NO_LOGS, *OTHERS}
