@@ -74,15 +74,19 @@ _ALLOWED = ", ".join(EXPONENTS)
 _EXAMPLES = "2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
 _ALLOWED_FORMS = f"numbers in s, ms, us or ns, or times such as {_EXAMPLES}"
 _DATES = (19_700_101_000_000, 21_000_101_000_000)  # YYYYMMDDhhmmss
-_DAYS = {  # 2000 to 2100, and the conversion to Unix time
-    "Excel's days since 1900": ((36_526.0, 73_051.0), "(t - 25569) * 86400 is Unix time in s"),
-    "MATLAB's datenum in days": ((730_486.0, 767_011.0), "(t - 719529) * 86400 is Unix time in s"),
-    "Julian days": ((2_451_544.5, 2_488_069.5), "(t - 2440587.5) * 86400 is Unix time in s"),
-}
-_TICKS = {
-    ".NET's ticks of 100 ns": ((6.308e17, 6.624e17), "(t - 621355968000000000) / 10 is Unix time in us"),
-    "Windows' ticks of 100 ns": ((1.259e17, 1.575e17), "(t - 116444736000000000) / 10 is Unix time in us"),
-}
+_OTHER_EPOCHS = (  # name, length of its unit [s], 2000 and 2100, the conversion to Unix time
+    ("Excel's days since 1900", 86_400.0, 36_526.0, 73_051.0, "(t - 25569) * 86400"),
+    ("MATLAB's datenum in days", 86_400.0, 730_486.0, 767_011.0, "(t - 719529) * 86400"),
+    ("Julian days", 86_400.0, 2_451_544.5, 2_488_069.5, "(t - 2440587.5) * 86400"),
+    (".NET's ticks of 100 ns", 1e-7, 6.308e17, 6.624e17, "(t - 621355968000000000) / 10"),
+    (
+        "Windows' ticks of 100 ns",
+        1e-7,
+        1.259e17,
+        1.575e17,
+        "(t - 116444736000000000) / 10 is Unix time in us",
+    ),
+)
 
 
 class Clock(NamedTuple):
@@ -330,7 +334,7 @@ def _find_unit_by_values(time: Column, table: LogTable, *, are_durations: bool) 
         if usual and step * 10.0 ** (EXPONENTS[since_1970] - 9) > MAX_PERIOD:
             raise _ask_unit(time, table, f"times of our years in steps of {step:g}", [since_1970, *usual])
         return UnitChoice(since_1970, "it counts from 1970, so as Unix time it is of our years")
-    _check_days_and_ticks(time, table, start, step)
+    _check_epoch(time, table, start, step)
     if 0 < step < IMPOSSIBLE_PERIOD:
         message = (
             f"found steps of {step:.3g}, as of days or hours, allowed: times in {_ALLOWED}; convert them"
@@ -367,15 +371,15 @@ def _unit_since_1970(start: float, step: float) -> str | None:
     return None
 
 
-def _check_days_and_ticks(time: Column, table: LogTable, start: float, step: float) -> None:
+def _check_epoch(time: Column, table: LogTable, start: float, step: float) -> None:
     """Raise if times of 2000 to 2100 count days, or ticks of 100 ns, from another year than 1970."""
-    are_days = 0.0 < step * 86_400.0 <= MAX_PAUSE
-    are_ticks = MIN_PERIOD < step * 1e-7 <= MAX_PAUSE
-    for kind, ((first, last), cure) in ((_DAYS if are_days else {}) | (_TICKS if are_ticks else {})).items():
-        if first <= start <= last:
+    for kind, unit, first, last, conversion in _OTHER_EPOCHS:
+        if first <= start <= last and 0 < step * unit <= MAX_PAUSE:
+            unchanged, converted = ("s", "s") if unit > 1 else ("ns", "us")
             message = f"found {start:.15g} in steps of {step:.3g}, as {kind}, allowed: times in {_ALLOWED}"
-            hints = unit_hints([time], "s" if are_days else "ns", "keeps them unchanged")
-            raise table.error(f"{message}; convert them: {cure}", time.header, *hints, *OTHER_CLOCK)
+            message += f"; convert them: {conversion} is Unix time in {converted}"
+            hints = unit_hints([time], unchanged, "keeps them unchanged")
+            raise table.error(message, time.header, *hints, *OTHER_CLOCK)
 
 
 def _assumed(time: Column, step: float, unit: str, why: str = "") -> tuple[LogWarning]:

@@ -64,7 +64,7 @@ MIN_HOURS = 10_000  # hhmmss without leading zeros has hours from here on: 0:59:
 MAX_SEAM = 10.0  # steps within a second by which a split time may continue where the seconds step
 MIN_ROWS = 10  # with fewer rows a joint may increase by chance, and only the first column may be the time
 MAX_FAULTS = 0.02  # share of steps in which a damaged clock may stand still or run backwards; two at least
-MIN_RESTS, MIN_CHANGES = 0.1, 10  # share of steps in which a coarse clock rests, and number of others
+MIN_CHANGES = 10  # of a coarse clock; no rest takes a larger share of the rows than one of these
 MAX_LISTED = 8  # columns in a question
 
 Steps = Literal["even", "rough", "smooth", "unclear"]
@@ -466,8 +466,9 @@ def _find_rising(
             is_even = steps[clock] == "even" and not _counts_rows(values[clock])
             if is_first and is_even and _others_move(clock, table):
                 return TimeColumns((clock,), "the first column alone increases in even steps")
-        halting = [] if joints_given else _find_halting(columns, table)
-        asked = list({*clocks, *halting}) if clocks or len(halting) == 1 else []
+        near = [column for column in columns if column not in clocks and _is_nearly_rising(column, table)]
+        near = near if len(near) == 1 or clocks else []
+        asked = [*clocks, *(c for c in near if c.index == 0 or c not in increasing)]
     if asked and not joints_given:
         raise _ask_time(sorted(asked, key=lambda column: column.number), increasing, table, is_path=is_path)
     return None
@@ -486,29 +487,16 @@ def _others_move(first: Column, table: LogTable) -> bool:
     return bool((steps != 0).any()) and not any(kind_of_steps(-column) == "even" for column in falling.T)
 
 
-def _find_halting(columns: Sequence[Column], table: LogTable) -> list[Column]:
-    """Return the first column if it alone increases in almost all rows; else all that rest and never fall."""
-    near = []
-    for column in columns:
-        steps = np.diff(table.numbers(column.index))
-        if np.count_nonzero(steps < 0) <= max(2, MAX_FAULTS * len(steps)) and (steps > 0).any():
-            near.append(column)
-    if not near:
-        return []
-    steps = np.diff(table.values([column.index for column in near]), axis=0)
-    is_few = (np.count_nonzero(~(steps > 0), axis=0) <= max(2, MAX_FAULTS * len(steps))) & (len(steps) > 8)
-    if [column.index for column, few in zip(near, is_few, strict=True) if few] == [0]:
-        return [near[0]]
-    return [column for k, column in enumerate(near) if _is_stair(steps[:, k])]
-
-
-def _is_stair(steps: FloatArray) -> bool:
-    """Return whether numbers with these steps rest between many changes, and never fall: a coarse clock."""
-    if not (steps >= 0).all() or np.mean(steps == 0) < MIN_RESTS:
-        return False
-    changes = np.flatnonzero(steps)
-    rests = np.diff(changes, prepend=-1, append=len(steps))
-    return len(changes) >= MIN_CHANGES and int(rests.max()) * MIN_CHANGES <= max(len(steps), 1)
+def _is_nearly_rising(column: Column, table: LogTable) -> bool:
+    """Return whether a column increases or rests in almost all rows: a damaged clock, or a coarse one."""
+    for numbers in (np.array(table.numbers(column.index)), table.values([column.index])[:, 0]):
+        steps = np.diff(numbers)
+        changes = np.flatnonzero(steps > 0)
+        rests = np.diff(changes, prepend=-1, append=len(steps))
+        is_damaged = np.count_nonzero(steps < 0) > max(2, MAX_FAULTS * len(steps))
+        if is_damaged or len(changes) < MIN_CHANGES or rests.max() * MIN_CHANGES > len(steps):
+            return False
+    return True
 
 
 def _ask_time(
