@@ -40,7 +40,7 @@ MOST_ROWS = 50_000
 SURE = 0.99
 """Where steps and rates correlate so, the period that they tell is exact to a percent."""
 
-CLEAR = 0.1  # steps times rates that are larger than this share of what one in ten exceeds are clear motion
+CLEAR = 0.1  # squares of steps above this share of what one in ten exceeds are clear motion
 LEAST_CLEAR = 10  # fewer clear steps of a joint show no period
 MOST_VARIED = 0.3  # periods of single steps vary by less, in the median, where rates are those of the joints
 SURE_VARIED = 0.1  # ... and where the period is exact to a percent: noise of a seventh of the rates
@@ -120,7 +120,7 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     """
     joints = q.shape[1]
     steps, means = _steps_and_mean_rates(q, rates)
-    size = np.abs(steps * means)
+    size = steps**2
     if len(steps) < LEAST_ROWS or not size.any():
         return None
     is_clear = size > CLEAR * np.sort(size, axis=None)[int(0.9 * (size.size - 1))]
@@ -135,7 +135,7 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     if variation >= MOST_VARIED or (errors > np.maximum(ONE_PERIOD, 4 * variation / np.sqrt(counts))).any():
         return None  # 2.2 standard errors of a median
     with np.errstate(divide="ignore", invalid="ignore"):
-        is_usual = is_clear & (np.abs(steps / means / period - 1) <= 4 * variation + 1e-9)
+        is_usual = is_clear & (np.abs(means * period / steps - 1) <= 4 * variation + 1e-9)
     return float(np.abs(steps[is_usual]).sum() / np.abs(means[is_usual]).sum()), variation
 
 
