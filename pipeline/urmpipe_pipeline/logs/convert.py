@@ -39,7 +39,7 @@ from urmpipe_pipeline.logs.formats.opening import PATH, TABLE
 from urmpipe_pipeline.logs.log_map import Evidence, LogMap
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.proofs import Recorded, prove_by_kinematics
-from urmpipe_pipeline.logs.rates import SURE_VARIED, period_of, rounded_period
+from urmpipe_pipeline.logs.rates import SURE_VARIED, period_of
 from urmpipe_pipeline.logs.rotation import settle_rotation
 from urmpipe_pipeline.logs.rows import Rows, check_not_empty, gap_warnings, missing_warnings
 from urmpipe_pipeline.logs.units import UnitFinder, UnitSources
@@ -262,7 +262,7 @@ def _find_times_by_rates(rows: Rows) -> Times | None:
     fit = period_of(rows.values(roles.joints), rows.values(roles.rates) * ratio)
     if fit is None or not MIN_PERIOD <= fit[0] <= MAX_PERIOD:
         return None
-    period, variation = rounded_period(fit[0]), fit[1]
+    period, variation = fit
     t_ns, _, _ = even_clock(rows.count, period)
     evidence = f"steps over recorded rates; half of the steps are within {100 * variation:.2g} % of it"
     basis: Basis = "proved" if variation <= SURE_VARIED else "assumed"

@@ -111,8 +111,9 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
 
     It is the sum of steps over that of mean rates, of the steps that move clearly and whose ratio is near the
     median: in [s] if the joints are in [rad] or [m] and the rates in [rad/s] or [m/s], both of shape
-    (n, joints). It varies by the median of the relative deviations [-]. None if nothing moves, or if joints
-    and rates do not agree. With the rows h apart, the mean rate between rows k and k + 1 is
+    (n, joints), with as few digits as its standard error allows. It varies by the median of the relative
+    deviations [-]. None if nothing moves, or if joints and rates do not agree. With the rows h apart, the
+    mean rate between rows k and k + 1 is
 
         (13 (v[k] + v[k + 1]) - v[k - 1] - v[k + 2]) / 24 + O(h^4),
 
@@ -125,7 +126,8 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
         return None
     is_clear = size > CLEAR * np.sort(size, axis=None)[int(0.9 * (size.size - 1))]
     columns = [(steps[rows, j], means[rows, j]) for j, rows in enumerate(is_clear.T)]
-    ratios = [step / mean for step, mean in columns if len(step) >= LEAST_CLEAR]
+    with np.errstate(divide="ignore"):
+        ratios = [step / mean for step, mean in columns if len(step) >= LEAST_CLEAR]
     if len(ratios) < min(2, joints):
         return None
     period = float(np.median(np.concatenate(ratios)))
@@ -136,7 +138,10 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
         return None  # 2.2 standard errors of a median
     with np.errstate(divide="ignore", invalid="ignore"):
         is_usual = is_clear & (np.abs(means * period / steps - 1) <= 4 * variation + 1e-9)
-    return float(np.abs(steps[is_usual]).sum() / np.abs(means[is_usual]).sum()), variation
+    period = float(np.abs(steps[is_usual]).sum() / np.abs(means[is_usual]).sum())
+    error = max(EXACT, 1.48 * variation / np.sqrt(np.count_nonzero(is_usual)))  # 1.48 medians are 1 sigma
+    rounded = (float(f"{period:.{digits}g}") for digits in range(1, 17))
+    return next(value for value in rounded if abs(value - period) <= error * period), variation
 
 
 def _steps_and_mean_rates(q: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -147,15 +152,6 @@ def _steps_and_mean_rates(q: FloatArray, rates: FloatArray) -> tuple[FloatArray,
     means = np.where(has_outer[:, np.newaxis], (26 * means - outer) / 24, means)
     is_known = np.isfinite(steps).all(axis=1) & np.isfinite(means).all(axis=1)
     return steps[is_known], means[is_known]
-
-
-def rounded_period(period: float) -> float:
-    """Return a period with as few digits as are within what rates tell of it, in the same unit."""
-    return next(
-        one
-        for digits in range(1, 17)
-        if abs((one := float(f"{period:.{digits}g}")) - period) <= EXACT * period
-    )
 
 
 def _correlate(steps: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
