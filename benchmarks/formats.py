@@ -1,33 +1,58 @@
-"""Ingest of one motion in the formats of other tools against the plain comma file of the same numbers.
+"""Reading of one motion in each format against the plain comma file of the same numbers, and another version.
 
-python benchmarks/formats.py [--rows N] [--rounds N] [--only NAME ...]
+python benchmarks/formats.py [--rows N] [--rounds N] [--before CHECKOUT] [--only NAME ...]
+
+CHECKOUT is another version of the sources, which reads the same files in the same rounds.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
+import h5py
 import numpy as np
+import openpyxl
 import pyarrow as pa
+from mcap_ros2.writer import Writer as McapWriter
 from numpy.typing import NDArray
-from pairs import Bound, Usage, machine, ratio, rounds, table, write_results
+from pairs import Bound, machine, write_results
 from pyarrow import csv
 from pyarrow import parquet as pq
 from scipy.io import savemat
 
 from urmpipe_models.elementwise import FloatArray
 
+AREAS = ("models", "fmus", "pipeline", "cli", "datasets")
 PERIOD_MS = 5
 NAMES = ["t", *(f"q{j}" for j in range(1, 7))]
-BLOCK = 20_000
-"""Rows turned into text at a time."""
+BLOCK = 20_000  # rows turned into text at a time
+
+JOB = """
+import json, sys, time
+from resource import RUSAGE_CHILDREN, getrusage
+from pathlib import Path
+try:
+    from urmpipe_pipeline.logs import LogMap, read_log
+except ImportError:
+    from urmpipe_pipeline.sources import LogMap, read_log
+import pyarrow, pandas
+def used():
+    return time.process_time() + sum(getrusage(RUSAGE_CHILDREN)[:2])
+wall, cpu = time.perf_counter(), used()
+log = read_log([Path(sys.argv[1])], LogMap(unit={"": "rad"}))
+wall, cpu = time.perf_counter() - wall, used() - cpu
+peak = Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]
+print(json.dumps([wall, cpu, int(peak) / 1024, log.rows]))
+"""  # files to arrays, in a process for each; without imports, whose order differs by version
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +61,15 @@ class Format:
 
     Attributes:
         write: Writes times in [ms] and joint values in [rad] to a file.
-        under: How many times longer than the plain comma file it may take.
-        options: What the file cannot tell.
+        under: How many times the CPU time of the plain comma file it may take.
         suffix: The file's suffix.
+        share: Of the rows that are written, since some writers are slow.
     """
 
     write: Callable[[Path, NDArray[np.int64], FloatArray], None]
-    under: float = 1.5
-    options: tuple[str, ...] = ()
+    under: float = 2.0
     suffix: str = ".csv"
+    share: float = 1.0
 
 
 def motion(rows: int) -> tuple[NDArray[np.int64], FloatArray]:
@@ -140,62 +165,121 @@ def mat(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
     savemat(path, {"t": t_ms / 1e3, "q": q})
 
 
+def hdf5(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
+    """Write two datasets."""
+    with h5py.File(path, "w") as file:
+        file["t"], file["q"] = t_ms / 1e3, q
+
+
+def numpy_archive(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
+    """Write what numpy.savez writes of two arrays."""
+    np.savez(path, t=t_ms / 1e3, q=q)
+
+
+def json_lines(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
+    """Write an object a line."""
+    with path.open("w") as file:
+        pattern = '{"t": %.3f, "q": [' + ", ".join(["%.7f"] * 6) + "]}\n"
+        file.writelines(lines(pattern, t_ms / 1e3, *q.T))
+
+
+def workbook(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
+    """Write a sheet of numbers."""
+    book = openpyxl.Workbook(write_only=True)
+    sheet = book.create_sheet("log")
+    sheet.append(NAMES)
+    for row in np.column_stack([t_ms / 1e3, q]).tolist():
+        sheet.append(row)
+    book.save(path)
+
+
+def mcap(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
+    """Write messages of the type JointState."""
+    names = [f"joint_{j}" for j in range(1, 7)]
+    definition = (
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
+        + "=" * 80
+        + "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+        + "=" * 80
+        + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+    )
+    with path.open("wb") as file, McapWriter(file) as bag:
+        schema = bag.register_msgdef("sensor_msgs/msg/JointState", definition)
+        for ms, position in zip(t_ms.tolist(), q.tolist(), strict=True):
+            stamp = {"sec": ms // 1000, "nanosec": ms % 1000 * 10**6}
+            message = {"header": {"stamp": stamp, "frame_id": ""}, "name": names, "position": position}
+            message |= {"velocity": [], "effort": []}
+            bag.write_message("/joint_states", schema, message, ms * 10**6)
+
+
 PLAIN = Format(separated(","))
 FORMATS = {
     "semicolon, decimal comma": Format(separated(";", ",")),
     "tab": Format(separated("\t")),
-    "runs of spaces (MATLAB save -ascii)": Format(matlab_ascii, options=("--unit", "rad")),
+    "runs of spaces (MATLAB save -ascii)": Format(matlab_ascii),
     "CoppeliaSim graph": Format(coppeliasim),
-    "UR RTDE, spaces, 12 columns": Format(ur_rtde),
+    "UR RTDE, spaces, 12 columns": Format(ur_rtde, under=3.0),
     "UTF-16": Format(separated(",", encoding="utf-16")),
     "ISO dates as clock": Format(iso_dates),
-}
-TEXTS = {
-    "FRI text": Format(fri_text, under=4.0, options=("--unit", "rad"), suffix=".txt"),
-    "array cells over two lines": Format(array_cells, under=4.0, options=("--unit", "rad")),
-}
-TYPED = {
+    "FRI text": Format(fri_text, under=8.0, suffix=".txt"),
+    "array cells over two lines": Format(array_cells, under=8.0),
+    "JSON lines": Format(json_lines, under=16.0, suffix=".jsonl", share=0.1),
     "Parquet": Format(parquet, under=1.0, suffix=".parquet"),
-    "MAT": Format(mat, options=("--unit", "rad"), suffix=".mat"),
+    "MAT": Format(mat, under=4.0, suffix=".mat"),
+    "HDF5": Format(hdf5, under=4.0, suffix=".h5"),
+    "NumPy": Format(numpy_archive, under=1.0, suffix=".npz"),
+    "workbook (.xlsx)": Format(workbook, under=16.0, suffix=".xlsx", share=0.05),
+    "MCAP, JointState": Format(mcap, under=64.0, suffix=".mcap", share=0.05),
 }
 
-
-def ingest(log: Path, output: Path, options: Sequence[str]) -> list[str]:
-    """Return the command."""
-    urmpipe = [sys.executable, "-m", "urmpipe", "ingest"]
-    return [*urmpipe, str(log), "--robot", "urm6", "-q", "-o", str(output), *options]
+Key = tuple[str, str]
+"""Name of the format and of the version."""
 
 
-def write_apart(one: Format, path: Path, rows: int) -> None:
-    """Write a log in a process of its own: the memory of this one would count for those that it starts."""
-    process = get_context("fork").Process(target=lambda: one.write(path, *motion(rows)))
-    process.start()
-    process.join()
-    if process.exitcode:
-        raise RuntimeError(f"{path} was not written")
+def read(checkout: Path, log: Path) -> list[float]:
+    """Return what reading takes with the sources of a checkout: wall and CPU in [s], peak in [MB], rows."""
+    path = os.pathsep.join(str(checkout / area) for area in AREAS)
+    command, env = [sys.executable, "-c", JOB, str(log)], {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False, timeout=600)
+    if done.returncode:
+        raise RuntimeError(f"{log.name} is not read with {checkout}: {done.stderr.splitlines()[-1]}")
+    taken: list[float] = json.loads(done.stdout)
+    return taken
 
 
-def refusal(one: Format, folder: Path) -> str | None:
-    """Return the first line of what urmpipe says where it refuses a format, seen on a short log."""
-    log, output = folder / f"short{one.suffix}", folder / "short.rrd"
-    write_apart(one, log, 100)
-    done = subprocess.run(ingest(log, output, one.options), capture_output=True, text=True, check=False)
-    log.unlink()
-    output.unlink(missing_ok=True)
-    return done.stderr.splitlines()[0].replace(f"{folder}/", "") if done.returncode else None
+def measure(
+    names: Sequence[str], options: argparse.Namespace, versions: Mapping[str, Path]
+) -> dict[Key, list[list[float]]]:
+    """Return what the files, and plain ones of the same numbers, take in turn, by version."""
+    taken: dict[Key, list[list[float]]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        logs: dict[str, tuple[Path, int]] = {}
+        for name in names:
+            form = FORMATS[name]
+            t_ms, q = motion(round(form.share * options.rows))
+            for key, writer in ((plain_name(form), PLAIN), (name, form)):
+                if key not in logs:
+                    path = Path(folder) / f"log{len(logs)}{writer.suffix}"
+                    writer.write(path, t_ms, q)
+                    logs[key] = path, len(q)
+        for number in range(options.rounds + 1):
+            for key, (path, rows) in logs.items():
+                for version, checkout in versions.items():
+                    figures = read(checkout, path)
+                    assert figures[3] == rows, (key, version, figures)
+                    if number:  # the first round warms up
+                        taken.setdefault((key, version), []).append(figures)
+    return taken
 
 
-def measure(name: str, one: Format, rows: int, count: int, folder: Path) -> dict[str, list[Usage]]:
-    """Return what the plain file and the same numbers in a format take, in turn."""
-    plain, log, output = folder / "plain.csv", folder / f"log{one.suffix}", folder / "log.rrd"
-    write_apart(PLAIN, plain, rows)
-    write_apart(one, log, rows)
-    commands = {"plain comma": ingest(plain, output, ()), name: ingest(log, output, one.options)}
-    try:
-        return rounds(commands, count, outputs=(output,))
-    finally:
-        for path in (plain, log, output):
-            path.unlink(missing_ok=True)
+def plain_name(form: Format) -> str:
+    """Return what the plain file of the same numbers is called."""
+    return "plain comma" if form.share == 1.0 else f"plain comma, {form.share:g} of the rows"
+
+
+def cpu_ratio(taken: Sequence[Sequence[float]], base: Sequence[Sequence[float]]) -> float:
+    """Return the median of the ratios of CPU times, pair by pair."""
+    return statistics.median(a[1] / b[1] for a, b in zip(taken, base, strict=True))
 
 
 def main() -> None:
@@ -203,24 +287,39 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--only", nargs="*", default=[*FORMATS, *TEXTS, *TYPED])
+    parser.add_argument("--before", type=Path)
+    parser.add_argument("--only", nargs="*", default=[*FORMATS])
     options = parser.parse_args()
-    found: list[str] = []
-    bounds: list[Bound] = []
-    for name, one in (FORMATS | TEXTS | TYPED).items():
-        if name not in options.only:
-            continue
-        with tempfile.TemporaryDirectory() as temporary:
-            refused = refusal(one, Path(temporary))
-            if refused:
-                found += [f"Left out, since it is refused: {name} ({refused})", ""]
-                continue
-            taken = measure(name, one, options.rows, options.rounds, Path(temporary))
-        found += [*table(taken, "plain comma"), ""]
-        factor = ratio(taken[name], taken["plain comma"])
-        bounds.append(Bound(f"{name} / plain comma", factor, under=one.under))
-    title = f"# Formats: ingest of {options.rows} rows x 6 joints, {options.rounds} rounds in pairs"
-    write_results("formats", [title, "", *machine("pyarrow", "rerun-sdk"), *found], bounds)
+    versions = {"now": Path(__file__).parents[1]} | ({"before": options.before} if options.before else {})
+    taken = measure(options.only, options, versions)
+    plains = {name: plain_name(FORMATS[name]) for name in options.only}
+    rows: list[str] = []
+    for (key, version), figures in taken.items():
+        wall, cpu, peak, count = (statistics.median(column) for column in zip(*figures, strict=True))
+        plain = cpu_ratio(figures, taken[plains.get(key, key), version])
+        is_compared = options.before and version == "now"
+        before = f"{cpu_ratio(figures, taken[key, 'before']):.2f}" if is_compared else ""
+        cells = f"{count:.0f} | {wall:.3f} ({min(figures)[0]:.3f}) | {cpu:.3f} | {peak:.0f} | {plain:.2f}"
+        rows.append(f"| {key} | {version} | {cells} | {before} |")
+    bounds = []
+    for name, plain_key in plains.items():
+        against = cpu_ratio(taken[name, "now"], taken[plain_key, "now"])
+        bounds.append(Bound(f"CPU of {name} / {plain_key}", against, under=FORMATS[name].under))
+    for key in dict.fromkeys(key for key, _ in taken) if options.before else ():
+        against = cpu_ratio(taken[key, "now"], taken[key, "before"])
+        bounds.append(Bound(f"CPU of {key}, now / before", against, under=1.15))
+    lines = [
+        f"# Formats: files of {options.rows} rows x 6 joints to arrays, {options.rounds} rounds in turn",
+        "",
+        *machine("pyarrow", "pandas", "h5py", "mcap", "rosbags", "python-calamine"),
+        "Each file is read in a process of its own, without the time of imports; CPU with that of children.",
+        "Ratios are medians of pairs. Formats whose writers are slow have fewer rows, as has a plain file.",
+        "",
+        "| format | version | rows | wall s (least) | CPU s | peak MB | CPU / plain comma | CPU / before |",
+        "|---|---|---|---|---|---|---|---|",
+        *rows,
+    ]
+    write_results("formats", lines, bounds)
 
 
 main()
