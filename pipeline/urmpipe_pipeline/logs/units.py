@@ -452,22 +452,20 @@ class UnitFinder:
         for unit, proof in ((deg, wraps_as_degrees(values)), (rad, wraps_as_radians(values))):
             if not proof:
                 continue
-            large = [column for column, x in each if usual_peak(x) > TWO_TURNS]
-            if may_slide and unit == rad and large:
+            still: list[Column] = []  # columns that show neither; of those in rad the number is the same in m
+            if may_slide and unit == deg:
+                still = [column for column, x in each if peak(x) > 0 and not count_wraps(x, "deg").any()]
+            elif may_slide and (large := [column for column, x in each if usual_peak(x) > TWO_TURNS]):
                 raise LogError(self._ask_slides(large, peak(values)))
-            still = [column for column, x in each if peak(x) > 0 and not count_wraps(x, "deg").any()]
-            still = still if may_slide and unit == deg else []  # in rad the number is the same in m
-            self._note(
-                [column for column in columns if column not in still], unit, "proved", proof, every=True
-            )
+            proved = [column for column in columns if column not in still]
+            self._note(proved, unit, "proved", proof, every=True)
             if still:
                 hints = (Hint("unit", {"": "deg"}, "confirms it"), *unit_hints(still, "mm", "if they slide"))
                 subject = _subject(still, "joint", are_all=False)
                 self._assume(still, deg, subject, "joint", hints, f", as the others have {proof}")
             return unit
-        large = [column for column, x in each if peak(x) > 2 * TWO_TURNS]
-        is_only = len(large) == 1 and sum(peak(x) > ONE_TURN for _, x in each) == 1
-        if may_slide and len(columns) > 2 and is_only:
+        large = [column for column, x in each if peak(x) > ONE_TURN]
+        if may_slide and len(columns) > 2 and len(large) == 1 and peak(values) > 2 * TWO_TURNS:
             raise LogError(self._ask_slides(large, peak(values)))
         fast = too_fast_as_radians(values, joints.t_ns) if peak(values) <= MAX_DEGREES else None
         if not fast and usual_peak(values) > TWO_TURNS:
