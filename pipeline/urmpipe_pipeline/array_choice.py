@@ -131,7 +131,7 @@ def _number(name: str) -> str:
 def _row_counts(shapes: Shapes, by_rows: bool) -> dict[Name, int]:
     """Return the number of rows of each vector and matrix that has more than one.
 
-    A matrix has as many rows as a vector that is as long as one of its sides, but for a short one that may
+    A matrix has as many rows as a vector that is as long as one of its sides, unless that is short and may
     be a parameter.
     """
     vectors = {max(shape) for shape in shapes.values() if _is_vector(shape)}

@@ -1,7 +1,7 @@
-"""Tables with a pose or a position in each row, and columns beside it: targets, and the rows of a path.
+"""Tables with a pose or a position in each row, and further columns: targets, and the rows of a path.
 
 A log is refused for one wrong cell, since a gap in a motion is a gap in everything computed from it. The rows
-of a table of targets stand each for itself: a wrong row is a fault of that row.
+of a table of targets are independent: a wrong row is a fault of that row.
 
 1. `sniff_targets`: how the table is written is shown by its header: x, y, z say more than rows of which some,
    or all, are wrong.
@@ -49,7 +49,7 @@ from urmpipe_pipeline.logs.units import MAX_REACH, UnitFinder, UnitSources
 from urmpipe_pipeline.logs.vocabulary import Patterns, Unit, key, split_unit, vocabulary
 
 MAX_NORM_ERROR = 1e-3  # of a quaternion, as printed digits cause; then it is divided by its norm
-MAX_RAD = 2 * np.pi * 1.01  # angles without a unit, most of them beyond this, are hardly in rad
+MAX_RAD = 2 * np.pi * 1.01  # angles without a unit, most of them beyond this, are rarely in rad
 ALLOWED = "a finite number"  # in the cells of a pose
 
 NAMED = Hint("orientation", None, "with --position and --rotation names them")
@@ -60,11 +60,11 @@ _KUKA_ANGLES = frozenset("abc")
 
 @dataclass(frozen=True, slots=True)
 class ExtraColumn:
-    """A column beside the poses.
+    """A further column of a table of poses.
 
     Attributes:
         patterns: Of its name.
-        allowed: The values that a cell may hold, in words.
+        allowed: The values that a cell may hold, as text.
         fits: Returns which numbers, in the file's unit and of shape (n,), a cell may hold.
         empty: The value of an empty cell, in SI.
         length: Whether it holds lengths.
@@ -86,9 +86,9 @@ class PoseTable:
         position: In [m], shape (n, 3); NaN in a row with a fault of its pose.
         rotation: Matrices [-], shape (n, 3, 3), NaN in a row with a fault; None if the table has positions
             only.
-        further: The columns beside the pose by their meaning, in [m] or [-], shape (n,).
+        further: The further columns by their meaning, in [m] or [-], shape (n,).
         clock: Times in integer [ns] on the table's clock, shape (n,); None without one. A row whose time is
-            not known stands between its neighbours.
+            not known is between its neighbours.
         faults: Data row from 1, and all that is wrong with it.
         inferences: What was found out about the table.
         warnings: What a person should know about it.
@@ -113,7 +113,7 @@ class PoseTable:
 
     @property
     def unused_numbers(self) -> list[Column]:
-        """Those of numbers, but for one that counts the rows."""
+        """Those of numbers, except one that counts the rows."""
         return [column for column in self.unused if not column.text and not column.counts_rows]
 
 
@@ -128,7 +128,7 @@ def read_pose_table(
     Args:
         file: A text table, as a log may be.
         options: How to read the file where it does not show it; those about joints are not used.
-        further: The columns to look for beside the poses, by their meaning. One with lengths has the unit of
+        further: The further columns to look for, by their meaning. One with lengths has the unit of
             x, y, z unless its name has one.
         naming: The remedy where columns have no names, for the error.
 
@@ -175,7 +175,7 @@ def _unused_columns(plan: Plan) -> list[Column]:
 
 
 def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None:
-    """Raise if columns without names remain, or the orientation stands in another table.
+    """Raise if columns without names remain, or the orientation is in another table.
 
     Args:
         plan: What is to be read.
@@ -185,8 +185,8 @@ def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None
     """
     layout, used = plan.tables.layouts[plan.main], [*plan.clock.columns, *plan.roles.columns]
     if len(plan.used) > 1:
-        found = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
-        raise LogError(Finding(f"{found}, allowed: one table", layout.file))
+        fault = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
+        raise LogError(Finding(f"{fault}, allowed: one table", layout.file))
     cells = len(layout.names) - (not layout.names[-1])
     if layout.header is None and cells > len(used) and not (plan.roles.rotation or named):
         time = " beside the time" if plan.clock.columns else ""
@@ -195,8 +195,8 @@ def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None
         hints += [Hint("rotation", form, "specifies it") for form in FORMS if 3 + column_count(form) == count]
         if not (timed or time) and count - 1 in {3, *(3 + column_count(form) for form in FORMS)}:
             hints.append(Hint("time", "1", "if the first is the time"))
-        found = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
-        raise LogError(Finding(found, layout.file, hints=tuple(hints)))
+        fault = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
+        raise LogError(Finding(fault, layout.file, hints=tuple(hints)))
 
 
 # How a table is written
@@ -216,7 +216,7 @@ def sniff_targets(
     """Return how a table is written: by its soundest rows, if a header names x, y, z or the columns given.
 
     These are the rows with a cell for each name and the most numbers for x, y, z. All lines below the header
-    are rows then, but for comments and a line of units. If no row is sound, the first line that is no comment
+    are rows then, except comments and a line of units. If no row is sound, the first line that is no comment
     may be such a header still, or the next one below a title.
 
     Raises:
@@ -244,7 +244,7 @@ def sniff_targets(
 
 
 def _with_rows(table: TextTable, below: Sequence[HeadLine]) -> TextTable:
-    """Return a table whose rows begin right below its header, or behind a line of units."""
+    """Return a table whose rows begin right below its header, or after a line of units."""
     cells = split_line(below[0].text, table.delimiter)
     units = tuple(cells) if len(below) > 1 and _are_units(cells) else ()
     first = below[1 if units else 0]
@@ -268,9 +268,9 @@ def _find_headers(text: str, named: Sequence[str]) -> list[_Header]:
 def _position_columns(cells: Sequence[str], named: Sequence[str]) -> tuple[int, ...]:
     """Return which names are those of x, y and z, or of a transform with them; none without all of them."""
     labels = [split_unit(cell)[0] for cell in cells]
-    given = tuple(k for k, label in enumerate(labels) if {label, cells[k]} & {*named})
-    if len(given) == 3:
-        return given
+    requested = tuple(k for k, label in enumerate(labels) if {label, cells[k]} & {*named})
+    if len(requested) == 3:
+        return requested
     keys = [key(label) for label in labels]
     for pattern in vocabulary().tcp_position:
         matches = ((k, pattern.search(name)) for k, name in enumerate(keys))
@@ -323,7 +323,7 @@ def _read_rows(
 ) -> tuple[FloatArray, IntArray | None, dict[int, list[RowFault]], Numbers]:
     """Return the numbers of the plan's columns, times, faults by row, and what was found out about the clock.
 
-    A fault is a row that is not written like the others, a cell of a pose without a finite number, a cell of
+    A fault is a row that is not written like the rest, a cell of a pose without a finite number, a cell of
     a further column with a wrong number, or a missing time. Times that run backwards are an error of the
     file, as in a log: either of two rows may be the wrong one. Numbers are in the file's units, of shape
     (n, columns), times in [ns].
@@ -349,9 +349,9 @@ def _read_rows(
         return numbers.values, None, faults, numbers
     known = np.flatnonzero(numbers.clock > UNREADABLE)
     if not len(known):
-        found = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
+        fault = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
         hints = (Hint("time", "none", "leaves the column out"),)
-        raise LogError(Finding(found, layout.file, column=clock.columns[0].header, hints=hints))
+        raise LogError(Finding(fault, layout.file, column=clock.columns[0].header, hints=hints))
     timed = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=(), wrong=0).at(known)
     timed = separate_repeated(replace(timed, rows=known + 1))
     if findings := find_row_errors(layout, timed, (), clock):
@@ -367,7 +367,7 @@ def _find_faults(
     faults = {row + 1: list(of_row) for row, of_row in numbers.unread.items()}
     for finding in unknown_times(numbers, clock):
         faults.setdefault(finding.row or 0, []).append(RowFault(finding.message, (finding.column or "",)))
-    poses, others = np.split(numbers.values, [len(roles.columns) - len(roles.further)], axis=1)
+    poses, extra_values = np.split(numbers.values, [len(roles.columns) - len(roles.further)], axis=1)
     for row in np.flatnonzero(~np.isfinite(poses).all(axis=1)).tolist():
         of_row = faults.setdefault(row + 1, [])
         if not all(fault.columns for fault in of_row):
@@ -379,7 +379,7 @@ def _find_faults(
                 text = "no number" if math.isnan(value) else str(value)
                 names.setdefault(text, []).append(column.header)
         of_row += [RowFault(f"found {text}, allowed: {ALLOWED}", (*same,)) for text, same in names.items()]
-    for (name, column), values in zip(roles.further.items(), others.T, strict=True):
+    for (name, column), values in zip(roles.further.items(), extra_values.T, strict=True):
         fits = further[name].fits(values) | np.isnan(values)
         for row in np.flatnonzero(~fits).tolist():
             text = f"found {values[row]:g}, allowed: {further[name].allowed}"
@@ -388,7 +388,7 @@ def _find_faults(
 
 
 def _fill_times(known: IntArray, times: IntArray, rows: int) -> IntArray:
-    """Return a time for each row: known ones as they are, others in even steps between and around them."""
+    """Return a time for each row: known ones as they are, the rest in even steps between and around them."""
     if len(known) == rows:
         return times
     step = int(np.median(np.diff(times) // np.diff(known))) if len(known) > 1 else int(DEFAULT_PERIOD * 1e9)
@@ -413,15 +413,15 @@ def _to_poses(
     """Return the rows in SI, the pose of a row with a fault as NaN, and what was found out about units."""
     finder = UnitFinder(UnitSources(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
     columns = plan.roles.rotation
-    position, turns, others = np.split(values.copy(), [3, 3 + len(columns)], axis=1)
-    beside = {column.header for column in plan.roles.further.values()}
+    position, turns, extra_values = np.split(values.copy(), [3, 3 + len(columns)], axis=1)
+    extra_headers = {column.header for column in plan.roles.further.values()}
     for row, of_row in faults.items():
-        if not all(fault.columns and beside.issuperset(fault.columns) for fault in of_row):
+        if not all(fault.columns and extra_headers.issuperset(fault.columns) for fault in of_row):
             position[row - 1], turns[row - 1] = np.nan, np.nan
     lengths, warnings = _length_units(plan, finder, position)
     position *= [unit.factor for unit in lengths]
     extra, inferences = dict[str, FloatArray](), list[Inference]()
-    for (name, column), cells in zip(plan.roles.further.items(), others.T, strict=True):
+    for (name, column), cells in zip(plan.roles.further.items(), extra_values.T, strict=True):
         factor = 1.0
         if further[name].length and finder.sources.find(column, ("length",)):
             factor = finder.settle_positions([column], np.zeros((1, 1)))[0].factor
@@ -431,7 +431,7 @@ def _to_poses(
         extra[name] = np.where(np.isnan(cells), further[name].empty, cells * factor)
     rotation = None
     if form is not None:
-        by_name = [found.unit if found else None for found in finder.sources.of_rotation(columns, (form,))]
+        by_name = [stated.unit if stated else None for stated in finder.sources.of_rotation(columns, (form,))]
         units, assumed = _rotation_units(columns, form, _finite_rows(turns), by_name)
         rotation, wrong = _to_rotations(columns, form, turns * [unit.factor for unit in units])
         position[list(wrong)] = np.nan
@@ -485,9 +485,9 @@ def _rotation_form(
     """
     columns, forms = plan.roles.rotation, plan.roles.forms
     if not columns and requested:
-        found = f"{requested} given for {listed(plan.roles.position)} and no orientation"
+        fault = f"{requested} given for {listed(plan.roles.position)} and no orientation"
         allowed = "its columns beside them"
-        raise LogError(Finding(file=file, parameter="rotation", found=found, allowed=allowed, hints=(NAMED,)))
+        raise LogError(Finding(file=file, parameter="rotation", found=fault, allowed=allowed, hints=(NAMED,)))
     if not columns:
         patterns = (  # KUKA's A, B, C may be anything
             pattern
@@ -499,8 +499,8 @@ def _rotation_form(
         parts = [*patterns]
         unused = [] if named else _unused_columns(plan)
         if half := [column for column in unused if any(part.search(column.key) for part in parts)]:
-            found, allowed = listed(half), "all of rz, ry, rx or of qx, qy, qz, qw, or none"
-            message = f"found {found} as a part of an orientation, allowed: {allowed}"
+            fault, allowed = listed(half), "all of rz, ry, rx or of qx, qy, qz, qw, or none"
+            message = f"found {fault} as a part of an orientation, allowed: {allowed}"
             raise LogError(Finding(message, file, hints=(NAMED,)))
         return None, []
     if len(forms) == 1:
@@ -542,7 +542,7 @@ def _rotation_units(
 def _to_rotations(
     columns: Sequence[Column], form: RotationForm, values: FloatArray
 ) -> tuple[FloatArray, dict[int, RowFault]]:
-    """Return the rotation matrices [-], shape (n, 3, 3), and by index what is wrong with rows that hold none.
+    """Return the rotation matrices [-], shape (n, 3, 3), and by index the faults of rows that hold none.
 
     Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and has no fault.
     """
@@ -565,5 +565,5 @@ def _iter_no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple
         with np.errstate(invalid="ignore"):  # rows with NaN, which have faults already
             det = np.linalg.det(r)
         for row in np.flatnonzero((off > ORTHOGONAL) | (det < 0)).tolist():
-            found = f"R R^T off I by {off[row]:.3g} and det R = {det[row]:.3g}"
-            yield row, f"found {found}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"
+            fault = f"R R^T off I by {off[row]:.3g} and det R = {det[row]:.3g}"
+            yield row, f"found {fault}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"

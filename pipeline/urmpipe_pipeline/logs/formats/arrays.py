@@ -1,6 +1,6 @@
 """Arrays as tables: those of a file by name, of a NumPy file, and those that Python code gives.
 
-1. `make_array_table`: the arrays of one length of a file (`array_choice` tells which) as columns.
+1. `make_array_table`: the arrays of one length of a file (`array_choice` decides which) as columns.
    `read_numpy` loads them from .npy and .npz; `matlab` has those of MAT and HDF5 files.
 2. `find_even_times`: the clock of a single number that is named like the time between samples.
 3. `arrays_to_table`: times, joint values and a recorded tool centre point of Python code.
@@ -130,14 +130,16 @@ def spread_array(name: Name, values: Array, rows: int) -> Iterator[ArrayColumn]:
         yield (*name[:-1], label if name[-1] else label[1:]), "", np.ascontiguousarray(column)
 
 
-def ask_for_arrays(path: Path, asked: Question) -> NoReturn:
+def ask_for_arrays(path: Path, open_choice: Question) -> NoReturn:
     """Raise the question which episode, or which arrays of one length, are read."""
-    values = [value for value, _ in asked.choices]
+    values = [value for value, _ in open_choice.choices]
     shown = ", ".join(values[:MAX_LISTED]) + ", ..." * (len(values) > MAX_LISTED)
-    parts = f"{len(values)} episodes" if asked.option == "episode" else f"arrays of {len(values)} lengths"
-    if asked.requested is not None:
-        parts = f"no {asked.option} {asked.requested} among {parts}"
-    raise question(path, f"{parts}: {shown}", asked.option, asked.choices)
+    parts = (
+        f"{len(values)} episodes" if open_choice.option == "episode" else f"arrays of {len(values)} lengths"
+    )
+    if open_choice.requested is not None:
+        parts = f"no {open_choice.option} {open_choice.requested} among {parts}"
+    raise question(path, f"{parts}: {shown}", open_choice.option, open_choice.choices)
 
 
 # The clock of a number
@@ -212,7 +214,7 @@ def read_numpy(path: Path, options: LogMap) -> MemoryTable:
         raise LogError(_describe_no_table(path, stored))
     in_order = all(len(name) == 1 and _IN_ORDER.fullmatch(name[0]) for name in tables)
     wide = [a for a in tables.values() if a.ndim == 2 and len(a) <= MAX_JOINT_ROWS < a.shape[1]]
-    is_named = not in_order and not len(tables) == len(wide) == 1  # joints as rows are asked about
+    is_named = not in_order and not len(tables) == len(wide) == 1  # joints as rows: a question
     depth = len(choice.group)
     spread = (spread_array(name[depth:], tables[name], choice.rows) for name in choice.names)
     scalars = {
@@ -279,7 +281,7 @@ def _describe_no_table(path: Path, arrays: Mapping[str, Array | None]) -> Findin
 
 TIMES = "n times in s, or datetime64 or timedelta64"
 JOINTS = "an array of shape (n, joints), in rad or m; a table is a log"
-POSES = "an array of shape (n, 3), in m, (n, 7), with quaternions x, y, z, w behind, or (n, 4, 4)"
+POSES = "an array of shape (n, 3), in m, (n, 7), with quaternions x, y, z, w after them, or (n, 4, 4)"
 POSITION, QUATERNION = ("tcp_x", "tcp_y", "tcp_z"), ("tcp_qx", "tcp_qy", "tcp_qz", "tcp_qw")
 
 
@@ -297,11 +299,11 @@ def arrays_to_table(
     Args:
         t: Times in [s], or as datetime64 or timedelta64, shape (n,); None without times.
         q: Joint values in [rad] or [m], shape (n, joints); None for a path.
-        recorded_tcp: The recorded tool centre point in [m], shape (n, 3), with quaternions x, y, z, w behind,
-            shape (n, 7), or as matrices, shape (n, 4, 4); None without one.
+        recorded_tcp: The recorded tool centre point in [m], shape (n, 3), with quaternions x, y, z, w, shape
+            (n, 7), or as matrices, shape (n, 4, 4); None without one.
         names: Of the joints; by default q1, q2, ...
         name: What to call the log.
-        robot: The arm: it tells which joints slide.
+        robot: The arm: its prismatic joints have values in m.
         units: Columns by name whose unit is an option; "" for every angle.
 
     Raises:
@@ -316,8 +318,8 @@ def arrays_to_table(
     arrays = {"t": times, "q": values, "recorded_tcp": poses}
     lengths = {parameter: len(array) for parameter, array in arrays.items() if array is not None}
     if len(set(lengths.values())) > 1:
-        found = ", ".join(f"{rows} rows of {parameter}" for parameter, rows in lengths.items())
-        raise OptionError(f"found {found}, allowed: as many of each")
+        fault = ", ".join(f"{rows} rows of {parameter}" for parameter, rows in lengths.items())
+        raise OptionError(f"found {fault}, allowed: as many of each")
     columns: list[tuple[str, str, str, Any]] = []
     if times is not None:
         columns.append(("t", "" if times.dtype.kind in "mM" else "s", "time 0", times))
@@ -338,13 +340,13 @@ def arrays_to_table(
         columns += [
             (label, *role, poses[:, k]) for k, (label, role) in enumerate(zip(labels, roles, strict=False))
         ]
-    made = [arrow_column(array) for *_, array in columns]
+    arrow = [arrow_column(array) for *_, array in columns]
     fields = [
         pa.field(label, array.type, metadata={UNIT: "" if label in units else unit, ROLE: role})
-        for (label, unit, role, _), array in zip(columns, made, strict=True)
+        for (label, unit, role, _), array in zip(columns, arrow, strict=True)
     ]
     schema = pa.schema(fields, {GIVEN: "", FORM: "quat_xyzw"})
-    return MemoryTable(name, pa.Table.from_arrays(made, schema=schema))
+    return MemoryTable(name, pa.Table.from_arrays(arrow, schema=schema))
 
 
 def _times(t: Any) -> Array:

@@ -2,7 +2,7 @@
 
 Structs become a column per field, NAME.FIELD; lists a column per entry, NAME_1, NAME_2, ...
 
-`exact_times`: times that are doubles, corrected by the exact clock beside them in urmpipe's own files.
+`exact_times`: times that are doubles, corrected by the exact clock next to them in urmpipe's own files.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def plain_table(table: pa.Table, place: str) -> pa.Table:
     """Return a table of numbers and texts alone, its names without blanks around them.
 
     Args:
-        table: Columns of any type; units and roles may stand in the metadata of their fields.
+        table: Columns of any type; units and roles may be in the metadata of their fields.
         place: The file, or what a table in memory is called, for errors.
 
     Raises:
@@ -85,7 +85,7 @@ def is_list(kind: pa.DataType) -> bool:
 
 
 def _flatten(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Named]:
-    """Yield a column, or those of a struct, or of lists of one length; none of lists of many lengths."""
+    """Yield a column, or those of a struct, or of lists of one length. Lists of many lengths are left out."""
     kind = column.type
     if isinstance(kind, pa.BaseExtensionType):
         yield from _flatten(field, column.cast(kind.storage_type), place)
@@ -105,9 +105,9 @@ def _flatten(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[N
         if not usual or len(other) > (1.0 - USUAL_SHARE) * len(present):
             return
         if len(other):
-            found, allowed = f"{lengths[other[0]]} entries", f"{usual}, as in the other rows"
+            fault, allowed = f"{lengths[other[0]]} entries", f"{usual}, as in the other rows"
             row = int(other[0]) + 1
-            raise LogError(Finding(file=place, row=row, column=field.name, found=found, allowed=allowed))
+            raise LogError(Finding(file=place, row=row, column=field.name, found=fault, allowed=allowed))
         check_width(usual, place)
         for k, name in enumerate(spread_names([field.name], [usual])):
             yield from _flatten(field.with_name(name), pc.list_element(column, k), place)

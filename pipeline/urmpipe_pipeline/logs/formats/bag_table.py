@@ -99,8 +99,8 @@ def read_bag(path: Path, options: LogMap) -> MemoryTable:
     messages, damage = bag.read(name)
     warnings, why_missing = [], "; ".join(damage)
     if damage and not messages:
-        found = f"found no message of {name} that can be read ({why_missing})"
-        raise LogError(Finding(f"{found}, allowed: a complete recording", str(path)))
+        fault = f"found no message of {name} that can be read ({why_missing})"
+        raise LogError(Finding(f"{fault}, allowed: a complete recording", str(path)))
     if damage:
         read = f"{format_count(len(messages), 'message')} of {name}"
         fault = f"the recording is cut or damaged: {read} were read, others are missing ({why_missing})"

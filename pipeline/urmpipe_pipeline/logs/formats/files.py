@@ -55,19 +55,19 @@ def unchanged(files: Collection[object]) -> Iterator[None]:
     for path in paths:
         _keep_piped(path)
     before = [_file_state(path) for path in paths]
-    fault: Exception | None = None
+    raised: Exception | None = None
     try:
         yield
     except Exception as error:
-        fault = error
+        raised = error
     changed = [path for path, state in zip(paths, before, strict=True) if _file_state(path) != state]
     if changed:
-        found = "changed while it was read, allowed: a file that no program still writes"
-        raise LogError(*(Finding(found, str(path)) for path in changed)) from fault
-    if isinstance(fault, OSError):
-        raise LogError(Finding(f"cannot be read: {fault.strerror or fault}", fault.filename)) from fault
-    if fault is not None:
-        raise fault
+        fault = "changed while it was read, allowed: a file that no program still writes"
+        raise LogError(*(Finding(fault, str(path)) for path in changed)) from raised
+    if isinstance(raised, OSError):
+        raise LogError(Finding(f"cannot be read: {raised.strerror or raised}", raised.filename)) from raised
+    if raised is not None:
+        raise raised
 
 
 def _keep_piped(path: Path) -> None:
@@ -78,16 +78,16 @@ def _keep_piped(path: Path) -> None:
         return
     pipe = _OWN_PIPE.fullmatch(str(path))
     if pipe is None or kind not in (stat.S_IFIFO, stat.S_IFSOCK):
-        found = f"found {_KINDS[kind]}, allowed: a file, which can be read more than once"
-        raise LogError(Finding(found, str(path)))
+        fault = f"found {_KINDS[kind]}, allowed: a file, which can be read more than once"
+        raise LogError(Finding(fault, str(path)))
     number = int(pipe[1] or 0)
     try:
         with TemporaryFile() as copy:
             while block := _read_pipe(path, number):
                 copy.write(block)
                 if copy.tell() > MAX_PIPED:
-                    found = f"found more than {MAX_PIPED >> 30} GiB in a pipe, allowed: a file"
-                    raise LogError(Finding(found, str(path)))
+                    fault = f"found more than {MAX_PIPED >> 30} GiB in a pipe, allowed: a file"
+                    raise LogError(Finding(fault, str(path)))
             copy.flush()
             os.dup2(copy.fileno(), number, inheritable=False)
     except OSError as error:
@@ -101,12 +101,12 @@ def _read_pipe(path: Path, number: int) -> bytes:
             return os.read(number, 1 << 20)
         if not attempt:
             print(f"waiting for {path}, a pipe that brings nothing so far", file=sys.stderr, flush=True)
-    found = f"found a pipe that brings nothing for {sum(PIPE_TIMEOUTS):g} s, allowed: a log"
-    raise LogError(Finding(found, str(path)))
+    fault = f"found a pipe that brings nothing for {sum(PIPE_TIMEOUTS):g} s, allowed: a log"
+    raise LogError(Finding(fault, str(path)))
 
 
 def _file_state(path: Path) -> tuple[int, ...] | None:
-    """Return kind, identity, size and time of a file, which writing changes; None if it is none."""
+    """Return kind, identity, size and time of a file, which writing changes; None without a file."""
     try:
         state = path.stat()
     except OSError:
@@ -162,16 +162,16 @@ def read_separately(path: Path, what: str, form: str, *arguments: str, hints: Se
     if reason == PASSWORD:
         raise password_error(path)
     if reason:
-        found = f"{what} that cannot be read ({reason})"
-        raise LogError(Finding(file=str(path), found=found, allowed="a whole one", hints=tuple(hints)))
+        fault = f"{what} that cannot be read ({reason})"
+        raise LogError(Finding(file=str(path), found=fault, allowed="a whole one", hints=tuple(hints)))
     return contents
 
 
 def password_error(path: Path) -> LogError:
     """Return the error about an encrypted workbook."""
     save = Hint("", effect="open it in a spreadsheet program and save it without a password, or as CSV")
-    found, allowed = "a workbook with a password", "a workbook without one"
-    return LogError(Finding(file=str(path), found=found, allowed=allowed, hints=(save,)))
+    fault, allowed = "a workbook with a password", "a workbook without one"
+    return LogError(Finding(file=str(path), found=fault, allowed=allowed, hints=(save,)))
 
 
 def first_bytes(path: Path, count: int) -> bytes:
@@ -183,10 +183,10 @@ def first_bytes(path: Path, count: int) -> bytes:
         return b""
 
 
-def question(path: Path, found: str, option: str, choices: Iterable[tuple[Any, str]]) -> LogError:
+def question(path: Path, fault: str, option: str, choices: Iterable[tuple[Any, str]]) -> LogError:
     """Return the question which table of a file is read: values of an option, each with what that reads."""
     hints = (Hint(option, value, f"reads {what}") for value, what in islice(choices, MAX_CHOICES))
-    return LogError(Finding(file=str(path), found=found, allowed="one", hints=tuple(hints)))
+    return LogError(Finding(file=str(path), found=fault, allowed="one", hints=tuple(hints)))
 
 
 def choice_error(path: Path, option: str, value: str | None, allowed: str) -> OptionError:

@@ -222,7 +222,7 @@ def _file_table(run: Mapping[str, Any]) -> pa.Table:
 
 
 def _simulation_table(simulated: Mapping[str, Any]) -> pa.Table:
-    """Return the signals of a simulation under their names, behind their clock."""
+    """Return the signals of a simulation under their names, after their clock."""
     clock, names = np.asarray(simulated["clock_ns"]).ravel(), _texts(simulated["names"])
     values = np.asarray(simulated["values"], dtype=np.float64).reshape(len(clock), -1)
     signals = ((name, "", column) for name, column in zip(names, values.T, strict=True))

@@ -145,8 +145,8 @@ def read_parquet(path: Path, head: bytes, options: LogMap) -> MemoryTable:
     import pyarrow.parquet as pq
 
     if head.startswith(b"PARE"):
-        found = "found an encrypted Parquet file, allowed: one without encryption"
-        raise LogError(Finding(found, str(path)))
+        fault = "found an encrypted Parquet file, allowed: one without encryption"
+        raise LogError(Finding(fault, str(path)))
     applied: list[str] = []
 
     def read() -> pa.Table:
@@ -161,8 +161,8 @@ def read_parquet(path: Path, head: bytes, options: LogMap) -> MemoryTable:
             columns = [field.name for field in file.schema_arrow if not _is_image(field.type)]
             numbers = sorted(pc.unique(file.read([EPISODE]).column(EPISODE)).drop_null().to_pylist())
         column, _, value = (options.episode or "").rpartition("=")
-        is_asked = options.rows is None and column in ("", EPISODE) and numbers
-        number = _choose_episode(path, numbers, value or None) if is_asked else None
+        is_chosen_here = options.rows is None and column in ("", EPISODE) and numbers
+        number = _choose_episode(path, numbers, value or None) if is_chosen_here else None
         applied.extend(["episode"] * (number is not None))
         rows = None if number is None else [(EPISODE, "==", number)]
         return _name_entries(pq.read_table(path, columns=columns, filters=rows, partitioning=None), path)
@@ -196,13 +196,13 @@ def _read_file(path: Path, read: Callable[[], pa.Table], form: str, applied: Seq
         table.validate()
     except (pa.ArrowException, OSError) as error:
         reason = str(error).partition("\n")[0].partition(": ")[0].strip(" .")
-        found = f"found a {form} file that cannot be read ({reason})"
-        raise LogError(Finding(f"{found}, allowed: a whole one", str(path))) from None
+        fault = f"found a {form} file that cannot be read ({reason})"
+        raise LogError(Finding(f"{fault}, allowed: a whole one", str(path))) from None
     metadata = table.schema.metadata or {}
     about = read_metadata_json(metadata, MARK)
     if not about and MARK.encode() in metadata:
-        found = f"found a {form} file of urmpipe whose metadata are damaged"
-        raise LogError(Finding(f"{found}, allowed: as `export` wrote it", str(path)))
+        fault = f"found a {form} file of urmpipe whose metadata are damaged"
+        raise LogError(Finding(f"{fault}, allowed: as `export` wrote it", str(path)))
     if about:
         table = with_roles(table, about if about.get("rows") == "file" else {})
         if CLOCK in table.column_names and not (table.schema.field(CLOCK).metadata or {}).get(b"role"):

@@ -53,7 +53,7 @@ class Program:
 
     Attributes:
         path: Its file.
-        text: All of it, comments as spaces, so that everything else stands where it stood.
+        text: All of it, comments as spaces, so that everything else keeps its place.
         language: What it is written in, as its users call it.
         options: What the user says about the log.
     """
@@ -80,10 +80,10 @@ class Program:
     def _ends(self) -> list[int]:
         return [match.start() for match in re.finditer("\n", self.text)]
 
-    def error(self, found: str, allowed: str, offset: int | None = None, *hints: Hint) -> LogError:
+    def error(self, fault: str, allowed: str, offset: int | None = None, *hints: Hint) -> LogError:
         """Return an error about the program, or about a place in it."""
         line = None if offset is None else self.line(offset)
-        return LogError(Finding(file=str(self.path), line=line, found=found, allowed=allowed, hints=hints))
+        return LogError(Finding(file=str(self.path), line=line, found=fault, allowed=allowed, hints=hints))
 
 
 def shortened(text: str, length: int = 40) -> str:
@@ -190,7 +190,7 @@ def _read_array(
 
 
 def _values(text: str, most: int) -> FloatArray:
-    """Return the numbers of a list, flat: brackets may stand in it, and n(values) repeats them.
+    """Return the numbers of a list, flat: it may have brackets, and n(values) repeats them.
 
     More than `most` repetitions count as one more than that.
 
@@ -268,8 +268,8 @@ def _find_period(program: Program, scalars: Sequence[_Scalar]) -> _Scalar | None
     ]
     if any(not math.isclose(periods[0].value, other.value, rel_tol=1e-9) for other in periods):
         hints = (Hint("period", other.value, f"takes {other.name}") for other in periods)
-        found = " and ".join(f"{other.name} := {other.text}" for other in periods)
-        raise program.error(found, "one time between rows", periods[0].offset, *hints)
+        fault = " and ".join(f"{other.name} := {other.text}" for other in periods)
+        raise program.error(fault, "one time between rows", periods[0].offset, *hints)
     return periods[0] if periods else None
 
 
@@ -287,5 +287,5 @@ def _seconds(program: Program, scalar: _Scalar) -> float:
         Hint("period", float(f"{scalar.value * factor:.12g}"), f"reads it in {name}")
         for name, factor in factors.items()
     )
-    found = f"{scalar.name} := {shortened(scalar.text)} and no unit"
-    raise program.error(found, "a time between rows in s", scalar.offset, *hints)
+    fault = f"{scalar.name} := {shortened(scalar.text)} and no unit"
+    raise program.error(fault, "a time between rows in s", scalar.offset, *hints)

@@ -9,9 +9,9 @@
 1. `read_program`: the language of a text by its head.
 2. `_read_krl`, `_read_rapid`: positions (of the joints, or of the tool) and moves; `program_text` has
    structured text.
-3. `_build_table`: an array of positions is a path, and what stands beside it is not. Without an array the
-   rows are the positions in the order of the moves, if every move names one or holds its numbers; else in
-   the order of the text.
+3. `_build_table`: an array of positions is a path, and what is declared next to it is not. Without an array
+   the rows are the positions in the order of the moves, if every move names one or holds its numbers; else
+   in the order of the text.
 
 Sources: KUKA System Software, Operating and Programming Instructions for System Integrators; ABB, Technical
 reference manual: RAPID Instructions, Functions and Data types.
@@ -228,7 +228,7 @@ def _build_table(
 
     Args:
         program: The program.
-        targets: What it declares, in the order of the text, and what stands in its moves.
+        targets: What it declares, in the order of the text, and the positions in its moves.
         moves: The position of each move.
         kinds: Of the joints, and of the tool.
 
@@ -259,9 +259,9 @@ def _build_table(
                 if not all(map(math.isnan, values)):  # an axis that is not there
                     columns[name if len(rows.paths) == 1 else f"{path}_{name}"] = values
     used = {id(target) for rows in parts for target in rows.targets}
-    others = dict.fromkeys(target.name for target in targets if id(target) not in used and target.name)
+    unused = dict.fromkeys(target.name for target in targets if id(target) not in used and target.name)
     why = ", ".join(dict.fromkeys(rows.why for rows in parts))
-    why += f"; not among them: {shortened(', '.join(others), 60)}" if others else ""
+    why += f"; not among them: {shortened(', '.join(unused), 60)}" if unused else ""
     table = pa.table({name: arrow_column(np.array(values)) for name, values in columns.items()})
     inference = Inference("program", " and ".join(map(str, parts)), why)
     return MemoryTable(program.path.stem, table, path=program.path, inferences=(inference,))
@@ -278,8 +278,8 @@ def _select_rows(
         if len(set(map(len, arrays.values()))) > 1:
             lengths = (f"{name} of {format_count(len(a), kind.name)}" for name, a in arrays.items())
             delete = Hint("", effect="delete the others")
-            found = shortened(", ".join(lengths), 200)
-            raise program.error(found, "one array, or several of one length", None, delete)
+            fault = shortened(", ".join(lengths), 200)
+            raise program.error(fault, "one array, or several of one length", None, delete)
         return _Rows(kind, arrays, f"of {', '.join(arrays)}")
     rows = of_kind if ordered is None else [target for target in ordered if target.kind is kind]
     order = "text" if ordered is None else "moves"
@@ -380,11 +380,11 @@ def read_program(segment: Segment, options: LogMap) -> MemoryTable | None:
     if language.read is None:
         columns = "J1 [deg],J2 [deg],... one row per position"
         hint = Hint("", effect=f"write its positions as a table, such as {columns}")
-        found = f"found {language.name}, allowed: a text table"
-        raise LogError(Finding(found, str(segment.path), hints=(hint,)))
+        fault = f"found {language.name}, allowed: a text table"
+        raise LogError(Finding(fault, str(segment.path), hints=(hint,)))
     program = Program(segment.path, segment.text(), language.comments, language.name, options)
     starts, ends = (list(_line(rf"{word}\b").finditer(program.text)) for word in language.block)
     if len(starts) > len(ends):
-        found = f"{starts[-1][0].strip()} without {language.block[1]}"
-        raise program.error(found, "a program as a whole", starts[-1].start())
+        fault = f"{starts[-1][0].strip()} without {language.block[1]}"
+        raise program.error(fault, "a program as a whole", starts[-1].start())
     return language.read(program)

@@ -99,12 +99,12 @@ def _choose_sheet(path: Path, sheets: Sequence[Sheet], requested: str | None) ->
         counts = ((sheet.name, format_count(_numeric_rows(sheet, 1), "row")) for sheet in tables)
         choices = ((name, f"its {count} of numbers") for name, count in counts)
         raise question(path, f"{len(tables)} sheets with a table", "sheet", choices)
-    found = f"no rows of numbers in {format_count(len(shown), 'sheet')} ({', '.join(names)})"
+    fault = f"no rows of numbers in {format_count(len(shown), 'sheet')} ({', '.join(names)})"
     allowed = "a table with one row per sample"
     values = Hint(
         "", effect="if its cells are formulas, save it in a spreadsheet program, which adds their values"
     )
-    raise LogError(Finding(file=str(path), found=found, allowed=allowed, hints=(values,)))
+    raise LogError(Finding(file=str(path), found=fault, allowed=allowed, hints=(values,)))
 
 
 def _numeric_rows(sheet: Sheet, count: int) -> int:
