@@ -119,23 +119,23 @@ def tcp_warnings(rest: Sequence[Column]) -> list[LogWarning]:
     if len(alike) < 2:
         return []
     message = f"{listed(alike)} look like a recorded TCP and are not read as one"
-    names = take(alike, "takes them", parameter="position")
-    names = names if len(alike) == 3 else Hint("position", None, "names them")
+    of_rotation = [pattern for rotation in vocabulary().tcp_rotations for pattern in rotation.patterns]
+    position = [column for column in alike if not any(p.search(column.plain) for p in of_rotation)]
+    names = take(position, "takes them", parameter="position")
+    names = names if len(position) == 3 else Hint("position", None, "names them")
     hints = (Hint("", effect="name its columns tcp_x, tcp_y, tcp_z"), names)
     return [LogWarning(TCP_NOT_READ, message, hints=hints)]
 
 
 def _is_like_tcp(column: Column) -> bool:
-    """Return whether the name of a column is that of a position, or near to one, and of no orientation."""
+    """Return whether the name of a column is that of a position, or near to one."""
     words = vocabulary()
     others = words.other - _TOOL | words.joint_words["rate"] | words.joint_words["acceleration"]
     if column.words & (others | _BESIDE_TOOL) or (column.unit and column.unit.quantity != "length"):
         return False
     if any(pattern.search(column.plain) for pattern in words.tcp_position):
         return not _TORQUES.fullmatch(column.plain)
-    of_rotation = (pattern for rotation in words.tcp_rotations for pattern in rotation.patterns)
-    near = bool(_NEAR_TOOL.search(column.plain) and re.search(r"[xyz\d]$", column.plain))
-    return near and not any(pattern.search(column.plain) for pattern in of_rotation)
+    return bool(_NEAR_TOOL.search(column.plain) and re.search(r"[xyz\d]$", column.plain))
 
 
 def odd_row_warnings(rest: Sequence[Column], tables: Sequence[LogTable]) -> list[LogWarning]:

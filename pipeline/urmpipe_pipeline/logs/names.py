@@ -26,6 +26,7 @@ from urmpipe_pipeline.logs.columns import (
     find_numbers,
     kind_of,
     listed,
+    take,
     which_joints,
 )
 from urmpipe_pipeline.logs.formats.log_table import LogTable
@@ -307,7 +308,11 @@ def _by_number(
         allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
         message = f"found joint columns {listed(columns)} and none with number {missing}, allowed: {allowed}"
         spare = [c for c in still if c not in columns and not c.words & vocabulary().other]
-        raise LogError(Finding(message, file=file, hints=cure(len(gaps), spare, count)))
+        numbered = {n: [c for c in spare if str(n) in FIRST_NUMBER.findall(c.key)] for n in gaps}
+        fillers = {n: group[0] for n, group in numbered.items() if len(group) == 1}
+        together = family.columns | fillers
+        choices = [take([together[n] for n in sorted(together)])] if len(fillers) == len(gaps) else []
+        raise LogError(Finding(message, file=file, hints=(*choices, *cure(len(gaps), spare, count))))
     if larger := _sharing_a_mark(still, columns):
         _ask_if_partial(columns, larger, larger, file, count)
     evidence = "their names, in the order of their numbers"
