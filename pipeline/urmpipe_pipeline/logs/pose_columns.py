@@ -1,4 +1,11 @@
-"""The tool centre point that a log recorded: the columns of its position and orientation, and their form."""
+"""The tool centre point that a log recorded: the columns of its position and orientation, and their form.
+
+1. `find_pose`: by names: x, y, z and a rotation vector in a row (pose_0, ...); a matrix by its numbers, too;
+   x, y, z of the tool or as measured from outside, with the only orientation beside them; p1, p2, p3 with a
+   quaternion. Of several positions those measured are read.
+2. `chosen_pose`, `with_form`: the columns and the form that the user gives.
+3. By their numbers: R R^T = I and a row 0, 0, 0, 1 prove a homogeneous transform, length 1 a quaternion.
+"""
 
 from __future__ import annotations
 
@@ -21,21 +28,14 @@ from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.names import Family, drop_unknown, find_families, prefer_measured
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
-ORTHOGONAL = 1e-2
-"""Entries of R R^T may differ from those of I by this: matrices are printed with three digits or more."""
+ORTHOGONAL = 1e-2  # entries of R R^T may differ from those of I by this: matrices have three digits or more
+OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)_$")  # behind the device
 
-
-_LIKE_JOINT = re.compile(r"q_?\d")
-"""Names that quaternions and joints have."""
-
-OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)_$")
-"""What the names of x, y, z may have behind the device, and those of the orientation have not."""
-
-_UNIT_LENGTH = 1e-2
-
-_PLACES = np.arange(16).reshape(4, 4)
+_UNIT_LENGTH = 1e-2  # squared lengths of quaternions may differ from 1 by this
+_MIN_ROWS = 3  # in fewer, numbers have length 1 by chance
+_LIKE_JOINT = re.compile(r"q_?\d")  # names that quaternions and joints have
+_PLACES = np.arange(16).reshape(4, 4)  # of the entries of a homogeneous transform among its columns
 _ORDERS = (("row by row", _PLACES), ("column by column", _PLACES.T))
-"""The places of the entries of a homogeneous transform among its columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +59,12 @@ class Pose:
     alternatives: tuple[tuple[Column, ...], ...] = ()
 
 
+# 1. By names
+
+
 def find_pose(
     numeric: Sequence[Column],
-    layouts: Sequence[LogTable],
+    tables: Sequence[LogTable],
     file: str | None = None,
     *,
     form: RotationForm | None = None,
@@ -72,9 +75,9 @@ def find_pose(
 
     Args:
         numeric: Candidates.
-        layouts: The tables.
-        file: The file, if it is an error that several positions are recorded; else they are left.
-        form: Form of the orientation, if it is told: its columns are not asked then whether they hold it.
+        tables: The tables.
+        file: The file, if it is an error that several positions are recorded; else they are left out.
+        form: Form of the orientation, if it is given: its columns need not prove that they hold it.
         some: Whether it is enough that some rows hold an orientation: the others are wrong.
         lone: Whether columns are a position that are known only without their words for measured or
             commanded: target_x is not where the tool was, unless the log has actual_x, too.
@@ -82,50 +85,114 @@ def find_pose(
     Raises:
         LogError: If there are several positions where one is needed.
     """
-    every = [f for f in find_families(numeric, vocabulary().tcp_pose_vector, 0) if _numbers(f) == range(6)]
-    vectors = prefer_measured(every)
+    words = vocabulary()
+    families = [f for f in find_families(numeric, words.tcp_pose_vector, 0) if _numbers(f) == range(6)]
+    vectors = prefer_measured(families)
     if len(vectors) == 1:
-        ordered = vectors[0].ordered()
+        columns = vectors[0].ordered()
         forms: tuple[RotationForm, ...] = ("vector",) if vectors[0].rank == 0 else ("vector", "rpy", "xyz")
-        return Pose(ordered[:3], ordered[3:], forms, alternatives=_alternatives(vectors[0], every))
-    every = find_families(numeric, vocabulary().tcp_matrix, 0)
-    for family in prefer_measured(every):
-        pose = matrix_pose(family.ordered(), layouts, some=some)
-        if pose is not None:
-            same = [other for other in every if other.shares_name(family)]
+        return Pose(columns[:3], columns[3:], forms, alternatives=_alternatives(vectors[0], families))
+    families = find_families(numeric, words.tcp_matrix, 0)
+    for family in prefer_measured(families):
+        columns = family.ordered()
+        if pose := transform_pose(columns, _sample(columns, tables)[0], some=some):
+            same = [other for other in families if other.shares_name(family)]
             return replace(pose, alternatives=_alternatives(family, same))
-    position, alternatives = _position(numeric, file, lone=lone)
-    measured = not position
-    if measured:
-        position, alternatives = _xyz(find_families(numeric, vocabulary().measured, 0))
-    if not position and (numbered := _counted_pose(numeric, layouts, form)):
-        return numbered
+    inside = [column for column in numeric if not column.words & words.outside]
+    if any(column.key in ("fx", "f_x") for column in inside):  # tx, ty, tz beside forces are torques
+        inside = [c for c in inside if not (c.key.startswith("t") and len(c.key) <= len("t_x"))]
+    families = drop_unknown(find_families(inside, words.tcp_position, 0), lone=lone)
+    position, alternatives = _find_xyz(families, file)
+    is_outside = not position
+    if is_outside:
+        position, alternatives = _find_xyz(find_families(numeric, words.measured, 0))
+    if not position:
+        return _find_counted_pose(numeric, tables, form)
     rest = [column for column in numeric if column not in position]
-    if measured and position:
+    if is_outside:
         stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
         stem = OF_POSITION.sub("", stem)
         rest = [column for column in rest if stem and column.key.startswith(stem)]
     if alternatives:  # the orientation of another position is not that of this one
         rest, lone = [column for column in rest if column.kind == position[0].kind], True
-    rotation, forms = _rotation(rest, layouts, form, some=some, lone=lone) if position else ((), ())
-    own_frame = any(p.search(column.key) for column in position[:1] for p in vocabulary().measured)
-    return Pose(position, rotation, forms, measured=own_frame, alternatives=alternatives)
+    rotation, forms = _find_rotation(rest, tables, form, some=some, lone=lone)
+    in_frame = any(pattern.search(position[0].key) for pattern in words.measured)
+    return Pose(position, rotation, forms, measured=in_frame, alternatives=alternatives)
 
 
-def _counted_pose(
-    numeric: Sequence[Column], layouts: Sequence[LogTable], form: RotationForm | None
-) -> Pose | None:
-    """Return p1, p2, p3 and the only quaternion beside them, which has length 1 in each row."""
-    every = prefer_measured(find_families(numeric, vocabulary().tcp_counted, 0))
-    found = [f for f in every if _numbers(f) == range(3)]
-    if len(found) != 1:
-        return None
-    position = found[0].ordered()
+def _find_counted_pose(
+    numeric: Sequence[Column], tables: Sequence[LogTable], form: RotationForm | None
+) -> Pose:
+    """Return p1, p2, p3 and the only quaternion beside them, which has length 1 in each row; else no pose."""
+    families = prefer_measured(find_families(numeric, vocabulary().tcp_counted, 0))
+    families = [family for family in families if _numbers(family) == range(3)]
+    if len(families) != 1:
+        return Pose()
+    position = families[0].ordered()
     rest = [column for column in numeric if column not in position]
-    rotation, forms = _rotation(rest, layouts, form, some=False)
-    if len(rotation) != 4 or not _is_unit(rotation, layouts, some=False):
-        return None
+    rotation, forms = _find_rotation(rest, tables, form)
+    if len(rotation) != 4 or not _is_unit(rotation, tables):
+        return Pose()
     return Pose(position, rotation, forms, "the four columns beside them have length 1")
+
+
+def _find_xyz(
+    families: Sequence[Family], file: str | None = None
+) -> tuple[tuple[Column, ...], tuple[tuple[Column, ...], ...]]:
+    """Return the columns of the only one of the surest families that is x, y, z, and those of the others."""
+    valid = [family for family in families if _numbers(family) == range(3)]
+    families = [family for family in prefer_measured(families) if family in valid]
+    best = [family for family in families if family.rank == families[0].rank]
+    if len(best) > 1 and file is not None:
+        groups = "; ".join(listed(family.ordered()) for family in best)
+        raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
+    return (best[0].ordered(), _alternatives(best[0], valid)) if len(best) == 1 else ((), ())
+
+
+def _alternatives(family: Family, families: Sequence[Family]) -> tuple[tuple[Column, ...], ...]:
+    """Return the columns of the other families of as many."""
+    count = len(family.columns)
+    return tuple(f.ordered() for f in families if f is not family and len(f.columns) == count)
+
+
+def _find_rotation(
+    rest: Sequence[Column],
+    tables: Sequence[LogTable],
+    form: RotationForm | None,
+    *,
+    some: bool = False,
+    lone: bool = False,
+) -> tuple[tuple[Column, ...], tuple[RotationForm, ...]]:
+    """Return the columns of the only orientation, and the forms that their names allow."""
+    for words in vocabulary().tcp_rotations:
+        numbers = range(4) if words.forms[0].startswith("quat") else range(3)
+        families = [f for f in find_families(rest, words.patterns, 0) if _numbers(f) == numbers]
+        families = prefer_measured(drop_unknown(families, lone=lone))
+        if len(families) != 1:
+            continue
+        columns = families[0].ordered()
+        is_clear = not _LIKE_JOINT.fullmatch(columns[0].bare) or form in words.forms
+        if is_clear or _is_unit(columns, tables, some=some):
+            return columns, words.forms
+    matrices = prefer_measured(find_families(rest, vocabulary().tcp_matrix, 0))
+    matrices = [family for family in matrices if len(family.columns) == 9]
+    if len(matrices) == 1:
+        columns = matrices[0].ordered()
+        is_clear = some and "i" in vocabulary().tcp_matrix[matrices[0].rank].groupindex  # r11 is no joint
+        holds = _are_orthogonal(_sample(columns, tables)[0].reshape(-1, 3, 3))
+        if is_clear or form == "matrix" or _is_enough(holds, some=some):
+            return columns, ("matrix",)
+    return (), ()
+
+
+def _numbers(family: Family) -> range | None:
+    """Return range(n) if the n numbers of a family count up from 0, or from 1, without a gap."""
+    count, lowest = len(family.columns), min(family.columns)
+    is_counted = lowest in (0, 1) and sorted(family.columns) == [*range(lowest, lowest + count)]
+    return range(count) if is_counted else None
+
+
+# 2. By options
 
 
 def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
@@ -135,8 +202,16 @@ def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
         LogError: If there is no such column.
         OptionError: If there are too few or too many for a position or for the form of the orientation.
     """
+    widths = str(column_count(options.rotation)) if options.rotation else "3, 4 or 9"
     if options.measured:
-        return _measured_pose(columns, options)
+        named = chosen_columns(columns, options.measured, parameter="measured")
+        position, rotation = named[:3], named[3:]
+        forms = _forms_of(rotation, options)
+        if len(position) != 3 or (rotation and not forms):
+            allowed = f"x, y, z, and {widths} of the orientation behind them, or none"
+            count = format_count(len(named), "column")
+            raise OptionError(Finding(parameter="measured", found=count, allowed=allowed))
+        return Pose(position, rotation, forms, "given as an option", measured=True)
     if not options.position:
         if options.orientation:
             hint = Hint("position", None, "names x, y, z")
@@ -150,39 +225,19 @@ def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
         raise OptionError(f"position: found {format_count(len(position), 'column')}, allowed: {allowed}")
     forms = _forms_of(rotation, options)
     if rotation and not forms:
-        allowed = (
-            f"{column_count(options.rotation)}, as {options.rotation} has"
-            if options.rotation
-            else "3, 4 or 9"
-        )
+        allowed = f"{widths}, as {options.rotation} has" if options.rotation else widths
         raise OptionError(f"orientation: found {format_count(len(rotation), 'column')}, allowed: {allowed}")
-    return Pose(position, rotation, forms if rotation else (), "given as an option")
-
-
-def _measured_pose(columns: Sequence[Column], options: LogMap) -> Pose:
-    """Return the pose that the user names as measured from outside."""
-    named = chosen_columns(columns, options.measured, parameter="measured")
-    position, rotation = named[:3], named[3:]
-    forms = _forms_of(rotation, options)
-    if len(position) != 3 or (rotation and not forms):
-        widths = f"{column_count(options.rotation)}" if options.rotation else "3, 4 or 9"
-        allowed = f"x, y, z, and {widths} of the orientation behind them, or none"
-        raise OptionError(
-            Finding(parameter="measured", found=format_count(len(named), "column"), allowed=allowed)
-        )
-    return Pose(position, rotation, forms, "given as an option", measured=True)
+    return Pose(position, rotation, forms, "given as an option")
 
 
 def _forms_of(rotation: Sequence[Column], options: LogMap) -> tuple[RotationForm, ...]:
     """Return the forms that so many columns of an orientation may have; none of none."""
-    many = len(rotation)
-    return tuple(
-        form for form in FORMS if many and column_count(form) == many and options.rotation in (None, form)
-    )
+    forms = [form for form in FORMS if rotation and column_count(form) == len(rotation)]
+    return tuple(form for form in forms if options.rotation in (None, form))
 
 
 def with_form(pose: Pose, form: RotationForm | None) -> Pose:
-    """Return the pose with the form of orientation that the user tells.
+    """Return the pose with the form of orientation that the user gives.
 
     Raises:
         OptionError: If it has another number of columns.
@@ -196,102 +251,72 @@ def with_form(pose: Pose, form: RotationForm | None) -> Pose:
     return replace(pose, forms=(form,))
 
 
+# 3. By numbers
+
+
 def trailing_matrix(
-    columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool = False
+    columns: Sequence[Column], tables: Sequence[LogTable], *, some: bool = False
 ) -> Pose | None:
     """Return the pose in columns without names of which the last 16 or 12 are a homogeneous transform."""
-    tried = (matrix_pose(columns[-count:], layouts, some=some) for count in (16, 12))
-    return next((pose for pose in tried if pose), None)
-
-
-def matrix_pose(columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool = False) -> Pose | None:
-    """Return the pose that 16 or 12 columns hold as a homogeneous transform, by what their numbers are.
-
-    Row by row, or of 16 also column by column: the entries 0, 0, 0, 1 tell which, and R R^T = I that it
-    is one at all.
-
-    Args:
-        columns: The columns, in their order.
-        layouts: The tables.
-        some: Whether it is enough that some rows are one: the others are wrong.
-    """
-    if len(columns) not in (12, 16):
-        return None
-    return transform_pose(columns, _sampled(columns, layouts)[0], some=some)
+    last = (columns[-count:] for count in (16, 12) if len(columns) >= count)
+    poses = (transform_pose(group, _sample(group, tables)[0], some=some) for group in last)
+    return next((pose for pose in poses if pose), None)
 
 
 def transform_pose(columns: Sequence[Column], values: FloatArray, *, some: bool = False) -> Pose | None:
-    """Return the pose that 16 or 12 columns hold, by their values in the file's units, shape (n, columns)."""
-    for order, entries in _ORDERS[: 1 if len(columns) == 12 else 2]:
-        if _enough(_are_transforms(values, entries), some=some):
-            position, turned = entries[:3, 3].tolist(), entries[:3, :3].ravel().tolist()
-            rotation = tuple(columns[k] for k in turned)
-            return Pose(tuple(columns[k] for k in position), rotation, ("matrix",), f"a transform, {order}")
+    """Return the pose that 16 or 12 columns hold as a homogeneous transform; None of others.
+
+    Row by row, or of 16 also column by column: the entries 0, 0, 0, 1 show which.
+
+    Args:
+        columns: The columns, in their order.
+        values: Their values in the file's units, shape (n, columns).
+        some: Whether it is enough that some rows are one: the others are wrong.
+    """
+    for order, entries in _orders_of(len(columns)):
+        if _is_enough(_are_transforms(values, entries), some=some):
+            position, rotation = (
+                tuple(columns[k] for k in places.ravel().tolist())
+                for places in (entries[:3, 3], entries[:3, :3])
+            )
+            return Pose(position, rotation, ("matrix",), f"a transform, {order}")
     return None
 
 
 def trailing_quaternion(
-    columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool = False
+    columns: Sequence[Column], tables: Sequence[LogTable], *, some: bool = False
 ) -> Pose | None:
     """Return the pose in the last seven columns without names, if four of length 1 follow three others."""
-    if len(columns) < 7 or not _is_unit(columns[-4:], layouts, some=some):
-        return None
-    return quaternion_pose(columns)
+    is_pose = len(columns) >= 7 and _is_unit(columns[-4:], tables, some=some)
+    return quaternion_pose(columns) if is_pose else None
 
 
 def quaternion_pose(columns: Sequence[Column]) -> Pose:
-    """Return the last seven columns as a position and a quaternion, whose order nothing tells."""
+    """Return the last seven columns as a position and a quaternion of unknown order."""
     evidence = "the last four of seven numbers have length 1"
     return Pose(tuple(columns[-7:-4]), tuple(columns[-4:]), ("quat_xyzw", "quat_wxyz"), evidence)
 
 
-def _is_unit(columns: Sequence[Column], layouts: Sequence[LogTable], *, some: bool) -> bool:
-    """Return whether the numbers of three rows or more, or of some, have length 1, as quaternions have."""
-    values, _ = _sampled(columns, layouts)
-    return (some or len(values) > 2) and _enough(have_length_1(values), some=some)
-
-
-def turns_as_quaternion(columns: Sequence[Column], layouts: Sequence[LogTable]) -> bool:
+def turns_as_quaternion(columns: Sequence[Column], tables: Sequence[LogTable]) -> bool:
     """Return whether four columns have length 1 in every sampled row, and change."""
-    values, _ = _sampled(columns, layouts)
-    changes = len(values) > 2 and bool((values != values[0]).any())
-    return changes and _is_unit(columns, layouts, some=False)
+    values, _ = _sample(columns, tables)
+    return _is_unit(columns, tables) and bool((values != values[0]).any())
 
 
-def odd_rows(columns: Sequence[Column], layouts: Sequence[LogTable]) -> list[int]:
+def odd_rows(columns: Sequence[Column], tables: Sequence[LogTable]) -> list[int]:
     """Return the few sampled rows, from 1, that hold no orientation although most do: they hide it.
 
     Of 16 or 12 columns it is a transform, of 9 a matrix, of 4 a quaternion that changes in most rows.
     """
-    values, rows = _sampled(columns, layouts)
-    if len(columns) in (12, 16):
-        laws = [_are_transforms(values, entries) for _, entries in _ORDERS[: 1 if len(columns) == 12 else 2]]
-    elif len(columns) == 9:
-        laws = [_orthogonal(values.reshape(-1, 3, 3))]
-    else:
+    values, rows = _sample(columns, tables)
+    laws = [_are_transforms(values, entries) for _, entries in _orders_of(len(columns))]
+    if len(columns) == 9:
+        laws = [_are_orthogonal(values.reshape(-1, 3, 3))]
+    elif len(columns) == 4:
         changes = (np.diff(values, axis=0) != 0).any(axis=1)
         laws = [have_length_1(values)] if 2 * np.count_nonzero(changes) > len(changes) else []
     few = (rows[~holds].tolist() for holds in laws if 0 < np.count_nonzero(~holds) <= FEW * len(rows))
     return next(few, [])
-
-
-def _sampled(columns: Sequence[Column], layouts: Sequence[LogTable]) -> tuple[FloatArray, IntArray]:
-    """Return the sampled rows in which all of these columns have a number, and which these are, from 1."""
-    cells = [layouts[c.table].cells(c.index) for c in columns]
-    decimals = [layouts[c.table].decimal for c in columns]
-    rows = [
-        [to_float(cell, decimal) for cell, decimal in zip(row, decimals, strict=True)]
-        for row in zip(*cells, strict=False)
-    ]
-    values = np.array(rows, dtype=np.float64).reshape(-1, len(columns))  # NaN for no number
-    known = np.flatnonzero(np.isfinite(values).all(axis=1))
-    return values[known], known + 1
-
-
-def _are_transforms(values: FloatArray, entries: IntArray) -> BoolArray:
-    """Return which rows are homogeneous transforms with their entries at these places; shape (n,)."""
-    holds = _orthogonal(values[:, entries[:3, :3].ravel()].reshape(-1, 3, 3))
-    return holds if values.shape[1] == 12 else holds & (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)
 
 
 def have_length_1(values: FloatArray) -> BoolArray:
@@ -300,83 +325,41 @@ def have_length_1(values: FloatArray) -> BoolArray:
         return np.asarray(np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH)
 
 
-def _orthogonal(r: FloatArray) -> BoolArray:
+def _is_unit(columns: Sequence[Column], tables: Sequence[LogTable], *, some: bool = False) -> bool:
+    """Return whether the numbers of three rows or more, or of some, have length 1, as quaternions have."""
+    values, _ = _sample(columns, tables)
+    return (some or len(values) >= _MIN_ROWS) and _is_enough(have_length_1(values), some=some)
+
+
+def _sample(columns: Sequence[Column], tables: Sequence[LogTable]) -> tuple[FloatArray, IntArray]:
+    """Return the sampled rows in which all of these columns have a number, and which these are, from 1."""
+    cells = [
+        [to_float(cell, tables[column.table].decimal) for cell in tables[column.table].cells(column.index)]
+        for column in columns
+    ]
+    values = np.array(list(zip(*cells, strict=False)), dtype=np.float64).reshape(-1, len(columns))
+    known = np.flatnonzero(np.isfinite(values).all(axis=1))  # NaN for no number
+    return values[known], known + 1
+
+
+def _orders_of(count: int) -> Sequence[tuple[str, IntArray]]:
+    """Return the orders of the entries of a transform in so many columns; none in others than 12 and 16."""
+    return _ORDERS if count == 16 else _ORDERS[:1] if count == 12 else ()
+
+
+def _are_transforms(values: FloatArray, entries: IntArray) -> BoolArray:
+    """Return which rows are homogeneous transforms with their entries at these places; shape (n,)."""
+    holds = _are_orthogonal(values[:, entries[:3, :3].ravel()].reshape(-1, 3, 3))
+    return holds if values.shape[1] == 12 else holds & (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)
+
+
+def _are_orthogonal(r: FloatArray) -> BoolArray:
     """Return which of these are rotation matrices: R R^T = I and det R = 1; shape (n,)."""
     gram = r @ r.transpose(0, 2, 1)
     near = (np.abs(gram - np.eye(3)) < ORTHOGONAL).all(axis=(1, 2))
     return np.asarray(near & (np.linalg.det(r) > 0))
 
 
-def _enough(holds: BoolArray, *, some: bool) -> bool:
+def _is_enough(holds: BoolArray, *, some: bool) -> bool:
     """Return whether a law holds in all rows, of which there is one, or in some: the others are wrong."""
     return bool(holds.any()) if some else len(holds) > 0 and bool(holds.all())
-
-
-def _position(
-    numeric: Sequence[Column], file: str | None, *, lone: bool
-) -> tuple[tuple[Column, ...], tuple[tuple[Column, ...], ...]]:
-    """Return the columns x, y, z, and others that may be; none if there are several and need not be known."""
-    numeric = [column for column in numeric if not column.words & vocabulary().outside]
-    forces = any(column.key in ("fx", "f_x") for column in numeric)  # tx, ty, tz beside them are torques
-    numeric = [c for c in numeric if not (forces and c.key.startswith("t") and len(c.key) <= len("t_x"))]
-    return _xyz(drop_unknown(find_families(numeric, vocabulary().tcp_position, 0), lone=lone), file)
-
-
-def _xyz(
-    families: Sequence[Family], file: str | None = None
-) -> tuple[tuple[Column, ...], tuple[tuple[Column, ...], ...]]:
-    """Return the columns of the only one of the surest families that is x, y, z, and those of the others."""
-    every = [family for family in families if _numbers(family) == range(3)]
-    families = [family for family in prefer_measured(families) if family in every]
-    best = [family for family in families if family.rank == families[0].rank]
-    if len(best) > 1 and file is not None:
-        groups = "; ".join(listed(family.ordered()) for family in best)
-        raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
-    return (best[0].ordered(), _alternatives(best[0], every)) if len(best) == 1 else ((), ())
-
-
-def _alternatives(family: Family, every: Sequence[Family]) -> tuple[tuple[Column, ...], ...]:
-    """Return the columns of the other families of as many."""
-    return tuple(
-        other.ordered()
-        for other in every
-        if other is not family and len(other.columns) == len(family.columns)
-    )
-
-
-def _rotation(
-    rest: Sequence[Column],
-    layouts: Sequence[LogTable],
-    form: RotationForm | None,
-    *,
-    some: bool,
-    lone: bool = False,
-) -> tuple[tuple[Column, ...], tuple[RotationForm, ...]]:
-    """Return the columns of the only orientation, and the forms that their names allow."""
-    for words in vocabulary().tcp_rotations:
-        wanted = range(4) if words.forms[0].startswith("quat") else range(3)
-        every = [f for f in find_families(rest, words.patterns, 0) if _numbers(f) == wanted]
-        families = prefer_measured(drop_unknown(every, lone=lone))
-        if len(families) != 1:
-            continue
-        columns = families[0].ordered()
-        told = not _LIKE_JOINT.fullmatch(columns[0].bare) or form in words.forms
-        if told or _is_unit(columns, layouts, some=some):
-            return columns, words.forms
-    matrices = prefer_measured(find_families(rest, vocabulary().tcp_matrix, 0))
-    nine = [family for family in matrices if len(family.columns) == 9]
-    if len(nine) == 1:
-        columns = nine[0].ordered()
-        holds = _orthogonal(_sampled(columns, layouts)[0].reshape(-1, 3, 3))
-        entries = some and "i" in vocabulary().tcp_matrix[nine[0].rank].groupindex  # r11 is no joint
-        if entries or form == "matrix" or _enough(holds, some=some):
-            return columns, ("matrix",)
-    return (), ()
-
-
-def _numbers(family: Family) -> range | None:
-    """Return range(n) if the n numbers of a family count up from 0, or from 1, without a gap."""
-    count = range(len(family.columns))
-    lowest = min(family.columns)
-    is_numbered = lowest in (0, 1) and sorted(family.columns) == [lowest + k for k in count]
-    return count if is_numbered else None
