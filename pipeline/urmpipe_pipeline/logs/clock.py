@@ -79,13 +79,7 @@ _OTHER_EPOCHS = (  # name, length of its unit [s], 2000 and 2100, the conversion
     ("MATLAB's datenum in days", 86_400.0, 730_486.0, 767_011.0, "(t - 719529) * 86400"),
     ("Julian days", 86_400.0, 2_451_544.5, 2_488_069.5, "(t - 2440587.5) * 86400"),
     (".NET's ticks of 100 ns", 1e-7, 6.308e17, 6.624e17, "(t - 621355968000000000) / 10"),
-    (
-        "Windows' ticks of 100 ns",
-        1e-7,
-        1.259e17,
-        1.575e17,
-        "(t - 116444736000000000) / 10 is Unix time in us",
-    ),
+    ("Windows' ticks of 100 ns", 1e-7, 1.259e17, 1.575e17, "(t - 116444736000000000) / 10"),
 )
 
 
@@ -422,8 +416,8 @@ def settle_unit_by_speed(
     if not unit:
         found = f"{'whole ' * are_integers}steps of {step:g} ({why})"
         raise _ask_unit(time, table, found, ["s", "ms"])
-    others = tuple(warning for warning in clock.warnings if warning.kind == PASSED_OVER)
-    warnings = (*others, *_assumed(time, step, unit, f", since {why}"))
+    passed_over = tuple(warning for warning in clock.warnings if warning.kind == PASSED_OVER)
+    warnings = (*passed_over, *_assumed(time, step, unit, f", since {why}"))
     return _with_unit(clock, UnitChoice(unit, f"its steps of {step:g}, and {why}", warnings))
 
 
@@ -606,7 +600,7 @@ def find_clocks_with_file(
         except LogError:  # it may have a time or not: the given one is used
             pass
     clock = make_clock(time, table, source, units, is_label=bool(options.poses))
-    first, *others = clock.inferences
+    first, *further = clock.inferences
     first = replace(first, value=value or first.value, kind=TIME_FILE)
-    clock = clock._replace(inferences=(first, *others))
+    clock = clock._replace(inferences=(first, *further))
     return tuple(clock if table == index else unused for table in (0, 1))

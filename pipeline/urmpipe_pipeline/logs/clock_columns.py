@@ -252,10 +252,10 @@ def _with_other_part(column: Column, columns: Sequence[Column], table: LogTable)
         return forms[0].unit if forms and forms[0].is_partial else None
 
     other_unit = {DATE: TIME_OF_DAY, TIME_OF_DAY: DATE}.get(partial_unit(column) or "")
-    others = [other for other in columns if other_unit is not None and partial_unit(other) == other_unit]
-    if len(others) != 1:
+    parts = [other for other in columns if other_unit is not None and partial_unit(other) == other_unit]
+    if len(parts) != 1:
         return (column,)
-    return (column, others[0]) if other_unit == TIME_OF_DAY else (others[0], column)
+    return (column, parts[0]) if other_unit == TIME_OF_DAY else (parts[0], column)
 
 
 def _find_dates_in_digits(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
@@ -335,7 +335,7 @@ def _find_rest(seconds: Column, columns: Sequence[Column], table: LogTable) -> T
         values = table.values([seconds.index, column.index])
         exponent = _fit_rest(*values.T, may_be_short=table.header is None or is_named)
         if exponent is not None:
-            evidence = "whole seconds, and what goes on from them beside it"
+            evidence = "whole seconds, and the rest of them in the next column"
             return TimeColumns((seconds, column), evidence, exponent)
     return None
 
@@ -397,7 +397,7 @@ def _find_before_pose(columns: Sequence[Column], table: LogTable, options: LogMa
             why = f"the {pose} columns are a pose" if options.rotation else "three columns are x, y, z"
             return TimeColumns((), why)
         if 3 < pose == len(columns) - 1 and not columns[0].text and _increases(table.numbers(0)):
-            return TimeColumns((columns[0],), f"the {pose} columns behind it are a pose, and it increases")
+            return TimeColumns((columns[0],), f"the {pose} columns after it are a pose, and it increases")
     pose_clock = None if options.joints else clock_before_pose(columns, table)
     return TimeColumns(*pose_clock) if pose_clock is not None else None
 
@@ -453,7 +453,7 @@ def _find_rising(
         even = [column for column in columns if runs_evenly(table.numbers(column.index))]
         if even == [first] and not _counts_rows(values[first]):
             return TimeColumns((first,), "the first column alone increases in even steps")
-        asked = [first] if is_one_more or (values[first][0] == 0.0 and len(values[first]) > 2) else []
+        candidates = [first] if is_one_more or (values[first][0] == 0.0 and len(values[first]) > 2) else []
     else:
         steps = {column: kind_of_steps(values[column]) for column in increasing}
         clocks = [c for c in increasing if is_one_more or steps[c] != "smooth" or values[c][0] == 0.0]
@@ -468,9 +468,11 @@ def _find_rising(
                 return TimeColumns((clock,), "the first column alone increases in even steps")
         near = [column for column in columns if column not in clocks and _is_nearly_rising(column, table)]
         near = near if len(near) == 1 or clocks else []
-        asked = [*clocks, *(c for c in near if c.index == 0 or c not in increasing)]
-    if asked and not joints_given:
-        raise _ask_time(sorted(asked, key=lambda column: column.number), increasing, table, is_path=is_path)
+        candidates = [*clocks, *(c for c in near if c.index == 0 or c not in increasing)]
+    if candidates and not joints_given:
+        raise _ask_time(
+            sorted(candidates, key=lambda column: column.number), increasing, table, is_path=is_path
+        )
     return None
 
 

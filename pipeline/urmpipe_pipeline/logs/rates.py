@@ -45,8 +45,7 @@ LEAST_CLEAR = 10  # fewer clear steps of a joint show no period
 MOST_VARIED = 0.3  # periods of single steps vary by less, in the median, where rates are those of the joints
 SURE_VARIED = 0.1  # ... and where the period is exact to a percent: noise of a seventh of the rates
 
-EXACT = 0.002
-"""Share of a period by which it is rounded: of a motion that is well sampled the rule misses by less."""
+EXACT = 0.001  # share of a period by which it is rounded; well sampled, the rule errs by less
 
 
 class Block(NamedTuple):
@@ -111,7 +110,7 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
 
     It is the sum of steps over that of mean rates, of the steps that move clearly and whose ratio is near the
     median: in [s] if the joints are in [rad] or [m] and the rates in [rad/s] or [m/s], both of shape
-    (n, joints), with as few digits as its standard error allows. It varies by the median of the relative
+    (n, joints), with as few digits as change it by 0.1 % at most. It varies by the median of the relative
     deviations [-]. None if nothing moves, or if joints and rates do not agree. With the rows h apart, the
     mean rate between rows k and k + 1 is
 
@@ -139,9 +138,8 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         is_usual = is_clear & (np.abs(means * period / steps - 1) <= 4 * variation + 1e-9)
     period = float(np.abs(steps[is_usual]).sum() / np.abs(means[is_usual]).sum())
-    error = max(EXACT, 1.48 * variation / np.sqrt(np.count_nonzero(is_usual)))  # 1.48 medians are 1 sigma
     rounded = (float(f"{period:.{digits}g}") for digits in range(1, 17))
-    return next(value for value in rounded if abs(value - period) <= error * period), variation
+    return next(value for value in rounded if abs(value - period) <= EXACT * period), variation
 
 
 def _steps_and_mean_rates(q: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:

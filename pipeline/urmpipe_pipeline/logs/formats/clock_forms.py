@@ -137,14 +137,14 @@ def _iter_shapes(block: Bytes) -> Iterator[IntArray | slice]:
     """Yield the places of cells that are equal except for their digits."""
     shapes = np.where(block - np.uint8(ord("0")) < 10, np.uint8(ord("0")), block)
     keys = shapes.view(f"S{block.shape[1]}").ravel()
-    others = np.flatnonzero(keys != keys[0])
-    if not len(others):
+    rest = np.flatnonzero(keys != keys[0])
+    if not len(rest):
         yield slice(None)
         return
     yield np.flatnonzero(keys == keys[0])
-    others = others[np.argsort(keys[others], kind="stable")]
-    ordered = keys[others]
-    yield from np.split(others, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1)
+    rest = rest[np.argsort(keys[rest], kind="stable")]
+    ordered = keys[rest]
+    yield from np.split(rest, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1)
 
 
 def _read_shape(cells: Bytes, form: ClockForm) -> IntArray | int:
