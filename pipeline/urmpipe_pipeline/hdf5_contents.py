@@ -29,8 +29,8 @@ from urmpipe_pipeline.array_choice import (
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 
 MAX_ENTRIES = 500  # columns of a dataset of a log; packed images have more
-SHOWN = 9  # episodes of which a question states the rows
-DEEPEST = 16  # structs in structs
+MAX_LISTED = 9  # episodes of which a question states the rows
+MAX_DEPTH = 16  # structs in structs
 
 
 class Contents(NamedTuple):
@@ -71,31 +71,23 @@ def read_contents(path: str, most: int, episode: str | None, topic: str | None) 
         return _read_datasets(file, most, episode, topic)
 
 
-def _walk(group: Any) -> Iterator[tuple[Name, Any]]:
-    """Yield datasets and groups below a group, without following links to other places and files."""
-    members: list[tuple[Name, Any]] = []
-    group.visititems(lambda name, item: members.append((tuple(name.split("/")), item)))
-    yield from members
-
-
 # 1. Variables of MATLAB and Octave
 
 
-def _read_variables(file: Any, most: int, read: Any) -> Contents:
-    arrays = [
-        item for _, item in _walk(file) if isinstance(item, h5py.Dataset) and len(item.shape or ()) <= 3
-    ]
+def _read_variables(file: Any, most: int, read: Callable[[Any, int], Any]) -> Contents:
+    items: list[Any] = []  # links to other places and files are not followed
+    file.visititems(lambda _, item: items.append(item))
+    arrays = (item for item in items if isinstance(item, h5py.Dataset) and len(item.shape or ()) <= 3)
     size = sum(item.nbytes for item in arrays)
     if size > most:
         return Contents(size=size)
-    field_values = (name for name in file if not name.startswith("#"))
-    return Contents({name: read(file[name], 0) for name in field_values}, size=size)
+    return Contents({name: read(file[name], 0) for name in file if not name.startswith("#")}, size=size)
 
 
 def _of_matlab(node: Any, depth: int) -> Any:
     """Return a variable of MATLAB as SciPy returns those of MAT 5: squeezed, structs as dictionaries."""
     kind = bytes(node.attrs.get("MATLAB_class", b"")).decode(errors="replace")
-    if depth > DEEPEST or "MATLAB_sparse" in node.attrs or len(getattr(node, "shape", None) or ()) > 3:
+    if depth > MAX_DEPTH or "MATLAB_sparse" in node.attrs or len(getattr(node, "shape", None) or ()) > 3:
         return None
     if isinstance(node, h5py.Dataset) and kind in _MATLAB:
         empty = node.attrs.get("MATLAB_empty", 0)
@@ -125,7 +117,7 @@ def _structs(cells: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
 def _of_octave(node: Any, depth: int) -> Any:
     """Return a variable of Octave, as `_of_matlab` does."""
     kind, value = bytes(node["type"][()]).decode(errors="replace"), node["value"]
-    if depth > DEEPEST:
+    if depth > MAX_DEPTH:
         return None
     if isinstance(value, h5py.Dataset):
         return np.empty(0) if "OCTAVE_EMPTY_MATRIX" in node.attrs else _octave_array(kind, value)
@@ -223,13 +215,14 @@ def _other_episodes(names: list[Name], episode: str | None) -> set[Name]:
     """Return the paths that need not be opened: of episodes that are not read, nor shown in the question."""
     groups = find_episodes(dict.fromkeys(names, (0,)))
     chosen = pick_episode(groups, episode)
-    needed = [chosen] if chosen else list(groups)[:SHOWN]
+    needed = [chosen] if chosen else list(groups)[:MAX_LISTED]
     left_out = {groups[name] for name in groups if name not in needed}
     depth = len(next(iter(left_out), ()))
     return {name for name in names if left_out and name[:depth] in left_out}
 
 
 def _is_frame(group: Any) -> bool:
+    """Return whether pandas wrote a group with blocks of columns."""
     return bool(group.attrs.get("pandas_type") == b"frame")
 
 
@@ -238,7 +231,7 @@ def _describes(dataset: Any, *, frame: bool) -> bool:
     if not frame:
         return "/_i_" in dataset.name
     counts = dataset.attrs.get("kind") == b"integer" and dataset.attrs.get("name") == b"N."
-    return not _own(dataset).endswith("_values") and (_own(dataset) != "axis1" or counts)
+    return not _last_name(dataset).endswith("_values") and (_last_name(dataset) != "axis1" or counts)
 
 
 def _is_narrow(dataset: Any) -> bool:
@@ -251,7 +244,7 @@ def _is_text(dataset: Any) -> bool:
     return h5py.check_string_dtype(dataset.dtype) is not None
 
 
-def _own(dataset: Any) -> str:
+def _last_name(dataset: Any) -> str:
     return str(dataset.name).rpartition("/")[2]
 
 
@@ -285,7 +278,7 @@ def _iter_columns(name: Name, dataset: Any, rows: int) -> Iterator[tuple[Name, s
             units = [kind[11:-1] or "ns"] if kind.startswith("datetime64") else []
             yield (*name[:-1], label), "".join(units), np.ascontiguousarray(values[:, 0])
             return
-        labels = _texts_of(dataset.parent[_own(dataset).replace("_values", "_items")][()])
+        labels = _texts_of(dataset.parent[_last_name(dataset).replace("_values", "_items")][()])
         yield from _spread(name, values, name[:-1], labels, units)
     else:
         named = (_texts_of(attributes.get(key)) for key in attributes if key not in ("unit", "units"))
