@@ -138,7 +138,7 @@ def test_dates_are_exact(start: datetime, steps: list[int], writer: str) -> None
 
 def coarse(step: int, period: float, rows: int, phase: float) -> Sequence[int]:
     """Return stamps in [ms] of a regular clock, cut to whole steps."""
-    return ((np.arange(rows) + phase) * period // step * step).astype(int).tolist()
+    return [int((k + phase) * period // step) * step for k in range(rows)]
 
 
 @pytest.mark.slow
@@ -166,7 +166,7 @@ def motion(rows: int, shortest: float, seed: int) -> FloatArray:
     rates = 2 * np.pi / (shortest * rng.uniform(1.0, 6.0, (3, 6)))
     phases, sizes = rng.uniform(0, 2 * np.pi, (3, 6)), rng.uniform(0.2, 3.0, (3, 6))
     q = (sizes * np.sin(rates * np.arange(rows)[:, None, None] + phases)).sum(axis=1)
-    return np.remainder(q + np.pi, 2 * np.pi) - np.pi
+    return np.asarray(np.remainder(q + np.pi, 2 * np.pi) - np.pi)
 
 
 @pytest.mark.slow
