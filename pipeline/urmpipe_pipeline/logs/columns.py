@@ -225,7 +225,7 @@ def refuse_twins(
     A rate of the same name is no duplicate, nor is an angle "t (rad)" one of the time "t (s)".
 
     Raises:
-        LogError: With a finding for each such column.
+        LogError: With a finding for each such column; joints that all have as many are a choice of groups.
     """
 
     def may_be_equal(first: Column, other: Column) -> bool:
@@ -237,16 +237,22 @@ def refuse_twins(
     for column in columns:
         if column.key and not column.text:
             by_key.setdefault(column.key, []).append(column)
-    findings = []
+    equal = []
     for column in used:
-        twins = [c for c in by_key.get(column.key, ()) if c is not column and may_be_equal(c, column)]
-        if twins:
-            numbers = sorted(twin.number for twin in (column, *twins))
+        twins = {c for c in by_key.get(column.key, ()) if may_be_equal(c, column)} | {column}
+        equal.append(sorted(twins, key=lambda twin: twin.number))
+    hints: tuple[Hint, ...] = (remedy,)
+    if remedy.parameter == "joints" and len(set(map(len, equal))) == 1:
+        hints = (*(take(group) for group in zip(*equal, strict=True)), remedy)
+    findings: list[Finding] = []
+    for column, group in zip(used, equal, strict=True):
+        if len(group) > 1:
+            numbers = [twin.number for twin in group]
             more = f" and {len(numbers) - MAX_TWINS} more" if len(numbers) > MAX_TWINS else ""
             message = f"found as columns {', '.join(map(str, numbers[:MAX_TWINS]))}{more}, allowed: once"
             table = tables[column.table]
             place = (table.file, table.header_line, None, column.header)
-            findings.append(Finding(message, *place, hints=(remedy,)))
+            findings.append(Finding(message, *place, hints=() if findings and len(hints) > 1 else hints))
     if findings:
         raise LogError(*capped(findings, tables[used[0].table].file))
 

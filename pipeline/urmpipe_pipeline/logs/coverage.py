@@ -104,12 +104,18 @@ def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -
 
 
 def beside_path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
-    """Return the warning that several columns next to a path, angles if there are any, are not read."""
-    angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"] or list(unused)
-    if not MIN_JOINTS_BESIDE_PATH <= len(angles) <= MOST_JOINTS:
+    """Return the warning that several columns next to a path are not read.
+
+    They are called joints; else angles, if there are any; else all, if they are as many as an arm's joints.
+    """
+    still = [column for column in unused if not column.words & vocabulary().other]
+    joints = [column for column in still if "joint" in column.words]
+    angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"]
+    columns = joints or angles or list(unused)
+    if len(columns) < MIN_JOINTS_BESIDE_PATH or len(columns) > MOST_JOINTS > len(joints):
         return []
-    message = f"x, y, z are read as a path, and {listed(angles, most=8)} are not read"
-    hint = take(angles, "takes them as the joints")
+    message = f"x, y, z are read as a path, and {listed(columns, most=8)} are not read"
+    hint = take(columns, "takes them as the joints") if len(columns) <= MOST_JOINTS else NAME_JOINTS
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
 
 

@@ -357,13 +357,23 @@ def _candidates(free: Sequence[Column]) -> list[Column]:
 
 
 def _ask_if_several(columns: Sequence[Column], file: str, count: int | None) -> None:
-    """Raise the question which are the joints if each number is there several times: as of no single arm."""
+    """Raise the question which are the joints if each number, or name of one side, is there several times."""
     if count is not None:
         return
     groups = max(numbered_alike(columns), numbered_alike(columns, FIRST_NUMBER), key=_min_size)
     if len(groups) > 1:
         names = "; ".join(f"{group[0].header} to {group[-1].header}" for group in groups)
         raise which_joints(file, f"several groups of numbered columns: {names}", groups, "one")
+    sides: dict[frozenset[str], dict[frozenset[str], Column]] = {}
+    for column in columns:
+        arms = frozenset(word for word in column.words if vocabulary().arms.fullmatch(word))
+        side = arms | column.marked.measured | column.marked.commanded
+        sides.setdefault(side, {})[column.words - side] = column
+    first, *others = sides.values()
+    if len(first) > 1 and others and all(other.keys() == first.keys() for other in others):
+        groups = [tuple(columns.values()) for columns in sides.values()]
+        names = "; ".join(f"{group[0].header} to {group[-1].header}" for group in groups)
+        raise which_joints(file, f"several groups of the same names: {names}", groups, "one")
 
 
 def _min_size(groups: Sequence[Sequence[Column]]) -> int:
