@@ -243,7 +243,7 @@ def refuse_twins(
         equal.append(sorted(twins, key=lambda twin: twin.number))
     hints: tuple[Hint, ...] = (remedy,)
     if remedy.parameter == "joints" and len(set(map(len, equal))) == 1:
-        hints = (*(take(group) for group in zip(*equal, strict=True)), remedy)
+        hints = (*(take(group, by_number=True) for group in zip(*equal, strict=True)), remedy)
     findings: list[Finding] = []
     for column, group in zip(used, equal, strict=True):
         if len(group) > 1:
