@@ -19,7 +19,7 @@ from urmpipe_pipeline.logs.columns import NAME_JOINTS, REST, Column, Kind, liste
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.names import family_of, find_families, prefer_measured
 from urmpipe_pipeline.logs.pose_columns import OF_POSITION, odd_rows
-from urmpipe_pipeline.logs.rates import MOST_JOINTS
+from urmpipe_pipeline.logs.rates import MAX_JOINTS
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 COLUMNS_NOT_READ = "columns-not-read"
@@ -112,10 +112,10 @@ def beside_path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
     joints = [column for column in still if "joint" in column.words]
     angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"]
     columns = joints or angles or list(unused)
-    if len(columns) < MIN_JOINTS_BESIDE_PATH or len(columns) > MOST_JOINTS > len(joints):
+    if len(columns) < MIN_JOINTS_BESIDE_PATH or len(columns) > MAX_JOINTS > len(joints):
         return []
     message = f"x, y, z are read as a path, and {listed(columns, most=8)} are not read"
-    hint = take(columns, "takes them as the joints") if len(columns) <= MOST_JOINTS else NAME_JOINTS
+    hint = take(columns, "takes them as the joints") if len(columns) <= MAX_JOINTS else NAME_JOINTS
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
 
 

@@ -74,7 +74,7 @@ from urmpipe_pipeline.logs.pose_columns import (
     turns_as_quaternion,
     with_form,
 )
-from urmpipe_pipeline.logs.rates import MOST_JOINTS
+from urmpipe_pipeline.logs.rates import MAX_JOINTS
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 
@@ -396,7 +396,7 @@ def _may_be(
         if column.table not in clocked and len(steps[column]) > 1 and (steps[column] > 0).all()
     ]
     candidates = [column for column in candidates if len(rising) != 1 or column is not rising[0]]
-    counts = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
+    counts = {len(robot.coordinates)} if robot else range(1, MAX_JOINTS + 1)
     candidates = of_first_kind(candidates)
     groups = [*by_arm(candidates), *numbered_alike(candidates), *numbered_alike(candidates, FIRST_NUMBER)]
     groups.sort(key=len, reverse=True)

@@ -49,7 +49,7 @@ from urmpipe_pipeline.logs.pose_columns import (
     transform_pose,
     with_form,
 )
-from urmpipe_pipeline.logs.rates import MOST_JOINTS, SURE, proved_blocks
+from urmpipe_pipeline.logs.rates import MAX_JOINTS, SURE, proved_blocks
 from urmpipe_pipeline.logs.roles import (
     GIVEN,
     Roles,
@@ -109,8 +109,8 @@ def without_header(
         return _path_by_place(columns, tables, options, pose)
     if texts := [column for column in columns if column.text]:
         is_text = np.array([column.text for column in columns])
-        unlike = is_text | unlike_joints(table.values([column.index for column in columns]))
-        groups = _groups(columns, unlike, len(robot.coordinates) if robot else None)
+        odd = is_text | find_odd_columns(table.values([column.index for column in columns]))
+        groups = _groups(columns, odd, len(robot.coordinates) if robot else None)
         cell = format_value(table.cells(texts[0].index)[0])
         message = f"{cell} in column {texts[0].number} of a table without a header"
         raise which_joints(table.file, message, [group for group in groups if not {*group} & {*texts}])
@@ -298,11 +298,11 @@ def _joints_among(
         joints, rates = (tuple(free[k] for k in place) for place in (blocks[0].joints, blocks[0].rates))
         evidence = f"steps and rates correlate by {blocks[0].correlation:.3g}"
         return joints, rates, f"columns {listed(rates)} are their rates: {evidence}"
-    unlike = unlike_joints(values)
-    if not blocks and count is None and len(free) <= MAX_UNASKED and not unlike.any():
+    odd = find_odd_columns(values)
+    if not blocks and count is None and len(free) <= MAX_UNASKED and not odd.any():
         return tuple(free), (), "no header: joints in order"
-    groups = [[free[k] for k in block.joints] for block in blocks] + _groups(free, unlike, count)
-    doubtful = [column for column, is_unlike in zip(free, unlike, strict=True) if is_unlike]
+    groups = [[free[k] for k in block.joints] for block in blocks] + _groups(free, odd, count)
+    doubtful = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
     message = f"{len(free)} columns that no header names"
     message += f", of which {listed(doubtful)} may be no joints" if doubtful else ""
     message += f", and robot {robot.name} has {count} joints" if robot else ""
@@ -310,7 +310,7 @@ def _joints_among(
     raise which_joints(table.file, message, groups, UNKNOWN, *as_path)
 
 
-def unlike_joints(values: FloatArray) -> BoolArray:
+def find_odd_columns(values: FloatArray) -> BoolArray:
     """Return which columns are unlike joints, or unlike the others, shape (columns,).
 
     They go further than any arm's joint, or than one in rad where most of the others do not; they move seldom
@@ -332,19 +332,19 @@ def unlike_joints(values: FloatArray) -> BoolArray:
     return np.asarray((size > TWO_TURNS[in_rad]) | seldom | (counts & (len(values) > 3)))
 
 
-def _groups(free: Sequence[Column], unlike: BoolArray, count: int | None) -> list[Sequence[Column]]:
+def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[Sequence[Column]]:
     """Return the columns that may be all joints: those between unlike ones, or blocks of one size."""
     runs = [
         [free[k] for k, _ in run]
-        for is_unlike, run in groupby(enumerate(unlike), lambda pair: bool(pair[1]))
-        if not is_unlike
+        for is_odd, run in groupby(enumerate(odd), lambda pair: bool(pair[1]))
+        if not is_odd
     ]
     near = sorted(
-        (run for run in runs if 2 < len(run) <= MOST_JOINTS or len(run) == count), key=len, reverse=True
+        (run for run in runs if 2 < len(run) <= MAX_JOINTS or len(run) == count), key=len, reverse=True
     )
     if count:
-        alike = [column for column, is_unlike in zip(free, unlike, strict=True) if not is_unlike]
-        return [run for run in (*near, alike, free[:count], free[-count:]) if len(run) == count]
+        likely = [column for column, is_odd in zip(free, odd, strict=True) if not is_odd]
+        return [run for run in (*near, likely, free[:count], free[-count:]) if len(run) == count]
     if len(free) <= MAX_UNASKED:
         return [*near[:1], free]
     tiles = [
@@ -382,8 +382,8 @@ def one_plot_a_file(
         return tuple(numeric), ()
     missing = [n for n in range(min(numbers), max(numbers)) if n not in numbers]
     if robot is None and missing and len(missing) < len(numbers):  # 1, 2, 4, but not 1, 2, 10
-        found = ", ".join(map(str, sorted(numbers)))
-        message = f"found plots with the numbers {found} and none with {', '.join(map(str, missing))}"
+        known = ", ".join(map(str, sorted(numbers)))
+        message = f"found plots with the numbers {known} and none with {', '.join(map(str, missing))}"
         message = f"{message}, allowed: a plot for each joint; add the missing one"
         raise LogError(Finding(message, str(paths[0].parent), hints=(NAME_JOINTS,)))
     in_order, by_files = (
