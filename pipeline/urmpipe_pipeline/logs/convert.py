@@ -110,7 +110,7 @@ class Group(NamedTuple):
 
     @property
     def recorded(self) -> FloatArray | None:
-        """The values; None if there are none, or one of the columns is empty."""
+        """The values in SI, shape (n, columns); None if there are none, or one of the columns is empty."""
         if not self.units or np.isnan(self.values).all(axis=0).any():
             return None
         return self.values
@@ -223,7 +223,7 @@ def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:
 
 
 class Times(NamedTuple):
-    """The times of the rows in [ns] from the first, the clock there in [ns], and how they are known."""
+    """The times of the rows in [ns] from the first, shape (n,), the clock there, and how they are known."""
 
     t_ns: IntArray
     start: int = 0

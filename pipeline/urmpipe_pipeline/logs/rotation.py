@@ -116,7 +116,7 @@ class Choice:
         return BY_COLUMNS if self.by_columns else tuple(range(len(self.units)))
 
     def in_si(self, values: FloatArray) -> FloatArray:
-        """Return values of the columns in [rad] or [-], in the order of the form."""
+        """Return values of the columns, shape (n, columns), in [rad] or [-] and in the order of the form."""
         return (values * [unit.factor for unit in self.units])[:, self.order]
 
     def __str__(self) -> str:

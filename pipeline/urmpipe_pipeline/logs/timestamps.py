@@ -69,7 +69,7 @@ class Reading(NamedTuple):
         times: Their sum in [ns], or NO_TIME, or UNREADABLE, shape (n,).
         midnights: Number of midnights in a time of day.
         unreadable: Number of rows that are no times.
-        steps: Steps between the rows that have a time in [ns].
+        steps: Steps between the m rows that have a time in [ns], shape (m - 1,).
         backwards: Number of these that are negative.
     """
 
@@ -265,7 +265,7 @@ class Regular(NamedTuple):
 
 
 def fit_rounded(timestamps: IntArray) -> Regular | None:
-    """Return the regular clock of increasing timestamps in [ns] such as 3, 7, 10, 13, 17 ms; or None."""
+    """Return the regular clock of increasing timestamps in [ns], shape (n,), as 3, 7, 10, 13 ms; or None."""
     steps = np.diff(timestamps)
     if len(steps) < MIN_CHANGES:
         return None
@@ -280,7 +280,7 @@ def fit_rounded(timestamps: IntArray) -> Regular | None:
 
 
 def fit_repeated(timestamps: IntArray) -> Regular | None:
-    """Return the regular clock of timestamps in [ns] that repeat about equally often; or None."""
+    """Return the regular clock of timestamps in [ns], shape (n,), that repeat equally often; or None."""
     steps = np.diff(timestamps)
     changes = np.flatnonzero(steps) + 1
     if len(changes) < MIN_CHANGES or not are_many(int(np.count_nonzero(steps == 0)), len(timestamps)):
@@ -327,7 +327,7 @@ class Spread(NamedTuple):
 
 
 def spread_repeated(timestamps: IntArray) -> Spread | None:
-    """Return the times of rows of which some share timestamps in [ns], never running backwards; or None.
+    """Return the times of rows of which some share timestamps in [ns], shape (n,), in order; or None.
 
     Over a gap the rows stay together.
     """
