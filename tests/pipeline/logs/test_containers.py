@@ -20,7 +20,6 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.logs import LogMap, read_log
-from urmpipe_pipeline.logs.log_map import read_options
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 Write = Callable[[Path], object]
@@ -99,15 +98,3 @@ def test_every_container_has_a_command_that_runs_here() -> None:
     for one in vocabulary().containers:
         suffixed = any(name.lower().endswith(one.suffixes) for name in WRITERS)
         assert suffixed or any(word in one.what for word in others), one.what
-
-
-def test_numpy_arrays_of_several_episodes_and_lengths_are_questions(tmp_path: Path) -> None:
-    demos = {"demo_0/q": Q, "demo_0/t": T, "demo_1/q": Q[:40], "demo_1/t": T[:40]}
-    for arrays in (demos, {"q": Q, "t": T, "force": Q[:40, :3], "limits": Q[:6]}):
-        np.savez(tmp_path / "log.npz", **arrays)
-        with pytest.raises(LogError) as caught:
-            read_log([tmp_path / "log.npz"])
-        hint = caught.value.findings[0].hints[0]
-        assert str(hint) == ("--episode demo_0" if arrays is demos else "--topic q")
-        log = read_log([tmp_path / "log.npz"], read_options({hint.parameter: hint.value}))
-        np.testing.assert_array_equal(log.q, Q)

@@ -35,9 +35,7 @@ class Good(NamedTuple):
     robot: str | None = None
     options: Mapping[str, Any] = {}
     unit: str | Sequence[str] = "rad"
-    joints: Sequence[
-        str
-    ] = ()  # what each joint's name contains, in order; empty: the file does not name them
+    joints: Sequence[str] = ()  # what each joint's name contains, in order; empty: no names
     rates: bool = False
 
 
@@ -368,17 +366,10 @@ def test_the_robot_is_inferred_where_the_recorded_tool_singles_it_out(name: str,
 
 
 # The runs of these specimens must go on where their files wrap; the first row tells no turns.
-TURNED: list[Any] = [
-    "pandas_german",
-    "numpy_savetxt_degrees",
-    "fstring_degree_sign",
-    "coppeliasim_one_graph",
-    "wrap_180",
-    "wrap_360",
-    "wrap_270",
-    "wrap_pi",
-    "wrap_two_turns",
-]
+TURNED = [
+    "pandas_german", "numpy_savetxt_degrees", "fstring_degree_sign", "coppeliasim_one_graph", "wrap_180",
+    "wrap_360", "wrap_270", "wrap_pi", "wrap_two_turns",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", TURNED)
