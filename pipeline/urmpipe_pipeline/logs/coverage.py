@@ -17,7 +17,13 @@ from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.logs.columns import NAME_JOINTS, REST, Column, Kind, listed, take
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.names import family_of, find_families, prefer_measured
+from urmpipe_pipeline.logs.names import (
+    FIRST_NUMBER,
+    family_of,
+    find_families,
+    numbered_alike,
+    prefer_measured,
+)
 from urmpipe_pipeline.logs.pose_columns import OF_POSITION, odd_rows
 from urmpipe_pipeline.logs.rates import MAX_JOINTS
 from urmpipe_pipeline.logs.vocabulary import vocabulary
@@ -106,12 +112,16 @@ def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -
 def beside_path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
     """Return the warning that several columns next to a path are not read.
 
-    They are called joints; else angles, if there are any; else all, if they are as many as an arm's joints.
+    They are called joints; else angles, if there are any; else all; of more than an arm's joints those in
+    numbered families.
     """
     still = [column for column in unused if not column.words & vocabulary().other]
     joints = [column for column in still if "joint" in column.words]
     angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"]
     columns = joints or angles or list(unused)
+    if len(columns) > MAX_JOINTS and not joints:
+        families = [group for group in numbered_alike(columns, FIRST_NUMBER) if len(group) <= MAX_JOINTS]
+        joints = columns = [c for group in families if len(group) >= MIN_JOINTS_BESIDE_PATH for c in group]
     if len(columns) < MIN_JOINTS_BESIDE_PATH or len(columns) > MAX_JOINTS > len(joints):
         return []
     message = f"x, y, z are read as a path, and {listed(columns, most=8)} are not read"
