@@ -10,10 +10,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn, TypeAlias
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, Hint, LogError
@@ -364,16 +364,41 @@ def _ask_if_several(columns: Sequence[Column], file: str, count: int | None) -> 
     if len(groups) > 1:
         names = "; ".join(f"{group[0].header} to {group[-1].header}" for group in groups)
         raise which_joints(file, f"several groups of numbered columns: {names}", groups, "one")
-    sides: dict[frozenset[str], dict[frozenset[str], Column]] = {}
-    for column in columns:
-        arms = frozenset(word for word in column.words if vocabulary().arms.fullmatch(word))
-        side = arms | column.marked.measured | column.marked.commanded
-        sides.setdefault(side, {})[column.words - side] = column
-    first, *others = sides.values()
-    if len(first) > 1 and others and all(other.keys() == first.keys() for other in others):
-        groups = [tuple(columns.values()) for columns in sides.values()]
+    groups = max((_group_by(columns, split) for split in (_side, _first_word, _last_word)), key=_min_size)
+    if groups:
         names = "; ".join(f"{group[0].header} to {group[-1].header}" for group in groups)
-        raise which_joints(file, f"several groups of the same names: {names}", groups, "one")
+        raise which_joints(file, f"several groups of the same names: {names}", [*groups, columns], "one")
+
+
+Split: TypeAlias = Callable[[Column], tuple[Hashable, Hashable]]
+
+
+def _group_by(columns: Sequence[Column], split: Split) -> list[tuple[Column, ...]]:
+    """Return columns by a part of their names, if each part has the same other parts; else nothing."""
+    groups: dict[Hashable, dict[Hashable, Column]] = {}
+    for column in columns:
+        part, rest = split(column)
+        groups.setdefault(part, {})[rest] = column
+    names = [group.keys() for group in groups.values()]
+    if len(names) < 2 or len(names[0]) < 2 or any(rests != names[0] for rests in names):
+        return []
+    return [tuple(group.values()) for group in groups.values()]
+
+
+def _side(column: Column) -> tuple[Hashable, Hashable]:
+    arms = frozenset(word for word in column.words if vocabulary().arms.fullmatch(word))
+    side = arms | column.marked.measured | column.marked.commanded
+    return side, column.words - side
+
+
+def _first_word(column: Column) -> tuple[Hashable, Hashable]:
+    word, _, rest = column.plain.partition("_")
+    return word, rest
+
+
+def _last_word(column: Column) -> tuple[Hashable, Hashable]:
+    rest, _, word = column.plain.rpartition("_")
+    return word, rest
 
 
 def _min_size(groups: Sequence[Sequence[Column]]) -> int:
