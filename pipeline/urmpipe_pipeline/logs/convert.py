@@ -371,6 +371,9 @@ def _log_columns(reading: Reading, proposal: Proposal) -> Iterator[LogColumn]:
 
 
 def _header(plan: Plan, column: Column) -> str:
-    """Return the name of a column as its file has it; empty if the file has no line of names."""
+    """Return the name of a column as its file has it; empty if the file does not name it."""
     table = plan.tables.layouts[column.table]
-    return "" if table.header in (None, table.first_line) else column.header
+    is_named = table.header is not None and ("header", "none") not in {
+        (inference.what, inference.value) for inference in table.inferences
+    }
+    return column.header if is_named else ""
