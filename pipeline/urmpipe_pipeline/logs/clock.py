@@ -482,7 +482,7 @@ def even_clock(
         raise OptionError(Finding(parameter=given_by, found=f"{step:g} s", allowed=allowed))
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
     basis: Basis = "assumed" if period is None else "given"
-    evidence = "assumed" if period is None else "given as an option"
+    evidence = "no column is a time, and no rates show it" if period is None else "given as an option"
     inferences = (Inference("period", f"{step:g} s", evidence, hints=(Hint("period"),), basis=basis),)
     if period is not None:
         return times, inferences, []

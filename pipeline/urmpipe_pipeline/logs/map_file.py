@@ -18,7 +18,7 @@ from urmpipe_models.errors import Finding, OptionError, escape_line
 from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
 from urmpipe_pipeline.joint_log import Basis, Inference, JointLog, LogColumn, Role
 from urmpipe_pipeline.logs.clock import TIME_FILE, split_file_column
-from urmpipe_pipeline.logs.formats.opening import TABLE
+from urmpipe_pipeline.logs.formats.opening import PATH, TABLE
 from urmpipe_pipeline.logs.formats.row_choice import ROWS_READ
 from urmpipe_pipeline.logs.log_map import KEYS, READING, TABLES, Evidence, LogMap
 from urmpipe_pipeline.logs.rotation import PURE
@@ -181,8 +181,10 @@ def _evidence(
 ) -> Iterator[tuple[str, Evidence]]:
     """Yield the evidence of the entries, by field or "unit.COLUMN"."""
     tcp = "measured" if log.externally_measured else "recorded"
-    for field, kind in ENTRIES.items():
-        if inference := by_kind.get(kind.format(tcp=tcp)):
+    kinds = {field: kind.format(tcp=tcp) for field, kind in ENTRIES.items()}
+    kinds |= {"source": "path"} if log.source == PATH and not options.source else {}
+    for field, kind in kinds.items():
+        if inference := by_kind.get(kind):
             basis: Basis = "given" if getattr(options, field) else inference.basis
             yield field, Evidence(basis, inference.evidence)
     units = {name: each for each in log.inferences if each.kind in UNITS for name in each.columns}

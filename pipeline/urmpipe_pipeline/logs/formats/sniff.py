@@ -287,7 +287,7 @@ def _find_header(above: Sequence[HeadLine], delimiter: str, width: int) -> tuple
             split[k - 1] = [cells[0], *split[k - 1][1:]]
             continue
         groups = split[k - 1] if k else []
-        names = _join_groups(cells, groups) if abs(len(groups) - len(cells)) <= 1 else cells
+        names = _join_groups(cells, groups)
         if not units and names == cells and len(groups) == len(cells) and _are_units(groups, [cells]):
             units = groups
         return (line.number, [printable(cell) for cell in names]), units
@@ -295,13 +295,22 @@ def _find_header(above: Sequence[HeadLine], delimiter: str, width: int) -> tuple
 
 
 def _join_groups(names: Row, groups: Row) -> Row:
-    """Return names with the groups above them, where they repeat and with their groups do not."""
-    groups = [*groups, *("" for _ in range(len(names) - len(groups)))][: len(names)]
-    joined, last = [], ""
+    """Return names with the groups above them, where they repeat and with their groups do not.
+
+    An empty cell has the group before it, as merged cells have, unless groups repeat.
+    """
+    repeated = [k for k, name in enumerate(names) if name and names.count(name) > 1]
+    if len(groups) == len(repeated) and all(groups):  # blanks between them are no cells
+        places = dict(zip(repeated, groups, strict=True))
+        groups = [places.get(k, "") for k in range(len(names))]
+    if abs(len(groups) - len(names)) > 1:
+        return names
+    groups = [*groups, ""][: len(names)]
+    joined, last, are_merged = [], "", not _repeat(groups)
     for name, group in zip(names, groups, strict=True):
-        last = group or last
+        last = group or (last if are_merged else "")
         joined.append(f"{last}/{name}" if last and name else name or group)
-    return joined if _repeat(names) and not _repeat(joined) else names
+    return joined if repeated and not _repeat(joined) else names
 
 
 def _repeat(names: Row) -> bool:
