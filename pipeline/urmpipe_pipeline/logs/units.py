@@ -60,6 +60,8 @@ GIVEN = "given as an option"  # why a unit is that of the user
 MAX_REACH = 10.0  # [m], of a coordinate; no arm reaches further
 MIN_REACH = 0.02  # [m]; a tool that moves has a larger coordinate
 MAX_METRES = 20.0  # larger values without a unit are not in [m]
+MAX_SLIDES = 3  # joints of a gantry or a delta robot
+PATH_WIDTHS = (3, 6, 7)  # columns of a path: x, y, z, and three angles or a quaternion
 
 _ALLOWED: dict[JointKind | None, tuple[Quantity, ...]] = {
     "revolute": ("angle",),
@@ -469,7 +471,7 @@ class UnitFinder:
             raise LogError(self._ask_slides(large, peak(values)))
         fast = too_fast_as_radians(values, joints.t_ns) if peak(values) <= MAX_DEGREES else None
         if not fast and usual_peak(values) > TWO_TURNS:
-            raise LogError(self._ask_angle(columns, peak(values)))
+            raise LogError(self._ask_angle(columns, peak(values), may_slide=may_slide))
         unit, why = (deg, f": {fast}") if fast else (rad, "")
         hints = (Hint("unit", {"": OTHER_UNIT[unit.name]}, "overrides this"),)
         self._assume(columns, unit, _ALL_OF["joint"], "joint", hints, why)
@@ -484,14 +486,17 @@ class UnitFinder:
         allowed = "the unit of a joint that slides, or one unit for all"
         return Finding(f"{message}, allowed: {allowed}", self.sources.file, hints=hints)
 
-    def _ask_angle(self, columns: Sequence[Column], largest: float) -> Finding:
+    def _ask_angle(self, columns: Sequence[Column], largest: float, *, may_slide: bool) -> Finding:
         """Return the question whether joints are in rad or deg."""
         message = f"found values up to {largest:.6g} in {_list_names(columns)} and no unit"
         message += ", allowed: rad or deg" + ("; convert ticks and counts" if largest > MAX_DEGREES else "")
         hints = [Hint("unit", {"": name}, "specifies it") for name in ("rad", "deg")]
         if all(column.header.isdigit() for column in columns):
-            hints += [Hint("source", "path", "reads them as x, y, z")] if len(columns) == 3 else []
-            hints += [NAME_JOINTS]
+            if may_slide and len(columns) == MAX_SLIDES:
+                hints += unit_hints(columns, "mm", "is for joints that slide")
+            if may_slide and len(columns) in PATH_WIDTHS:
+                hints.append(Hint("source", "path", "reads x, y, z, and an orientation behind them"))
+            hints.append(NAME_JOINTS)
         return Finding(message, self.sources.file, hints=tuple(hints))
 
     def warn_not_reached(
