@@ -23,8 +23,8 @@ ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 300.0
 """An input that has not returned after so many seconds never does, however loaded the machine is."""
 
-INPUTS = 5
-"""Of a kind whose share is 1: 250 of all kinds, in five seconds."""
+INPUTS = 10
+"""Of a kind whose share is 1: five hundred of all kinds, in ten seconds."""
 
 PLANTED = """
 import os, sys, time

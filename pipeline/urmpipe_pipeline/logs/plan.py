@@ -51,6 +51,7 @@ from urmpipe_pipeline.logs.roles import (
     joint_inference,
     own_joints,
     refuse_long_form,
+    signal_roles,
     written_roles,
 )
 from urmpipe_pipeline.logs.unnamed import one_plot_a_file, without_header
@@ -201,8 +202,9 @@ def _find_roles(
     main = tables.layouts[0 if time_file is None else 1 - time_file]
     are_several = time_file is None and len(set(tables.paths)) > 1
     columns_given = options.joints or options.position or options.measured
-    if len(tables.layouts) == 1 and not (columns_given or options.source or options.side or options.pair):
-        stated = written_roles(columns, main, robot)
+    if not (columns_given or options.source or options.side or options.pair):
+        stated = written_roles(columns, main, robot) if len(tables.layouts) == 1 else None
+        stated = stated or signal_roles(columns, main, robot)
         if stated is not None:
             return stated
     if main.header is None and not are_several:

@@ -4,7 +4,8 @@
    the robot's joints or like those of an arm (`names`), or whose rates stand beside them.
 2. Without joints, x, y, z are a path; else a question whose choices are the columns that may be joints.
 3. `written_roles`: the columns of what urmpipe writes itself, by their metadata or all names together.
-4. `refuse_long_form`: a table with a row per joint, with the command that makes it a row per sample.
+4. `signal_roles`: the signals of a simulation: its only array of joints, else a question.
+5. `refuse_long_form`: a table with a row per joint, with the command that makes it a row per sample.
 """
 
 from __future__ import annotations
@@ -516,7 +517,67 @@ def _names(columns: Sequence[Column]) -> str:
     return ", ".join(column.name for column in columns)
 
 
-# 4. Long form
+# 4. Signals of a simulation
+
+_SIGNAL = re.compile(r"(?P<block>[^.\s]+)\.(?P<variable>[^.\s\[]+)(\[(?P<element>\d+)\])?( \[[^\]]*\])?")
+_SIGNAL_CLOCKS = ("t [s]", "clock [ns]")
+_JOINT_ARRAYS = ("q", "phi", "s")  # names of arrays of joints in the units of urmpipe
+
+
+def signal_roles(columns: Sequence[Column], table: LogTable, robot: Chain | None) -> Roles | None:
+    """Return the roles of the signals BLOCK.VARIABLE of a simulation; None if a table has others.
+
+    The joints are the only array with a name of joints. Scalars such as load1.theta, load2.theta may be those
+    of drives, of loads or of set points.
+
+    Args:
+        columns: The columns, without the clock.
+        table: Their table.
+        robot: The arm, or None.
+
+    Raises:
+        LogError: With the question which they are, if several may be, or they are not as many as the robot's.
+    """
+    signals = [(c, _SIGNAL.fullmatch(c.header)) for c in columns if c.header not in _SIGNAL_CLOCKS]
+    if table.names[:1] != _SIGNAL_CLOCKS[:1] or not signals or not all(match for _, match in signals):
+        return None
+    arrays: dict[tuple[str, str], list[Column]] = {}
+    scalars: dict[tuple[str, str], list[Column]] = {}
+    for column, match in signals:
+        unit = column.unit
+        if match is None or unit is None or unit.quantity not in ("angle", "length") or unit.order:
+            continue
+        block, variable = match["block"], match["variable"]
+        if not match["element"]:
+            scalars.setdefault((block.rstrip("0123456789"), variable), []).append(column)
+        elif variable in _JOINT_ARRAYS:
+            arrays.setdefault((block, variable), []).append(column)
+    groups = list((arrays or scalars).values())
+    if len(arrays) != 1:
+        size = max(map(len, groups), default=0)
+        groups = [group for group in groups if len(group) == size]
+        if len(groups) < 2:
+            return None
+        raise which_joints(
+            table.file, f"{len(groups)} groups of signals that may be joints", groups, "one of them"
+        )
+    joints = tuple(groups[0])
+    check_count(joints, table.file, robot)
+    by_name = {column.header.partition(" ")[0]: column for column in columns}
+    names = [column.header.partition(" ")[0] for column in joints]
+    rates, accelerations = (
+        tuple(by_name[name.replace("[", f"{suffix}[")] for name in names)
+        if all(name.replace("[", f"{suffix}[") in by_name for name in names)
+        else ()
+        for suffix in ("d", "dd")
+    )
+    rest = [column for column in columns if column not in (*joints, *rates, *accelerations)]
+    inferences = [joint_inference(joints, "the only array of joints among the signals")]
+    inferences += not_used(rest, "signals beside the joints")
+    return Roles(joints, rates, accelerations, inferences=tuple(inferences))
+
+
+# 5. Long form
 
 
 def refuse_long_form(
