@@ -37,7 +37,7 @@ REST = "rest"  # all columns without the other side's word
 OTHER_UNIT = {"rad": "deg", "deg": "rad", "m": "mm", "mm": "m", "cm": "m"}  # what a wrong unit most likely is
 UNKNOWN = "columns that are known to be joints"  # allowed, where nothing shows which columns they are
 MAX_LISTED = 8  # words in a message, those of most columns
-MAX_TWINS = 12  # numbers of columns with one name in a message
+MAX_DUPLICATES = 12  # numbers of columns with one name in a message
 MAX_CHOICES = 9  # groups of columns that a question offers
 MAX_SIDE_WORDS = 3  # words that select a group of columns
 
@@ -184,8 +184,8 @@ def columns_of(tables: Sequence[LogTable], titles: Sequence[str]) -> tuple[Colum
             is_text = 2 * count_numbers(cells, table.decimal) < len(cells)
             name = name or f"column {len(columns) + 1}"
             place = (len(columns) + 1, number, index)
-            twin = table.names.count(header) > 1
-            columns.append(Column(*place, header, name, key(label), unit, is_text, shares_name=twin))
+            duplicate = table.names.count(header) > 1
+            columns.append(Column(*place, header, name, key(label), unit, is_text, shares_name=duplicate))
     names: dict[tuple[int, str, str], str] = {}
     for column in columns:
         match = _NAME_COLUMN.match(column.key) if column.text else None
@@ -217,7 +217,7 @@ def find_numbers(names: Sequence[str]) -> list[int] | None:
     return numbers if same and len(set(numbers)) == len(names) else None
 
 
-def refuse_twins(
+def check_unique_names(
     used: Sequence[Column], columns: Sequence[Column], tables: Sequence[LogTable], remedy: Hint
 ) -> None:
     """Raise if a column that is to be used shares its name with another one.
@@ -239,17 +239,17 @@ def refuse_twins(
             by_key.setdefault(column.key, []).append(column)
     equal = []
     for column in used:
-        twins = {c for c in by_key.get(column.key, ()) if may_be_equal(c, column)} | {column}
-        equal.append(sorted(twins, key=lambda twin: twin.number))
+        duplicates = {c for c in by_key.get(column.key, ()) if may_be_equal(c, column)} | {column}
+        equal.append(sorted(duplicates, key=lambda duplicate: duplicate.number))
     hints: tuple[Hint, ...] = (remedy,)
     if remedy.parameter == "joints" and len(set(map(len, equal))) == 1:
         hints = (*(take(group, by_number=True) for group in zip(*equal, strict=True)), remedy)
     findings: list[Finding] = []
     for column, group in zip(used, equal, strict=True):
         if len(group) > 1:
-            numbers = [twin.number for twin in group]
-            more = f" and {len(numbers) - MAX_TWINS} more" if len(numbers) > MAX_TWINS else ""
-            message = f"found as columns {', '.join(map(str, numbers[:MAX_TWINS]))}{more}, allowed: once"
+            numbers = [duplicate.number for duplicate in group]
+            more = f" and {len(numbers) - MAX_DUPLICATES} more" if len(numbers) > MAX_DUPLICATES else ""
+            message = f"found as columns {', '.join(map(str, numbers[:MAX_DUPLICATES]))}{more}, allowed: once"
             table = tables[column.table]
             place = (table.file, table.header_line, None, column.header)
             findings.append(Finding(message, *place, hints=() if findings and len(hints) > 1 else hints))

@@ -242,8 +242,8 @@ def find_times(reading: Reading) -> Times:
         table, like = plan.tables.layouts[plan.main], None
         if options.time is None and table.header:
             columns = columns_of(plan.tables.layouts, plan.tables.titles)
-            beside = [column for column in columns if column.table == plan.main]
-            like = suggest_time_column(beside, table, rows.roles.columns)
+            of_table = [column for column in columns if column.table == plan.main]
+            like = suggest_time_column(of_table, table, rows.roles.columns)
         t_ns, inferences, warnings = even_clock(rows.count, options.period, like=like.called if like else "")
         return Times(t_ns, 0, inferences, warnings)
     start = int(rows.clock[0])

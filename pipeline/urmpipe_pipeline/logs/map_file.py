@@ -213,8 +213,8 @@ def _names(log: JointLog, columns: Sequence[LogColumn]) -> tuple[str, ...]:
 
 def _name(log: JointLog, column: LogColumn) -> str:
     """Return what distinguishes a column: its header, or its number where several share that."""
-    twins = [other for other in log.columns if other.header == column.header]
-    return column.header if column.header and len(twins) == 1 else str(column.number)
+    duplicates = [other for other in log.columns if other.header == column.header]
+    return column.header if column.header and len(duplicates) == 1 else str(column.number)
 
 
 def format_map(log_map: LogMap) -> str:

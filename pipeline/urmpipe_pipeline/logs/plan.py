@@ -31,13 +31,13 @@ from urmpipe_pipeline.logs.clock import (
 )
 from urmpipe_pipeline.logs.columns import (
     Column,
+    check_unique_names,
     columns_named,
     columns_of,
     columns_of_side,
     columns_of_topic,
     given_units,
     listed,
-    refuse_twins,
     without_other_side,
 )
 from urmpipe_pipeline.logs.formats.cells import is_missing
@@ -48,9 +48,9 @@ from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.roles import (
     Roles,
     assign,
+    check_not_long_form,
     joint_inference,
     own_joints,
-    refuse_long_form,
     signal_roles,
     written_roles,
 )
@@ -141,7 +141,7 @@ def make_plan(
         hint = Hint("time", None, "selects one: give its number")
         for index, clock in enumerate(clocks):
             of_table = [column for column in side if column.table == index]
-            refuse_twins(clock.columns, of_table, layouts, hint)
+            check_unique_names(clock.columns, of_table, layouts, hint)
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in in_topic if column not in times and column.table != time_file]
     rest = columns_of_side(rest, options, file)
@@ -154,7 +154,7 @@ def make_plan(
         clocks = tuple(settle_unit_by_speed(clock, tables, roles.joints, units) for clock in clocks)
     for index in {column.table for column in roles.joints}:
         of_table = [column for column in rest if column.table == index]
-        refuse_long_form(roles.joints, of_table, clocks[index].columns, layouts[index])
+        check_not_long_form(roles.joints, of_table, clocks[index].columns, layouts[index])
     warnings = [
         LogWarning(f"{name}-not-used", "no effect: not in this log", parameter=name)
         for name in ("topic", "episode")
@@ -237,9 +237,11 @@ def _roles_by_names(
     joints = () if is_path else written or ()
     roles = assign(columns, layouts, options, robot, path=is_path, written=joints)
     if not options.joints:
-        refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "selects them: give their numbers"))
+        check_unique_names(
+            roles.joints, columns, layouts, Hint("joints", None, "selects them: give their numbers")
+        )
     pose, hint = (*roles.position, *roles.rotation), Hint("", effect="rename or remove the others")
-    refuse_twins(pose, columns, layouts, hint)
+    check_unique_names(pose, columns, layouts, hint)
     return roles
 
 

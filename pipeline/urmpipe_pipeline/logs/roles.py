@@ -5,7 +5,7 @@
 2. Without joints, x, y, z are a path; else a question whose choices are the columns that may be joints.
 3. `written_roles`: the columns of what urmpipe writes itself, by their metadata or all names together.
 4. `signal_roles`: the signals of a simulation: its only array of joints, else a question.
-5. `refuse_long_form`: a table with a row per joint, with the command that makes it a row per sample.
+5. `check_not_long_form`: a table with a row per joint, with the command that makes it a row per sample.
 """
 
 from __future__ import annotations
@@ -342,7 +342,7 @@ def _path(
         roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
         roles = _with_warnings(roles, inferences, numeric, tables, robot, (), pose.alternatives)
         return replace(roles, warnings=(*roles.warnings, *beside_path_warnings(rest)))
-    _refuse_thousands(tables)
+    _check_thousands(tables)
     if path:
         hints = (Hint("", effect="name them so in the header"), Hint("position", None, "names them"))
         message = f"found no position in {listed(columns)}, allowed: x, y, z"
@@ -404,7 +404,7 @@ def _may_be(
     return [group for group in groups if len(group) in counts]
 
 
-def _refuse_thousands(tables: Sequence[LogTable]) -> None:
+def _check_thousands(tables: Sequence[LogTable]) -> None:
     """Raise a `LogError` where numbers have signs between their thousands: their columns count as text."""
     for table in tables:
         for row in table.sample:
@@ -425,7 +425,7 @@ def _with_warnings(
     robot: Chain | None,
     *alternatives: Sequence[tuple[Column, ...]],
 ) -> Roles:
-    """Return the roles with the inferences, and what is to be said of the columns that are not used.
+    """Return the roles with the inferences, and the warnings about the columns that are not used.
 
     Args:
         roles: The roles.
@@ -464,8 +464,8 @@ def _with_warnings(
 def own_joints(columns: Sequence[Column]) -> tuple[Column, ...]:
     """Return the joints of a joint log of inverse kinematics, a plan or a network: columns with their units.
 
-    Behind the joints of a plan or a traced point stands its tool: x, y, z, or tcp_x, ... What stands behind
-    the rows of targets or path was added by somebody else.
+    After the joints of a plan or a traced point comes its tool: x, y, z, or tcp_x, ... What comes after the
+    rows of targets or path is of another program.
     """
     rows = [column for column in columns if column.header in (TARGET_ROW, PATH_ROW, MOTION_ROW)]
     before = columns[: columns.index(rows[0])] if rows else columns
@@ -573,14 +573,14 @@ def signal_roles(columns: Sequence[Column], table: LogTable, robot: Chain | None
     )
     rest = [column for column in columns if column not in (*joints, *rates, *accelerations)]
     inferences = [joint_inference(joints, "the only array of joints among the signals")]
-    inferences += not_used(rest, "signals beside the joints")
+    inferences += not_used(rest, "signals next to the joints")
     return Roles(joints, rates, accelerations, inferences=tuple(inferences))
 
 
 # 5. Long form
 
 
-def refuse_long_form(
+def check_not_long_form(
     joints: Sequence[Column], columns: Sequence[Column], clock: Sequence[Column], table: LogTable
 ) -> None:
     """Raise if a table has a row per joint: a column beside its only joint repeats the same names in order.

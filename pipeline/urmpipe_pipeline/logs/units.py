@@ -495,7 +495,7 @@ class UnitFinder:
             if may_slide and len(columns) == MAX_SLIDES:
                 hints += unit_hints(columns, "mm", "is for joints that slide")
             if may_slide and len(columns) in PATH_WIDTHS:
-                hints.append(Hint("source", "path", "reads x, y, z, and an orientation behind them"))
+                hints.append(Hint("source", "path", "reads x, y, z, and an orientation after them"))
             hints.append(NAME_JOINTS)
         return Finding(message, self.sources.file, hints=tuple(hints))
 
