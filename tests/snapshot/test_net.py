@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 HERE = Path(__file__).parent
-CASES = ("models", "mistakes")
+CASES = ("models", "robot.*", "network.*", "fmu.*", "mistakes")
 
 
 @pytest.mark.slow
-def test_functions_and_refusals_give_what_they_gave(tmp_path: Path) -> None:
+def test_functions_robots_networks_and_refusals_give_what_they_gave(tmp_path: Path) -> None:
     run = [
         sys.executable,
         str(HERE / "snapshot.py"),
