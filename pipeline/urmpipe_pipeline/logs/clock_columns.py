@@ -275,12 +275,13 @@ def _find_dates_in_digits(columns: Sequence[Column], table: LogTable) -> TimeCol
 def has_form(column: Column, form: ClockForm, table: LogTable) -> bool:
     """Return whether all sampled cells of a column, and one at least, are times of a form."""
     if form in DIGITS and not column.text:
-        cells = [expand_exponent(cell) for cell in table.number_texts(column.index)]
+        cells = (expand_exponent(cell) for cell in table.number_texts(column.index))
     else:
-        cells = [cell for cell in table.cells(column.index) if not is_missing(cell)]
-    if not cells or not form.match(cells[0]):
+        cells = (cell for cell in table.cells(column.index) if not is_missing(cell))
+    first = next(cells, "")
+    if not first or not form.match(first):  # the usual case: the others need no look
         return False
-    return bool((read_cells(TextCells.of(cells), form) > UNREADABLE).all())
+    return bool((read_cells(TextCells.of([first, *cells]), form) > UNREADABLE).all())
 
 
 def _has_hours(column: Column, table: LogTable) -> bool:

@@ -297,16 +297,18 @@ def check_line_lengths(segment: Segment) -> None:
     """
     if segment.end <= MAX_LINE_BYTES:
         return
-    sign, length, lines = segment.newline.encode(), 0, 1
+    sign, length, read = segment.newline.encode(), 0, 0
     with segment.open() as file:
         while block := file.read(MAX_LINE_BYTES // 8):
             first = block.find(sign)
             if length + (len(block) if first < 0 else first) > MAX_LINE_BYTES:
                 found, allowed = f"a line of more than {MAX_LINE_BYTES >> 20} MiB", "shorter lines"
-                hints, file_name = (_ROW_PER_SAMPLE,), str(segment.path)
-                raise LogError(Finding(file=file_name, line=lines, found=found, allowed=allowed, hints=hints))
+                with segment.open() as before:
+                    line = 1 + before.read(read - length).count(sign)
+                hints, name = (_ROW_PER_SAMPLE,), str(segment.path)
+                raise LogError(Finding(file=name, line=line, found=found, allowed=allowed, hints=hints))
             length = length + len(block) if first < 0 else len(block) - 1 - block.rfind(sign)
-            lines += block.count(sign)
+            read += len(block)
 
 
 def fingerprint(path: Path) -> SourceFile:
