@@ -122,7 +122,7 @@ class Column:
 
     @property
     def marked(self) -> MarkedName:
-        """Its key, and what it says of its values: measured or commanded."""
+        """Its name for comparison, and whether its words are those of measured or of commanded values."""
         label = self.name if key(self.name) == self.key else split_unit(self.header)[0]
         return mark_name(self.matched or label)
 

@@ -36,7 +36,7 @@ from urmpipe_pipeline.logs.columns import Column, columns_of
 from urmpipe_pipeline.logs.formats.cells import significant_digits
 from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS
 from urmpipe_pipeline.logs.formats.opening import PATH, TABLE
-from urmpipe_pipeline.logs.log_map import Evidence, LogMap
+from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.proofs import Recorded, prove_by_kinematics
 from urmpipe_pipeline.logs.rates import SURE_VARIED, period_of
@@ -124,7 +124,7 @@ class Proposal(NamedTuple):
         form: The form of the orientation; None without one.
         inferences: The units.
         warnings: Units that are assumed or contradicted, rows that are no orientation.
-        evidence: The evidence of the unit of a column, by its number.
+        doubts: Why the unit of a column is only assumed, by its number.
         uses_source: Whether the source stated a unit.
     """
 
@@ -132,7 +132,7 @@ class Proposal(NamedTuple):
     form: RotationForm | None
     inferences: Sequence[Inference]
     warnings: Sequence[LogWarning]
-    evidence: Mapping[int, Evidence]
+    doubts: Mapping[int, str]
     uses_source: bool
 
 
@@ -195,7 +195,7 @@ def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Prop
         form=turned.form,
         inferences=(*finder.inferences, *planar, *turned.inferences),
         warnings=(*finder.warnings, *turned.warnings),
-        evidence=finder.evidence | {column.number: turned.evidence for column in turned.columns},
+        doubts=finder.doubts | dict.fromkeys((column.number for column in turned.columns), turned.doubt),
         uses_source=finder.uses_source,
     )
 
@@ -355,7 +355,6 @@ def _log_columns(reading: Reading, proposal: Proposal) -> Iterator[LogColumn]:
         for i, (column, unit) in enumerate(zip(group.columns, group.units, strict=True)):
             sign = signs[i] if role in ("joint", "rate", "acceleration") else 1
             offset = offsets[i] if role == "joint" else 0.0
-            known = proposal.evidence.get(column.number)
             yield LogColumn(
                 name=column.name,
                 header=_header(reading.plan, column),
@@ -366,7 +365,7 @@ def _log_columns(reading: Reading, proposal: Proposal) -> Iterator[LogColumn]:
                 sign=sign,
                 offset=offset,
                 number=column.number,
-                uncertainty=known.why if known and known.basis == "assumed" else "",
+                uncertainty=proposal.doubts.get(column.number, ""),
             )
 
 

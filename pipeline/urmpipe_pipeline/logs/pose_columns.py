@@ -361,5 +361,5 @@ def _are_orthogonal(r: FloatArray) -> BoolArray:
 
 
 def _is_enough(holds: BoolArray, *, some: bool) -> bool:
-    """Return whether a law holds in all rows, of which there is one, or in some: the others are wrong."""
+    """Return whether a law holds in all rows, one at least; with `some`, in any: the others have errors."""
     return bool(holds.any()) if some else len(holds) > 0 and bool(holds.all())

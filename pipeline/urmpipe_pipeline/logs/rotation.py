@@ -34,7 +34,6 @@ from urmpipe_models.math3d import (
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.columns import OTHER_UNIT, Column, unit_hints
-from urmpipe_pipeline.logs.log_map import Evidence
 from urmpipe_pipeline.logs.proofs import (
     MARGIN,
     ONE_TURN,
@@ -135,7 +134,7 @@ class SettledRotation(NamedTuple):
         values: In [rad] or [-], shape (n, columns); NaN in rows without an orientation.
         inferences: Form and unit with their evidence.
         warnings: What is assumed or contradicted, and rows that are not used.
-        evidence: Of the unit.
+        doubt: Why the unit is only assumed; empty if it is known.
     """
 
     form: RotationForm | None = None
@@ -144,7 +143,7 @@ class SettledRotation(NamedTuple):
     values: FloatArray = np.empty((0, 0))
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
-    evidence: Evidence = Evidence("named", "their names")
+    doubt: str = ""
 
 
 class _Decision(NamedTuple):
@@ -212,12 +211,17 @@ def settle_rotation(
         hints = tuple(Hint("rotation", form, "specifies it") for form in sound)
         return SettledRotation(warnings=(*warnings, LogWarning(ORIENTATION, message, hints=hints)))
     choice, why, objections, basis = decision or _decide_by_values(columns, choices, values, stated)
-    assumed = [warning.message for warning in objections if warning.assumption and basis != "given"]
-    evidence = Evidence("assumed", assumed[0]) if assumed else Evidence(basis, why)
+    assumed = (warning.message for warning in objections if warning.assumption and basis != "given")
     inference = form_inference([column.name for column in columns], choice.form, choice.units[0], why, basis)
     ordered, warnings = tuple(columns[k] for k in choice.order), [*warnings, *objections]
     return SettledRotation(
-        choice.form, ordered, choice.units, choice.in_si(values), (inference,), tuple(warnings), evidence
+        choice.form,
+        ordered,
+        choice.units,
+        choice.in_si(values),
+        (inference,),
+        tuple(warnings),
+        next(assumed, ""),
     )
 
 

@@ -410,7 +410,7 @@ def _to_poses(
     form: RotationForm | None,
     further: Mapping[str, ExtraColumn],
 ) -> PoseTable:
-    """Return the rows in SI, the pose of a row with a fault as NaN, and what was found out about units."""
+    """Return the rows in SI, NaN for the pose of a row with an error, and the inferences about units."""
     finder = UnitFinder(UnitSources(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
     columns = plan.roles.rotation
     position, turns, extra_values = np.split(values.copy(), [3, 3 + len(columns)], axis=1)

@@ -11,8 +11,8 @@
 5. Else rad is assumed up to two turns, deg if joints would be too fast in rad, m, and mm from `MAX_METRES`
    for a joint that slides or a position together with joints. Larger joint values are asked about.
 
-Each unit has an `Evidence`: given, named, proved or assumed, and why. What the user gives is used; values
-or kinematics that contradict it are a warning with the assumption.
+The inference of a unit states its basis (given, named, proved or assumed) and why. What the user gives is
+used; values or kinematics that contradict it are a warning with the assumption.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ from urmpipe_pipeline.logs.columns import (
     unit_inference,
     which_unit,
 )
-from urmpipe_pipeline.logs.log_map import Evidence
 from urmpipe_pipeline.logs.proofs import (
     MAX_DEGREES,
     ONE_TURN,
@@ -270,14 +269,14 @@ class UnitFinder:
         sources: What states units.
         kinematic: The units that the kinematics prove, if they do.
         warnings: Units that are assumed or uncertain, and contradictions.
-        evidence: The evidence of the unit of a column, by its number.
+        doubts: Why the unit of a column is only assumed, by its number.
         uses_source: Whether the source stated a unit.
     """
 
     sources: UnitSources
     kinematic: KinematicUnits | None = None
     warnings: list[LogWarning] = field(default_factory=list)
-    evidence: dict[int, Evidence] = field(default_factory=dict)
+    doubts: dict[int, str] = field(default_factory=dict)
     uses_source: bool = False
     _notes: dict[tuple[str, str, Basis, bool], list[Column]] = field(default_factory=dict)
 
@@ -531,13 +530,12 @@ class UnitFinder:
     ) -> None:
         """Keep the evidence of a unit, and whether a unit for every angle would reach its columns."""
         self._notes.setdefault((unit.name, why, basis, every), []).extend(columns)
-        self.evidence |= {column.number: Evidence(basis, why) for column in columns}
 
     def _warn(self, columns: Sequence[Column], warning: LogWarning, *, by_user: bool = False) -> None:
         """Keep a warning: unless the user gave the unit, it is only assumed."""
         self.warnings.append(warning)
         if not by_user:
-            self.evidence |= {column.number: Evidence("assumed", warning.message) for column in columns}
+            self.doubts |= {column.number: warning.message for column in columns}
 
     def _assume(
         self,

@@ -304,7 +304,7 @@ def _joints_among(
     groups = [[free[k] for k in block.joints] for block in blocks] + _groups(free, odd, count)
     doubtful = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
     message = f"{len(free)} columns that no header names"
-    message += f", of which {listed(doubtful)} may be no joints" if doubtful else ""
+    message += f", of which {listed(doubtful)} may not be joints" if doubtful else ""
     message += f", and robot {robot.name} has {count} joints" if robot else ""
     as_path = (Hint("source", "path", "reads them as x, y, z"),) if len(free) == 3 else ()
     raise which_joints(table.file, message, groups, UNKNOWN, *as_path)

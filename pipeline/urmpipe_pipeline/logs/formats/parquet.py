@@ -134,7 +134,7 @@ def _index_first(table: pa.Table) -> pa.Table:
 
 
 def read_parquet(path: Path, head: bytes, options: LogMap) -> MemoryTable:
-    """Return the table of a Parquet file, of which the first bytes are given.
+    """Return the table of a Parquet file that begins with some bytes.
 
     Of a file of episodes (LeRobot), only the rows of a given episode are read, and no images.
 
