@@ -124,7 +124,7 @@ class Proposal(NamedTuple):
         form: The form of the orientation; None without one.
         inferences: The units.
         warnings: Units that are assumed or contradicted, rows that are no orientation.
-        doubts: Why the unit of a column is only assumed, by its number.
+        uncertainties: Why the unit of a column is only assumed, by its number.
         uses_source: Whether the source stated a unit.
     """
 
@@ -132,7 +132,7 @@ class Proposal(NamedTuple):
     form: RotationForm | None
     inferences: Sequence[Inference]
     warnings: Sequence[LogWarning]
-    doubts: Mapping[int, str]
+    uncertainties: Mapping[int, str]
     uses_source: bool
 
 
@@ -184,6 +184,7 @@ def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Prop
     )
     if turned.form:
         finder.warn_not_reached(roles.rotation, stated, turned.units, "rotation")
+    rotated = [column.number for column in turned.columns]
     return Proposal(
         groups=(
             Group(roles.joints, q, units),
@@ -195,7 +196,8 @@ def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Prop
         form=turned.form,
         inferences=(*finder.inferences, *planar, *turned.inferences),
         warnings=(*finder.warnings, *turned.warnings),
-        doubts=finder.doubts | dict.fromkeys((column.number for column in turned.columns), turned.doubt),
+        uncertainties=finder.uncertainties
+        | dict.fromkeys((column.number for column in turned.columns), turned.uncertainty),
         uses_source=finder.uses_source,
     )
 
@@ -365,7 +367,7 @@ def _log_columns(reading: Reading, proposal: Proposal) -> Iterator[LogColumn]:
                 sign=sign,
                 offset=offset,
                 number=column.number,
-                uncertainty=proposal.doubts.get(column.number, ""),
+                uncertainty=proposal.uncertainties.get(column.number, ""),
             )
 
 

@@ -134,7 +134,7 @@ class SettledRotation(NamedTuple):
         values: In [rad] or [-], shape (n, columns); NaN in rows without an orientation.
         inferences: Form and unit with their evidence.
         warnings: What is assumed or contradicted, and rows that are not used.
-        doubt: Why the unit is only assumed; empty if it is known.
+        uncertainty: Why the unit is only assumed; empty if it is known.
     """
 
     form: RotationForm | None = None
@@ -143,7 +143,7 @@ class SettledRotation(NamedTuple):
     values: FloatArray = np.empty((0, 0))
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
-    doubt: str = ""
+    uncertainty: str = ""
 
 
 class _Decision(NamedTuple):

@@ -269,14 +269,14 @@ class UnitFinder:
         sources: What states units.
         kinematic: The units that the kinematics prove, if they do.
         warnings: Units that are assumed or uncertain, and contradictions.
-        doubts: Why the unit of a column is only assumed, by its number.
+        uncertainties: Why the unit of a column is only assumed, by its number.
         uses_source: Whether the source stated a unit.
     """
 
     sources: UnitSources
     kinematic: KinematicUnits | None = None
     warnings: list[LogWarning] = field(default_factory=list)
-    doubts: dict[int, str] = field(default_factory=dict)
+    uncertainties: dict[int, str] = field(default_factory=dict)
     uses_source: bool = False
     _notes: dict[tuple[str, str, Basis, bool], list[Column]] = field(default_factory=dict)
 
@@ -535,7 +535,7 @@ class UnitFinder:
         """Keep a warning: unless the user gave the unit, it is only assumed."""
         self.warnings.append(warning)
         if not by_user:
-            self.doubts |= {column.number: warning.message for column in columns}
+            self.uncertainties |= {column.number: warning.message for column in columns}
 
     def _assume(
         self,
