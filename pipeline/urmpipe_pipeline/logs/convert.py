@@ -196,8 +196,7 @@ def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Prop
         form=turned.form,
         inferences=(*finder.inferences, *planar, *turned.inferences),
         warnings=(*finder.warnings, *turned.warnings),
-        uncertainties=finder.uncertainties
-        | dict.fromkeys((column.number for column in turned.columns), turned.uncertainty),
+        uncertainties=finder.uncertainties | dict.fromkeys(rotated, turned.uncertainty),
         uses_source=finder.uses_source,
     )
 
