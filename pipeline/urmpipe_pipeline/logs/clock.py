@@ -149,7 +149,7 @@ def find_clocks(
         OptionError: If the unit given for it is not a unit of time.
     """
     clocks = []
-    for k, table in enumerate(tables.layouts):
+    for k, table in enumerate(tables.tables):
         in_table = [column for column in columns if column.table == k]
         time = find_time_columns(in_table, table, options, joints)
         clock = make_clock(time, table, tables.known, units, is_label=bool(options.poses))
@@ -398,7 +398,7 @@ def settle_unit_by_speed(
     if len(clock.parts) != 1 or clock.parts[0].forms or clock.is_stated or clock.by_source:
         return clock
     (time,) = clock.columns
-    table = tables.layouts[time.table]
+    table = tables.tables[time.table]
     start, step = _start_and_step(time, table, are_durations=clock.are_durations)
     if not S_OR_MS[0] <= step <= S_OR_MS[1] or _unit_since_1970(start, step):
         return clock
@@ -430,8 +430,8 @@ def _speed_in_s(
     None if no joint moves.
     """
     main = [joint for joint in joints if joint.table == joints[0].table]
-    times = tables.layouts[clock.columns[0].table].values([clock.columns[0].index])[:, 0]
-    q = tables.layouts[main[0].table].values([joint.index for joint in main]) if main else times[:0]
+    times = tables.tables[clock.columns[0].table].values([clock.columns[0].index])[:, 0]
+    q = tables.tables[main[0].table].values([joint.index for joint in main]) if main else times[:0]
     if len(q) != len(times) or len(q) < 2:
         return None
     q, turns = joints_in_si(q, main, units, tables.known)
@@ -531,18 +531,18 @@ def append_time_file(tables: Tables, options: LogMap) -> tuple[Tables, int | Non
     file_column = split_file_column(options.time)
     if file_column is None:
         return tables, None
-    if len(tables.layouts) > 1:
-        found = f"{format_value(options.time or '')} for {len(tables.layouts)} tables"
+    if len(tables.tables) > 1:
+        found = f"{format_value(options.time or '')} for {len(tables.tables)} tables"
         raise OptionError(Finding(parameter="time", found=found, allowed="FILE:COLUMN for one table"))
     try:
         times = open_tables([file_column[0]], LogMap(delimiter=options.delimiter, decimal=options.decimal))
     except LogError:
         times = open_tables([file_column[0]], LogMap())  # it may be written in another way than the log
-    table, rows = across(times.layouts[0]), tables.layouts[0].rows
+    table, rows = across(times.tables[0]), tables.tables[0].rows
     if rows is not None and rows[-1] < table.count_rows():
         table = table.take(rows)
-    layouts, titles = (*tables.layouts, table), (*tables.titles, times.titles[0])
-    return replace(tables, layouts=layouts, titles=titles), 1
+    titles = (*tables.titles, times.titles[0])
+    return replace(tables, tables=(*tables.tables, table), titles=titles), 1
 
 
 def find_time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
@@ -551,15 +551,15 @@ def find_time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
     It is a single column or row that is named like a time, or whose file is; or the only one of the two,
     without a header, that runs in even steps.
     """
-    if len(tables.layouts) != 2 or len(set(tables.paths)) != 2:
+    if len(tables.tables) != 2 or len(set(tables.paths)) != 2:
         return None
     in_tables = [[column for column in columns if column.table == k] for k in (0, 1)]
     single = [k for k in (0, 1) if len(in_tables[k]) == 1]
     named = [k for k in single if is_named_time(in_tables[k][0].key) or is_named_time(key(tables.titles[k]))]
     if len(named) == 1:
         return named[0]
-    layouts = tables.layouts
-    even = [k for k in single if layouts[k].header is None and runs_evenly(layouts[k].numbers(0))]
+    unnamed = [(k, tables.tables[k]) for k in single if tables.tables[k].header is None]
+    even = [k for k, table in unnamed if runs_evenly(table.numbers(0))]
     return even[0] if len(single) == len(even) == 1 else None
 
 
@@ -575,7 +575,7 @@ def find_clocks_with_file(
     """
     in_file = tuple(column for column in columns if column.table == index)
     in_log = [column for column in columns if column.table != index]
-    table, log_layout = tables.layouts[index], tables.layouts[1 - index]
+    table, log_table = tables.tables[index], tables.tables[1 - index]
     unused, file_column = Clock(), split_file_column(options.time)
     if file_column is None:
         title, source = table.path.name, tables.known
@@ -584,9 +584,9 @@ def find_clocks_with_file(
                 hints = (Hint("time", None, "selects the column"), Hint("time", "none", "leaves both out"))
                 message, place = (
                     f"found a time here and in {title}, allowed: one clock",
-                    log_layout.header_line,
+                    log_table.header_line,
                 )
-                raise LogError(Finding(message, log_layout.file, place, column=column.header, hints=hints))
+                raise LogError(Finding(message, log_table.file, place, column=column.header, hints=hints))
         form = "one row" if table.across else "one column"
         time, value = TimeColumns(in_file, f"{title} holds nothing but {form} of times"), ""
     else:
@@ -596,7 +596,7 @@ def find_clocks_with_file(
         value = f"{file_column[0].name}:{file_column[1]}"
         try:
             without = replace(options, time=None)
-            unused = Clock(find_time_columns(in_log, log_layout, without, None).columns)
+            unused = Clock(find_time_columns(in_log, log_table, without, None).columns)
         except LogError:  # it may have a time or not: the given one is used
             pass
     clock = make_clock(time, table, source, units, is_label=bool(options.poses))

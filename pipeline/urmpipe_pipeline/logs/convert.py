@@ -97,7 +97,7 @@ class Reading:
     def unit_sources(self) -> UnitSources:
         """What states the units of the columns."""
         tables = self.plan.tables
-        file = tables.layouts[self.plan.main].file
+        file = self.plan.table.file
         return UnitSources(self.plan.units, tables.known, file, self.options.source is not None)
 
 
@@ -240,9 +240,9 @@ def find_times(reading: Reading) -> Times:
     if rows.clock is None:
         if options.period is None and (by_rates := _find_times_by_rates(rows)):
             return by_rates
-        table, like = plan.tables.layouts[plan.main], None
+        table, like = plan.table, None
         if options.time is None and table.header:
-            columns = columns_of(plan.tables.layouts, plan.tables.titles)
+            columns = columns_of(plan.tables.tables, plan.tables.titles)
             of_table = [column for column in columns if column.table == plan.main]
             like = suggest_time_column(of_table, table, rows.roles.columns)
         t_ns, inferences, warnings = even_clock(rows.count, options.period, like=like.called if like else "")
@@ -280,12 +280,12 @@ def _find_times_by_rates(rows: Rows) -> Times | None:
 def convert(reading: Reading, times: Times, proposal: Proposal) -> JointLog:
     """Return the log of rows whose times and units are known."""
     plan, rows = reading.plan, reading.rows
-    roles, tables, table = rows.roles, plan.tables, plan.tables.layouts[plan.main]
+    roles, tables, table = rows.roles, plan.tables, plan.table
     numbers, clock = rows.numbers[plan.main], plan.clock.as_label if rows.are_poses else plan.clock
     joints, rates, accelerations, position, rotation = proposal.groups
-    in_text = (column for column in roles.joints if tables.layouts[column.table].arrow is None)
+    in_text = (column for column in roles.joints if tables.tables[column.table].arrow is None)
     digits = significant_digits(
-        chain(*(tables.layouts[column.table].number_texts(column.index) for column in in_text))
+        chain(*(tables.tables[column.table].number_texts(column.index) for column in in_text))
     )
     coarse = "every joint value is written with as many"
     groups = [group for group in proposal.groups if group.columns]
@@ -372,7 +372,7 @@ def _log_columns(reading: Reading, proposal: Proposal) -> Iterator[LogColumn]:
 
 def _header(plan: Plan, column: Column) -> str:
     """Return the name of a column as its file has it; empty if the file does not name it."""
-    table = plan.tables.layouts[column.table]
+    table = plan.tables.tables[column.table]
     is_named = table.header is not None and ("header", "none") not in {
         (inference.what, inference.value) for inference in table.inferences
     }

@@ -95,6 +95,11 @@ class Plan:
         return self.roles.columns[0].table
 
     @property
+    def table(self) -> LogTable:
+        """The table with the first joint; of a path, with x."""
+        return self.tables.tables[self.main]
+
+    @property
     def used(self) -> list[int]:
         """Indices of the tables that hold a column that is used, the main one first."""
         return list(dict.fromkeys(column.table for column in self.roles.columns))
@@ -120,12 +125,12 @@ def make_plan(
         OptionError: If an option's value makes no sense.
     """
     tables, time_file = append_time_file(tables, options)
-    layouts, file = tables.layouts, tables.layouts[0].file
-    columns = columns_of(layouts, tables.titles)
+    file = tables.tables[0].file
+    columns = columns_of(tables.tables, tables.titles)
     units = given_units(columns, options)
-    extra = columns_named(columns, layouts, further or {})
+    extra = columns_named(columns, tables.tables, further or {})
     columns = tuple(column for column in columns if column not in extra.values())
-    in_topic, applied = columns, {name for table in layouts for name in table.applied}
+    in_topic, applied = columns, {name for table in tables.tables for name in table.applied}
     if options.topic is not None and "topic" not in applied:
         topic = tuple(columns_of_topic(columns, options, file))
         in_topic, applied = topic or columns, applied | ({"topic"} if topic else set())
@@ -141,20 +146,20 @@ def make_plan(
         hint = Hint("time", None, "selects one: give its number")
         for index, clock in enumerate(clocks):
             of_table = [column for column in side if column.table == index]
-            check_unique_names(clock.columns, of_table, layouts, hint)
+            check_unique_names(clock.columns, of_table, tables.tables, hint)
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in in_topic if column not in times and column.table != time_file]
     rest = columns_of_side(rest, options, file)
     roles = _rename_joints(_find_roles(rest, tables, options, robot, time_file), options)
     if len(roles.joints) > MAX_JOINTS:
         message = f"found {len(roles.joints)} joints, allowed: {MAX_JOINTS} at most"
-        file = layouts[roles.joints[0].table].file
+        file = tables.tables[roles.joints[0].table].file
         raise LogError(Finding(message, file, hints=(Hint("joints"),)))
     if not options.poses:
         clocks = tuple(settle_unit_by_speed(clock, tables, roles.joints, units) for clock in clocks)
     for index in {column.table for column in roles.joints}:
         of_table = [column for column in rest if column.table == index]
-        check_not_long_form(roles.joints, of_table, clocks[index].columns, layouts[index])
+        check_not_long_form(roles.joints, of_table, clocks[index].columns, tables.tables[index])
     warnings = [
         LogWarning(f"{name}-not-used", "no effect: not in this log", parameter=name)
         for name in ("topic", "episode")
@@ -199,16 +204,16 @@ def _find_roles(
     robot: Chain | None,
     time_file: int | None,
 ) -> Roles:
-    main = tables.layouts[0 if time_file is None else 1 - time_file]
+    main = tables.tables[0 if time_file is None else 1 - time_file]
     are_several = time_file is None and len(set(tables.paths)) > 1
     columns_given = options.joints or options.position or options.measured
     if not (columns_given or options.source or options.side or options.pair):
-        stated = written_roles(columns, main, robot) if len(tables.layouts) == 1 else None
+        stated = written_roles(columns, main, robot) if len(tables.tables) == 1 else None
         stated = stated or signal_roles(columns, main, robot)
         if stated is not None:
             return stated
     if main.header is None and not are_several:
-        return without_header(columns, tables.layouts, options, robot, path=options.source == PATH)
+        return without_header(columns, tables.tables, options, robot, path=options.source == PATH)
     if are_several and not options.joints:
         plots = one_plot_a_file(columns, tables.paths, robot)
         if plots is not None:
@@ -233,15 +238,15 @@ def _roles_by_names(
     written: tuple[Column, ...] | None = None,
 ) -> Roles:
     """Return the roles by names, each name once; a log that urmpipe wrote without joints is a path."""
-    layouts, is_path = tables.layouts, options.source == PATH or written == ()
+    is_path = options.source == PATH or written == ()
     joints = () if is_path else written or ()
-    roles = assign(columns, layouts, options, robot, path=is_path, written=joints)
+    roles = assign(columns, tables.tables, options, robot, path=is_path, written=joints)
     if not options.joints:
         check_unique_names(
-            roles.joints, columns, layouts, Hint("joints", None, "selects them: give their numbers")
+            roles.joints, columns, tables.tables, Hint("joints", None, "selects them: give their numbers")
         )
     pose, hint = (*roles.position, *roles.rotation), Hint("", effect="rename or remove the others")
-    check_unique_names(pose, columns, layouts, hint)
+    check_unique_names(pose, columns, tables.tables, hint)
     return roles
 
 
@@ -258,7 +263,7 @@ def _check_one_log(
     If a number of joints is given, only logs with as many count.
     """
     logs = []
-    for index, (path, table) in enumerate(zip(tables.paths, tables.layouts, strict=True)):
+    for index, (path, table) in enumerate(zip(tables.paths, tables.tables, strict=True)):
         of_table = [column for column in columns if column.table == index]
         try:
             if table.header is None and joints is None:
@@ -279,7 +284,7 @@ def _check_one_log(
 def _plot_roles(plots: Sequence[Column], warnings: tuple[LogWarning, ...], tables: Tables) -> Roles:
     """Return the roles of one plot per file, named by their columns or, if these repeat, by their files."""
     names = [column.header for column in plots]
-    if len(set(names)) < len(names) or tables.layouts[0].header is None:
+    if len(set(names)) < len(names) or tables.tables[0].header is None:
         plots = [replace(column, name=tables.titles[column.table]) for column in plots]
     inference = joint_inference(plots, "one plot per file")
     return Roles(joints=tuple(plots), inferences=(inference,), warnings=warnings)
@@ -297,11 +302,11 @@ def plan_topic(tables: Tables, options: LogMap, robot: Chain | None) -> Plan:
     needed, main = plan.roles.joints or plan.roles.position, plan.main
     if any(column.table != main for column in needed):
         return plan
-    table, is_empty = tables.layouts[main], _find_empty_rows(plan, needed)
+    table, is_empty = tables.tables[main], _find_empty_rows(plan, needed)
     if not is_empty.any() or is_empty.all():
         return plan
     used = {column.number for column in (*needed, *plan.clocks[main].columns)}
-    columns = [column for column in columns_of(tables.layouts, tables.titles) if column.table == main]
+    columns = [column for column in columns_of(tables.tables, tables.titles) if column.table == main]
     columns = [column for column in columns if column.number not in used]
     is_filled = _find_filled_cells(table, columns, len(is_empty))
     of_others = _find_other_topics(needed, columns, is_filled[~is_empty], np.flatnonzero(~is_empty))
@@ -318,8 +323,8 @@ def plan_topic(tables: Tables, options: LogMap, robot: Chain | None) -> Plan:
     why = f"{format_count(int(is_other.sum()), 'row')} of other topics, with {with_values}, left out"
     rows = np.flatnonzero(~is_other)
     table = table.take(rows, Inference(ROWS_READ, f"{len(rows)} of {len(is_other)}", why))
-    layouts = (*tables.layouts[:main], table, *tables.layouts[main + 1 :])
-    plan = make_plan(replace(tables, layouts=layouts), options, robot)
+    in_topic = (*tables.tables[:main], table, *tables.tables[main + 1 :])
+    plan = make_plan(replace(tables, tables=in_topic), options, robot)
     empty = {column.number for column in without_values(~is_other)}
     return _drop_groups(plan, [column for column in plan.roles.columns if column.number in empty])
 
@@ -328,7 +333,7 @@ def _find_empty_rows(plan: Plan, needed: Sequence[Column]) -> BoolArray:
     """Return in which rows all cells of some columns are empty, shape (n,)."""
     columns = [column for column in plan.roles.columns if column.table == plan.main]
     clock = plan.clocks[plan.main].parts
-    numbers = plan.tables.layouts[plan.main].read([column.index for column in columns], clock)
+    numbers = plan.table.read([column.index for column in columns], clock)
     is_empty = np.isnan(numbers.values[:, columns.index(needed[0])])
     if is_empty.any():
         places = [columns.index(column) for column in needed]

@@ -100,16 +100,16 @@ def open_map(files: Sequence[Path | MemoryTable], options: LogMap, error: LogErr
         tables = open_tables(files, options)
     except LogError:
         return replace(options, questions=questions)
-    inferences = [*tables.inferences, *(each for table in tables.layouts for each in table.inferences)]
+    inferences = [*tables.inferences, *(each for table in tables.tables for each in table.inferences)]
     return replace(options, **file_entries(inferences), questions=questions)
 
 
 def _with_own_clock(tables: Tables, options: LogMap) -> LogMap:
     """Return the options with the clock of a file that urmpipe wrote under another name."""
-    times = [k for k, role in read_roles(tables.layouts[0]).items() if role == "time"]
-    if options.time is not None or len(tables.layouts) != 1 or len(times) != 1:
+    times = [k for k, role in read_roles(tables.tables[0]).items() if role == "time"]
+    if options.time is not None or len(tables.tables) != 1 or len(times) != 1:
         return options
-    name = key(split_unit(tables.layouts[0].names[times[0]])[0])
+    name = key(split_unit(tables.tables[0].names[times[0]])[0])
     return options if is_named_time(name) else replace(options, time=str(times[0] + 1))
 
 
@@ -120,9 +120,9 @@ def _without_foreign_columns(tables: Tables, options: LogMap) -> LogMap:
     """
     if not options.shared:
         return options
-    columns = columns_of(tables.layouts, tables.titles)
+    columns = columns_of(tables.tables, tables.titles)
     numeric = [column for column in columns if not column.text]
-    position = find_pose(numeric, tables.layouts).position if tables.layouts[0].header is not None else ()
+    position = find_pose(numeric, tables.tables).position if tables.tables[0].header is not None else ()
     positions = {str(column.number) for column in position}
 
     def is_foreign(texts: Sequence[str]) -> bool:
@@ -189,7 +189,7 @@ def read_series(file: Path, names: Sequence[str], options: LogMap | None = None)
     options = options or LogMap()
     with unchanged([file]):
         tables = open_tables([file], options)
-        columns = columns_of(tables.layouts, tables.titles)
+        columns = columns_of(tables.tables, tables.titles)
         selected = map_collecting_errors(lambda name: find_column(columns, name, file=str(file)), names)
         given = given_units(columns, options)
         clocks = find_clocks(tables, columns, options, given)

@@ -113,7 +113,7 @@ def read_rows(plan: Plan, *, skip_bad: bool = False) -> Rows:
 
 
 def _read_table(plan: Plan, index: int, columns: Sequence[Column], skip_bad: bool) -> Numbers:
-    table, clock = plan.tables.layouts[index], plan.clocks[index]
+    table, clock = plan.tables.tables[index], plan.clocks[index]
     numbers = table.read([column.index for column in columns], clock.parts)
     numbers, warnings, too_many = _skip_unread(table, numbers, skip_bad)
     numbers, inferences = _drop_empty_end(read_text_times(table, clock.parts, numbers))
@@ -180,7 +180,7 @@ def _with_times(plan: Plan, main: Numbers, times: Numbers) -> Numbers:
     """Return the numbers of the main table with the times of another file, one for each row."""
     assert plan.time_file is not None
     if len(times.values) != len(main.values):
-        file, title = plan.tables.layouts[plan.time_file].file, plan.tables.paths[plan.main].name
+        file, title = plan.tables.tables[plan.time_file].file, plan.tables.paths[plan.main].name
         message = f"found {len(times.values)} times, allowed: {len(main.values)}, as {title} has rows"
         raise LogError(Finding(message, file))
     warnings = (*main.warnings, *times.warnings)
@@ -207,7 +207,7 @@ def _join_tables(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tup
 
 def _find_difference(plan: Plan, numbers: Mapping[int, Numbers], index: int) -> Finding | None:
     """Return where the times of a table differ from those of the main one; None if they do not."""
-    main, other, table = numbers[plan.main], numbers[index], plan.tables.layouts[index]
+    main, other, table = numbers[plan.main], numbers[index], plan.tables.tables[index]
     title, one_log = plan.tables.titles[plan.main], "the tables of one log share their times"
     if (main.clock is None) != (other.clock is None):
         here, there = ("no time column", "with one") if other.clock is None else ("a time column", "without")

@@ -159,7 +159,7 @@ def read_pose_table(
         form, assumed = _rotation_form(plan, str(file), options.rotation, named=is_named)
         values, times, faults, about_clock = _read_rows(plan, further)
     table = _to_poses(plan, values, faults, form, further)
-    before = (plan.tables, plan.tables.layouts[plan.main], plan.clock, plan.roles, about_clock)
+    before = (plan.tables, plan.table, plan.clock, plan.roles, about_clock)
     passed_over = (warning for warning in plan.roles.warnings if warning.kind == PASSED_OVER)
     return replace(
         table,
@@ -171,7 +171,7 @@ def read_pose_table(
 
 def _unused_columns(plan: Plan) -> list[Column]:
     used = {*plan.clock.columns, *plan.roles.columns}
-    return [column for column in columns_of(plan.tables.layouts, plan.tables.titles) if column not in used]
+    return [column for column in columns_of(plan.tables.tables, plan.tables.titles) if column not in used]
 
 
 def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None:
@@ -183,12 +183,12 @@ def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None
         named: Whether options name the columns of the pose.
         timed: Whether options name the time.
     """
-    layout, used = plan.tables.layouts[plan.main], [*plan.clock.columns, *plan.roles.columns]
+    table, used = plan.table, [*plan.clock.columns, *plan.roles.columns]
     if len(plan.used) > 1:
         fault = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
-        raise LogError(Finding(f"{fault}, allowed: one table", layout.file))
-    cells = len(layout.names) - (not layout.names[-1])
-    if layout.header is None and cells > len(used) and not (plan.roles.rotation or named):
+        raise LogError(Finding(f"{fault}, allowed: one table", table.file))
+    cells = len(table.names) - (not table.names[-1])
+    if table.header is None and cells > len(used) and not (plan.roles.rotation or named):
         time = " beside the time" if plan.clock.columns else ""
         count = cells - len(plan.clock.columns)
         hints = [Hint("", effect=naming)]
@@ -196,7 +196,7 @@ def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None
         if not (timed or time) and count - 1 in {3, *(3 + column_count(form) for form in FORMS)}:
             hints.append(Hint("time", "1", "if the first is the time"))
         fault = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
-        raise LogError(Finding(fault, layout.file, hints=tuple(hints)))
+        raise LogError(Finding(fault, table.file, hints=tuple(hints)))
 
 
 # How a table is written
@@ -332,18 +332,18 @@ def _read_rows(
         LogError: If there is no row, if a fault remains without the wrong rows (the header again), or if the
             known times are no clock.
     """
-    layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
+    table, clock = plan.table, plan.clocks[plan.main]
     allowed = {column.index: ALLOWED for column in plan.roles.columns}
     allowed |= {column.index: further[name].allowed for name, column in plan.roles.further.items()}
-    read = layout.read([column.index for column in plan.roles.columns], clock.parts, allowed)
+    read = table.read([column.index for column in plan.roles.columns], clock.parts, allowed)
     if read.lasting:
         raise LogError(*read.lasting)
-    numbers = read_text_times(layout, clock.parts, read)
+    numbers = read_text_times(table, clock.parts, read)
     if len(numbers.values) and np.isnan(numbers.values[-1]).all():  # as spreadsheets end
-        filled = (row for row, cells in enumerate(layout.iter_cells(), start=1) if any(cells))
+        filled = (row for row, cells in enumerate(table.iter_cells(), start=1) if any(cells))
         numbers = numbers.at(slice(max((*filled, *(row + 1 for row in numbers.unread)), default=0)))
     if not len(numbers.values):
-        raise LogError(Finding("found no row with a number, allowed: at least one", layout.file))
+        raise LogError(Finding("found no row with a number, allowed: at least one", table.file))
     faults = _find_faults(numbers, plan.roles, further, clock)
     if numbers.clock is None:
         return numbers.values, None, faults, numbers
@@ -351,10 +351,10 @@ def _read_rows(
     if not len(known):
         fault = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
         hints = (Hint("time", "none", "leaves the column out"),)
-        raise LogError(Finding(fault, layout.file, column=clock.columns[0].header, hints=hints))
+        raise LogError(Finding(fault, table.file, column=clock.columns[0].header, hints=hints))
     timed = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=(), wrong=0).at(known)
     timed = separate_repeated(replace(timed, rows=known + 1))
-    if findings := find_row_errors(layout, timed, (), clock):
+    if findings := find_row_errors(table, timed, (), clock):
         raise LogError(*findings)
     assert timed.clock is not None
     return numbers.values, _fill_times(known, timed.clock, len(numbers.clock)), faults, timed

@@ -78,7 +78,7 @@ def read_path(file: Path, options: LogMap | None = None) -> GivenPath:
     if findings:
         raise LogError(*capped(findings, str(file)))
     warnings = (*table.warnings, *_not_used(table))
-    lines = table.plan.tables.layouts[table.plan.main].lines_of(range(1, len(rows) + 1))
+    lines = table.plan.table.lines_of(range(1, len(rows) + 1))
     return GivenPath(file.stem, rows, fingerprint(file), warnings, lines, str(file))
 
 
@@ -107,20 +107,22 @@ def _rows(table: PoseTable) -> PathRows:
 
 def _faults(table: PoseTable, of_curve: Iterable[Finding]) -> Iterator[Finding]:
     """Yield all that is wrong with a file, and with the curve of its rows, in the order of its lines."""
-    layout, columns = table.plan.tables.layouts[table.plan.main], table.plan.roles.further
+    log_table, columns = table.plan.table, table.plan.roles.further
     if MEANINGS.keys() <= columns.keys():
         both = listed([columns[name] for name in MEANINGS])
         allowed = ", or ".join(f"{name} where a row is {meaning}" for name, meaning in MEANINGS.items())
-        yield Finding(file=layout.file, line=layout.header, found=both, allowed=f"one of them: {allowed}")
+        yield Finding(
+            file=log_table.file, line=log_table.header, found=both, allowed=f"one of them: {allowed}"
+        )
     found = [
         Finding(fault.message, row=row, column=", ".join(fault.columns) or None)
         for row, faults in table.faults.items()
         for fault in faults
     ]
     found += [replace(one, column=columns[one.column].header if one.column else None) for one in of_curve]
-    lines = layout.lines_of([one.row for one in found if one.row])
+    lines = log_table.lines_of([one.row for one in found if one.row])
     for one in sorted(found, key=lambda one: one.row or 0):
-        yield replace(one, file=layout.file, line=lines.get(one.row or 0))
+        yield replace(one, file=log_table.file, line=lines.get(one.row or 0))
 
 
 def _not_used(table: PoseTable) -> Iterator[LogWarning]:
@@ -139,7 +141,7 @@ def _not_used(table: PoseTable) -> Iterator[LogWarning]:
 
 def _times(table: PoseTable) -> tuple[Column, ...]:
     """Return the columns that hold a time, if a header names them."""
-    layout, unused = table.plan.tables.layouts[table.plan.main], table.unused
-    if layout.header is None or not unused:
+    log_table, unused = table.plan.table, table.unused
+    if log_table.header is None or not unused:
         return ()
-    return find_time_columns(unused, layout, LogMap(), None)[0]
+    return find_time_columns(unused, log_table, LogMap(), None)[0]

@@ -3,7 +3,7 @@
 1. Each file is opened: typed columns, a program or JSON become a table in memory, all else is text.
 2. A text is refused if it holds a merge conflict; CoppeliaSim's export is several tables in one file.
 3. Each table is sniffed: JSON lines, labels in rows, arrays in cells, or plain cells.
-4. Its rows are chosen: a row per sample (`layout`), then the rows and the episode that options name.
+4. Its rows are chosen: a row per sample (`shape`), then the rows and the episode that options name.
 5. The source: given as an option, stated by a schema, or known by the names of columns.
 """
 
@@ -55,7 +55,7 @@ class Tables:
     Attributes:
         source: Name of the source.
         known: Its entry in the vocabulary, if it has one.
-        layouts: The tables.
+        tables: The tables.
         titles: Title of each table: the file's stem, or the graph's path.
         inferences: What was found out.
         foreign: Whether its source was given, and has special columns or graphs, which are missing.
@@ -64,7 +64,7 @@ class Tables:
 
     source: str
     known: KnownSource | None
-    layouts: tuple[LogTable, ...]
+    tables: tuple[LogTable, ...]
     titles: tuple[str, ...]
     inferences: tuple[Inference, ...]
     foreign: bool = False
@@ -73,7 +73,7 @@ class Tables:
     @property
     def paths(self) -> list[Path]:
         """The file of each table."""
-        return [table.path for table in self.layouts]
+        return [table.path for table in self.tables]
 
 
 def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plain: Sniff = sniff) -> Tables:
@@ -129,7 +129,7 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
     return Tables(
         source=name,
         known=known,
-        layouts=tuple(tables),
+        tables=tuple(tables),
         titles=titles,
         inferences=(*_describe_text(texts[:1]), inference),
         foreign=not graphs if options.source == COPPELIASIM else is_foreign,
