@@ -46,8 +46,8 @@ from urmpipe_pipeline.logs.formats.clock_forms import (
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.opening import PATH
 from urmpipe_pipeline.logs.log_map import LogMap
-from urmpipe_pipeline.logs.pose_columns import have_length_1, trailing_matrix, trailing_quaternion
-from urmpipe_pipeline.logs.unnamed import clock_before_pose
+from urmpipe_pipeline.logs.pose_columns import trailing_pose
+from urmpipe_pipeline.logs.unnamed import clock_before_pose, columns_before
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 GIVEN = "given as an option"  # the evidence for a column that the user gives
@@ -382,8 +382,8 @@ def _find_without_header(
     clock = _find_dates_in_digits(free, table) or _find_unix_time(free, table)
     if clock is not None:
         return clock
-    pose_columns = _find_trailing_pose(free, table)
-    free = [column for column in free if column not in pose_columns]
+    pose = trailing_pose(free, table, path=is_path)
+    free = [*columns_before(pose, free)] if pose else free
     for column in free:
         if (split := _find_rest(column, free, table)) is not None:
             return split
@@ -401,18 +401,6 @@ def _find_before_pose(columns: Sequence[Column], table: LogTable, options: LogMa
             return TimeColumns((columns[0],), f"the {pose} columns after it are a pose, and it increases")
     pose_clock = None if options.joints else clock_before_pose(columns, table)
     return TimeColumns(*pose_clock) if pose_clock is not None else None
-
-
-def _find_trailing_pose(columns: Sequence[Column], table: LogTable) -> tuple[Column, ...]:
-    """Return the last columns that are a transform, or x, y, z and a quaternion, in many rows."""
-    tables = [table] * (max((column.table for column in columns), default=0) + 1)
-    pose = trailing_matrix(columns, tables, some=True)
-    if pose is None and len(columns) >= 7:
-        parts = [table.numbers(column.index) for column in columns[-4:]]
-        rows = np.array(list(zip(*parts, strict=False)))
-        if len(rows) and 2 * np.count_nonzero(have_length_1(rows)) > len(rows):
-            pose = trailing_quaternion(columns, tables, some=True)
-    return (*pose.position, *pose.rotation) if pose else ()
 
 
 def _find_unix_time(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:

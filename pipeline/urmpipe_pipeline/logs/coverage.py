@@ -2,8 +2,8 @@
 
 1. `coverage_warnings`: columns that are named like the joints, or have their unit where names share no word.
 2. `passed_over_warnings`: groups of the same names, passed over for those measured.
-3. `beside_path_warnings`, `orientation_warnings`, `tcp_warnings`, `odd_row_warnings`: what may be joints, an
-   orientation or a tool centre point under names that are not known.
+3. `beside_path_warnings`, `orientation_warnings`, `tcp_warnings`: what may be joints, an orientation or a
+   tool centre point under names that are not known.
 """
 
 from __future__ import annotations
@@ -12,19 +12,11 @@ import os.path
 import re
 from collections.abc import Sequence
 
-from urmpipe_models.display import format_count
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.logs.columns import NAME_JOINTS, REST, Column, Kind, listed, take
-from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.names import (
-    FIRST_NUMBER,
-    family_of,
-    find_families,
-    numbered_alike,
-    prefer_measured,
-)
-from urmpipe_pipeline.logs.pose_columns import OF_POSITION, odd_rows
+from urmpipe_pipeline.logs.names import FIRST_NUMBER, family_of, numbered_alike
+from urmpipe_pipeline.logs.pose_columns import OF_POSITION
 from urmpipe_pipeline.logs.rates import MAX_JOINTS
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
@@ -152,18 +144,6 @@ def _is_like_tcp(column: Column) -> bool:
     if any(pattern.search(column.plain) for pattern in words.tcp_position):
         return not _TORQUES.fullmatch(column.plain)
     return bool(_NEAR_TOOL.search(column.plain) and re.search(r"[xyz\d]$", column.plain))
-
-
-def odd_row_warnings(rest: Sequence[Column], tables: Sequence[LogTable]) -> list[LogWarning]:
-    """Return a warning for columns that are called as a matrix, and are one but for a few rows."""
-    for family in prefer_measured(find_families(rest, vocabulary().tcp_matrix, 0)):
-        columns = family.ordered()
-        if len(columns) in (9, 12, 16) and (rows := odd_rows(columns, tables)):
-            names, count = listed(columns, most=4), format_count(len(rows), "row")
-            message = f"{names} hold no orientation in {count}, first in this one: none is read"
-            hints = (Hint("", effect="correct the row, or leave these cells empty"),)
-            return [LogWarning(TCP_NOT_READ, message, rows[0], hints=hints)]
-    return []
 
 
 def passed_over_warnings(

@@ -38,7 +38,6 @@ from urmpipe_pipeline.logs.coverage import (
     beside_path_warnings,
     compare_sides,
     coverage_warnings,
-    odd_row_warnings,
     orientation_warnings,
     passed_over_warnings,
     tcp_warnings,
@@ -194,8 +193,7 @@ def _find_joints(
     stated = tuple(column for column in numeric if column.index in stated_joints(tables[column.table]))
     robots = () if path else stated or called_as_joints(numeric, robot)
     rest = [column for column in numeric if column not in robots]
-    form = options.rotation if path else None
-    pose = chosen_pose(columns, options) or find_pose(rest, tables, form=form, some=path, lone=path)
+    pose = chosen_pose(columns, options) or find_pose(rest, tables, options.rotation, path=path)
     if path:
         return NamedJoints(()), pose
     of_tool = {*pose.position, *pose.rotation, *(column for group in pose.alternatives for column in group)}
@@ -317,7 +315,7 @@ def _path(
 ) -> Roles:
     """Return the roles of a path; raise if it is none either."""
     file = tables[0].file
-    pose = pose if pose.position else find_pose(numeric, tables, file, lone=True)
+    pose = pose if pose.position else find_pose(numeric, tables, path=True)
     if pose.position:
         same = [group for group in pose.alternatives if group[0].kind == pose.position[0].kind]
         if same:
@@ -449,7 +447,7 @@ def _with_warnings(
     unused = [column for column in rest if column not in covered]
     is_given = inferences[0].evidence == GIVEN
     warnings = passed_over_warnings(passed, roles.joints, roles.position)
-    warnings += odd_row_warnings(rest, tables) or ([] if roles.position else tcp_warnings(rest))
+    warnings += [] if roles.position else tcp_warnings(rest)
     warnings += coverage_warnings(roles.joints, unused, robot=robot is not None, is_given=is_given)
     if roles.position and not roles.rotation:
         warnings += orientation_warnings(roles.position, unused)

@@ -1,11 +1,12 @@
 """The recorded orientation of the tool: its form and unit, and rows that hold no orientation of the motion.
 
-1. Rows between the ends of a jump (`find_interpolated_rows`). One orientation has several spellings: a
+1. Rows without an orientation become NaN: quaternions of another length than 1, matrices that are none, and
+   rows between the ends of a jump (`find_interpolated_rows`). One orientation has several spellings: a
    rotation vector u a is u (a - 2 pi) as well, an Euler angle continues from +pi at -pi, and q is -q. Where
    a log goes from one to the other, its numbers x jump by the length T, 2 pi (360 in deg) of a vector or
    of angles, 2 of a quaternion, and the orientation nearly stays. A linear resampling puts rows on the
-   straight line between, x = a + s (b - a) with |b - a| = T and 0 < s < 1, which are no orientations:
-   they become NaN.
+   straight line between, x = a + s (b - a) with |b - a| = T and 0 < s < 1. Where an arm is known to turn
+   there, it is no jump.
 2. Form and unit (`settle_rotation`): the names allow some choices. With an arm the one counts that turns
    as it does, `MARGIN` times nearer than the others (`proofs.rotation_distances`). Else wraps prove a
    unit, and size is a reason to assume it; several forms are not read.
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from urmpipe_models.math3d import (
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.columns import OTHER_UNIT, Column, unit_hints
+from urmpipe_pipeline.logs.pose_columns import holds_orientation
 from urmpipe_pipeline.logs.proofs import (
     MARGIN,
     ONE_TURN,
@@ -63,19 +65,22 @@ MIN_STEP_RATIO = (
     3.0  # a step of a jump over those next to it and the usual one; nearer rows are as good as the end
 )
 MAX_ANGLE = 0.03  # [rad] (1.7 deg), median within which orientations agree with the arm
-MAX_LENGTH_DEVIATION = 0.02  # of a quaternion from 1: they are printed with two digits or more
+MIN_TURN_BETWEEN = 1.0  # [rad], of an arm within a jump; from one sample to the next it turns less
+
+Arm: TypeAlias = tuple[Chain, FloatArray]  # robot, and its joint values in SI, shape (n, joints)
 
 PURE = Unit("1", "ratio", 1.0)  # of quaternions and matrices
 BY_COLUMNS = (0, 3, 6, 1, 4, 7, 2, 5, 8)  # entries of a matrix that is written column by column
 
 
-def find_interpolated_rows(values: FloatArray) -> BoolArray:
+def find_interpolated_rows(values: FloatArray, arm: Arm | None = None) -> BoolArray:
     """Return which rows of an orientation were interpolated across a jump, shape (n,).
 
     All steps of a jump are larger than those around it, and add up to its length: they lie on a line.
 
     Args:
         values: In the file's own units, shape (n, 3) of a vector or angles, (n, 4) of a quaternion.
+        arm: The robot and its joint values, if there is one: it turns where the tool does.
     """
     is_between = np.zeros(len(values), dtype=bool)
     turn = 360.0 if peak(values) > ONE_TURN else FULL_TURN
@@ -96,9 +101,17 @@ def find_interpolated_rows(values: FloatArray) -> BoolArray:
                 within = steps[first:last]
                 around = [float(steps[i]) for i in (first - 1, last) if 0 <= i < len(steps)]
                 is_straight = within.sum() <= (1 + MAX_JUMP_DEVIATION / 2) * lengths[k]
-                if is_straight and within.min() > MIN_STEP_RATIO * max(usual, *around):
+                is_large_step = within.min() > MIN_STEP_RATIO * max(usual, *around)
+                if is_straight and is_large_step and not (arm and _turns_between(*arm, first, last)):
                     is_between[first + 1 : last] = True
     return is_between
+
+
+def _turns_between(robot: Chain, q: FloatArray, first: int, last: int) -> bool:
+    """Return whether an arm turns away from the orientation of two rows between them."""
+    rotation = poses_over_log(robot, q[[first, (first + last) // 2]])[1]
+    cosine = (np.trace(rotation[0].T @ rotation[1]) - 1) / 2
+    return bool(cosine < np.cos(MIN_TURN_BETWEEN))
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +173,7 @@ def settle_rotation(
     forms: Sequence[RotationForm],
     values: FloatArray,
     stated: Sequence[StatedUnit | None],
-    arm: tuple[Chain, FloatArray] | None,
+    arm: Arm | None,
     base: FloatArray | None = None,
     *,
     form_given: bool = False,
@@ -181,25 +194,14 @@ def settle_rotation(
     """
     if not columns:
         return SettledRotation()
-    names, warnings = ", ".join(column.name for column in columns), list[LogWarning]()
-    if (is_between := find_interpolated_rows(values)).any():
-        values = np.where(is_between[:, np.newaxis], np.nan, values)
-        between = {3: "+180 and -180 deg", 4: "q and -q"}[len(columns)]
-        rows = f"{format_count(int(np.count_nonzero(is_between)), 'row')} of {len(values)}"
-        message = f"{names} were interpolated between {between} in {rows}, first in this one"
-        message += ": no orientation of the motion; it is not used there"
-        warnings.append(LogWarning(INTERPOLATED, message, int(np.argmax(is_between)) + 1))
+    names = ", ".join(column.name for column in columns)
+    values, warnings = _without_odd_rows(names, values, arm)
     if np.isnan(values).any(axis=1).all():
         return SettledRotation(warnings=tuple(warnings))
-    sound = [form for form in forms if _has_unit_length(values, form)]
-    if not sound:
-        warnings.append(_length_warning(names, np.linalg.norm(values, axis=1)))
-        return SettledRotation(warnings=tuple(warnings))
-    choices = [Choice(form, units) for form in sound for units in _possible_units(form, stated)]
+    choices = [Choice(form, units) for form in forms for units in _possible_units(form, stated)]
     decision = None
     if arm is not None:
-        possible = dict.fromkeys((*choices, *_other_choices(choices[0].units)))
-        every = [c for c in possible if _has_unit_length(values, c.form)]
+        every = list(dict.fromkeys((*choices, *_other_choices(choices[0].units))))
         fit = _fit_arm(every, choices, values, arm, base)
         if fit is not None and fit.is_proof:
             unit_given = any(item and item.by == "user" for item in stated)
@@ -208,7 +210,7 @@ def settle_rotation(
             choices = [fit.choice]
     if decision is None and len({choice.form for choice in choices}) > 1:
         message = f"{names} may be of several forms: the recorded orientation is not used"
-        hints = tuple(Hint("rotation", form, "specifies it") for form in sound)
+        hints = tuple(Hint("rotation", form, "specifies it") for form in forms)
         return SettledRotation(warnings=(*warnings, LogWarning(ORIENTATION, message, hints=hints)))
     choice, why, objections, basis = decision or _decide_by_values(columns, choices, values, stated)
     assumed = (warning.message for warning in objections if warning.assumption and basis != "given")
@@ -233,21 +235,28 @@ def form_inference(
     return Inference(what, shown, evidence, "form", tuple(names), (Hint("rotation"),), basis)
 
 
-def _has_unit_length(values: FloatArray, form: RotationForm) -> bool:
-    if not form.startswith("quat"):
-        return True
-    length = np.linalg.norm(values, axis=1)
-    return bool(np.nanmax(np.abs(length - 1.0)) <= MAX_LENGTH_DEVIATION)
+def _without_odd_rows(names: str, values: FloatArray, arm: Arm | None) -> tuple[FloatArray, list[LogWarning]]:
+    """Return the values with NaN in rows without an orientation, in all if these are most, and warnings."""
+    is_known, is_between = np.isfinite(values).all(axis=1), find_interpolated_rows(values, arm)
+    is_odd = is_known & ~is_between & ~holds_orientation(values)
+    is_useless, warnings = 2 * np.count_nonzero(is_odd) > np.count_nonzero(is_known), []
 
+    def where(rows: BoolArray) -> str:
+        return f"in {format_count(int(np.count_nonzero(rows)), 'row')} of {len(values)}, first in this one"
 
-def _length_warning(names: str, length: FloatArray) -> LogWarning:
-    is_off = np.abs(length - 1.0) > MAX_LENGTH_DEVIATION
-    count, row = int(np.count_nonzero(is_off)), int(np.argmax(is_off))
-    are_few = 2 * count < len(is_off)
-    typical = length[row] if are_few else np.nanmedian(length)
-    where = f" in {format_count(count, 'row')} of {len(is_off)}, first in this one" if are_few else ""
-    message = f"{names} hold quaternions of length {typical:.4g}{where}, allowed: 1; they are not used"
-    return LogWarning(ORIENTATION, message, row + 1 if are_few else None)
+    if is_between.any():
+        ends = "+180 and -180 deg" if values.shape[1] == 3 else "q and -q"
+        message = f"{names} were interpolated between {ends} {where(is_between)}"
+        message += ": no orientation of the motion; it is not used there"
+        warnings.append(LogWarning(INTERPOLATED, message, int(np.argmax(is_between)) + 1))
+    if is_odd.any():
+        row, law = int(np.argmax(is_odd)), "matrices have R R^T = I and det R = 1"
+        if values.shape[1] == 4:
+            law = f"quaternions have length 1, not {np.linalg.norm(values[row]):.3g}"
+        message = f"{names} hold no orientation {where(is_odd)}: {law}; it is not used"
+        warnings.append(LogWarning(ORIENTATION, message if is_useless else f"{message} there", row + 1))
+    is_wrong = is_between | is_odd | is_useless
+    return np.where(is_wrong[:, np.newaxis], np.nan, values) if is_wrong.any() else values, warnings
 
 
 def _possible_units(form: RotationForm, stated: Sequence[StatedUnit | None]) -> list[tuple[Unit, ...]]:
@@ -284,7 +293,7 @@ def _fit_arm(
     every: Sequence[Choice],
     stated: Sequence[Choice],
     values: FloatArray,
-    arm: tuple[Chain, FloatArray],
+    arm: Arm,
     base: FloatArray | None,
 ) -> _ArmFit | None:
     """Return the choice with which the arm agrees; None if none stands out.

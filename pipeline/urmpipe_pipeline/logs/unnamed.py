@@ -22,7 +22,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import format_count
 from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError, format_value
-from urmpipe_models.math3d import RotationForm, column_count
+from urmpipe_models.math3d import column_count
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.logs.columns import (
     NAME_JOINTS,
@@ -36,17 +36,11 @@ from urmpipe_pipeline.logs.columns import (
     which_joints,
 )
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import (
     Pose,
     chosen_pose,
-    have_length_1,
-    odd_rows,
-    quaternion_pose,
-    trailing_matrix,
-    trailing_quaternion,
-    transform_pose,
+    trailing_pose,
     with_form,
 )
 from urmpipe_pipeline.logs.rates import MAX_JOINTS, SURE, proved_blocks
@@ -68,11 +62,6 @@ MAX_SELDOM = 0.2  # a column that moves in a smaller share of the rows than othe
 MAX_UNASKED = 7  # columns that are joints where no robot tells how many there are; more may be blocks
 MIN_SURE_JOINTS = 4  # fewer may go on as others say by chance, where no robot tells how many there are
 USUAL_COUNTS = (6, 7, 5, 4)  # joints of arms, the usual first
-QUATERNION, TRANSFORMS = (
-    7,
-    (12, 16),
-)  # columns of a pose; of transforms without and with a last row 0, 0, 0, 1
-MIN_POSES = 3  # rows; in fewer, four of seven joints may have length 1 by chance
 
 
 def without_header(
@@ -97,37 +86,37 @@ def without_header(
     """
     table = tables[columns[0].table if columns else 0]
     columns = [column for column in columns if column.header]
-    pose = chosen_pose(columns, options)
+    pose, count = chosen_pose(columns, options), len(robot.coordinates) if robot else 0
     if options.joints:
         joints = chosen_columns(columns, options.joints, parameter="joints")
         check_count(joints, table.file, robot)
         return _by_place(joints, columns, robot, GIVEN, pose)
-    poses = path_of_poses(columns, table, options.rotation) if pose is None else None
-    if poses is not None:
-        return poses
+    behind = trailing_pose(columns, table, path=path) if pose is None else None
+    if behind and len(columns_before(behind, columns)) <= 1:
+        return _path_of_poses(behind, columns, table, options)
     if path:
-        return _path_by_place(columns, tables, options, pose)
+        return _path_by_place(columns, table, options, pose or behind)
     if texts := [column for column in columns if column.text]:
         is_text = np.array([column.text for column in columns])
         odd = is_text | find_odd_columns(table.values([column.index for column in columns]))
-        groups = _groups(columns, odd, len(robot.coordinates) if robot else None)
+        groups = [group for group in _groups(columns, odd, count) if not {*group} & {*texts}]
         cell = format_value(table.cells(texts[0].index)[0])
         message = f"{cell} in column {texts[0].number} of a table without a header"
-        raise which_joints(table.file, message, [group for group in groups if not {*group} & {*texts}])
+        raise which_joints(table.file, message, groups)
     if not columns:
         message = "found no column except the time, allowed: the joints"
         raise LogError(Finding(message, file=table.file, hints=(TIMES_OF_ANOTHER,)))
-    behind = None if pose else _trailing_pose(columns, tables, robot)
+    if behind and len(columns_before(behind, columns)) < count:
+        behind = None
     pose = with_form(pose or behind or Pose(), options.rotation)
-    used = (*pose.position, *pose.rotation)
-    start = min(map(columns.index, used)) if behind else len(columns)
-    free = [column for column in columns[:start] if column not in used]
+    free = columns_before(behind, columns) if behind else columns
+    free = [column for column in free if column not in (*pose.position, *pose.rotation)]
     if not free and pose.position:
-        return _path_roles(pose, columns, NO_HEADER)
+        return _path_roles(pose, columns)
     joints, rates, evidence = _joints_among(free, table, robot)
     check_count(joints, table.file, robot)
     roles = _by_place(joints, columns, robot, evidence, pose, rates)
-    if robot or rates or behind or len(joints) == 1:
+    if robot or rates or len(joints) == 1:
         return roles
     assumption = f"columns {joints[0].number} to {joints[-1].number} are the joints"
     hints = (take(joints, "confirms it"), Hint("joints", None, "names others"))
@@ -169,33 +158,28 @@ def clock_before_pose(columns: Sequence[Column], table: LogTable) -> tuple[tuple
         columns: All columns of a table without a header.
         table: The table.
     """
-    pose = _find_pose(columns, table)
-    if pose is None:
+    pose = trailing_pose(columns, table)
+    before = columns_before(pose, columns) if pose else columns
+    if pose is None or len(before) > 1:
         return None
-    if columns[0] in (*pose.position, *pose.rotation):
+    if not before:
         return (), f"the {len(columns)} columns are a pose: {pose.evidence}"
-    single = len(table.samples.values) < 2
-    rises = single or bool(table.increasing[table.numeric_columns.index(columns[0].index)])
-    why = f"it increases, and a pose stands behind it: {pose.evidence}"
-    return (tuple(columns[:1]), why) if rises else None
-
-
-def path_of_poses(columns: Sequence[Column], table: LogTable, rotation: RotationForm | None) -> Roles | None:
-    """Return the roles of the columns of a table of poses, with or without its clock; None of any other.
-
-    In TUM's form w is the last of a quaternion; without a header that is an assumption.
-
-    Args:
-        columns: Columns of a table without a header.
-        table: The table.
-        rotation: Form of the orientation, if the user gives it.
-    """
-    pose = _find_pose(columns, table)
-    if pose is None:
+    times = table.values([before[0].index])[:, 0]
+    if before[0].text or (np.diff(times) <= 0).any() or np.isnan(times).any():
         return None
+    return tuple(before), f"it increases, and a pose stands behind it: {pose.evidence}"
+
+
+def columns_before(pose: Pose, columns: Sequence[Column]) -> Sequence[Column]:
+    """Return the columns before the first one of a pose."""
+    return columns[: min(map(columns.index, (*pose.position, *pose.rotation)))]
+
+
+def _path_of_poses(pose: Pose, columns: Sequence[Column], table: LogTable, options: LogMap) -> Roles:
+    """Return the roles of a pose alone, or behind one column; w of TUM is assumed to be the last."""
     warnings: tuple[LogWarning, ...] = ()
-    is_tum = len(table.names) == 1 + QUATERNION and table.delimiter == " "
-    if rotation is None and len(pose.forms) > 1 and is_tum:
+    is_tum = len(table.names) == 8 and table.delimiter == " "
+    if options.rotation is None and len(pose.forms) > 1 and is_tum:
         order = f"no header tells the order of {listed(pose.rotation)}, a quaternion"
         hints = (
             Hint("rotation", "quat_wxyz", "overrides this"),
@@ -205,78 +189,28 @@ def path_of_poses(columns: Sequence[Column], table: LogTable, rotation: Rotation
         message = f"{order}: taken as x, y, z, w, as of TUM"
         warnings = (LogWarning("assumed-form", message, hints=hints, assumption=assumption, role="rotation"),)
         pose = replace(pose, forms=("quat_xyzw",))
-    pose = with_form(pose, rotation)
-    return replace(_path_roles(pose, columns, "no header tells what it is"), warnings=warnings)
+    return replace(_path_roles(with_form(pose, options.rotation), columns), warnings=warnings)
 
 
-def _find_pose(columns: Sequence[Column], table: LogTable) -> Pose | None:
-    """Return the pose that columns hold in every row, alone or behind one of them."""
-    if not {column.index for column in columns}.issubset(table.numeric_columns):
-        return None
-    for count in (*TRANSFORMS, QUATERNION):
-        if len(columns) - count not in (0, 1):
-            continue
-        last = columns[-count:]
-        values = table.values([column.index for column in last])
-        values = values[np.isfinite(values).all(axis=1)]
-        if count != QUATERNION:
-            pose = transform_pose(last, values)
-        elif len(values) == 0 or (len(values) < MIN_POSES and len(table.names) == QUATERNION):
-            pose = None
-        else:
-            pose = quaternion_pose(last) if have_length_1(values[:, 3:]).all() else None
-        if pose is not None:
-            return pose
-    return None
-
-
-def _path_by_place(
-    columns: Sequence[Column], tables: Sequence[LogTable], options: LogMap, pose: Pose | None
-) -> Roles:
+def _path_by_place(columns: Sequence[Column], table: LogTable, options: LogMap, pose: Pose | None) -> Roles:
     """Return x, y, z and the orientation behind them: of the given form, or by what its numbers are."""
     form = options.rotation
     if pose is None and len(columns) < 3:
         message = f"found {format_count(len(columns), 'column')}, allowed: x, y, z"
-        raise LogError(Finding(message, file=tables[0].file))
-    if pose is None and form is not None and len(columns) == 3 + column_count(form):
-        pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), GIVEN)
-    behind = _trailing_pose(columns, tables, None, some=True) if pose is None else None
-    pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
-    return _path_roles(pose, columns, NO_HEADER)
+        raise LogError(Finding(message, file=table.file))
+    if pose is None:
+        has_form = form is not None and len(columns) == 3 + column_count(form)
+        rotation = tuple(columns[3:]) if has_form else ()
+        pose = Pose(tuple(columns[:3]), rotation, evidence=GIVEN if has_form else "there is no header")
+    return _path_roles(with_form(pose, form), columns)
 
 
-def _path_roles(pose: Pose, columns: Sequence[Column], why_not_used: str) -> Roles:
+def _path_roles(pose: Pose, columns: Sequence[Column]) -> Roles:
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
     inferences = [path_inference(listed(pose.position), pose.evidence), *about_pose(pose, "proved")[1:]]
-    inferences += not_used(rest, why_not_used)
+    inferences += not_used(rest, NO_HEADER)
     place = pose.position, pose.rotation, pose.forms
     return Roles((), (), (), *place, tuple(inferences), measured=pose.measured)
-
-
-def _trailing_pose(
-    columns: Sequence[Column], tables: Sequence[LogTable], robot: Chain | None, *, some: bool = False
-) -> Pose | None:
-    """Return the pose behind the joints, or the only one of a table, by its numbers in all or some rows.
-
-    Raises:
-        LogError: With the few rows without which columns are an orientation.
-    """
-    fits = len(columns) == 7 if robot is None else len(columns) >= len(robot.coordinates) + 7
-    pose = trailing_matrix(columns, tables, some=some)
-    pose = pose or (trailing_quaternion(columns, tables, some=some) if fits else None)
-    for count in () if pose else (16, 12, *([4] if fits else [])):
-        if len(columns) < count:
-            continue
-        last = columns[-count:]
-        table = tables[last[0].table]
-        rows = [table.file_row(row) for row in odd_rows(last, tables)]
-        lines = table.lines_of(rows)
-        message = f"found no orientation in columns {listed(last, most=4)}"
-        message += ", allowed: one in every row, as in most"
-        findings = [Finding(message, table.file, lines.get(row), row, hints=(NAME_JOINTS,)) for row in rows]
-        if findings:
-            raise LogError(*capped(findings, table.file))
-    return pose
 
 
 # 2., 3. Joints
