@@ -5,7 +5,7 @@
 2. Unit of a clock of numbers (`find_unit`): the option; the name of the column; the program that wrote the
    log; the year, since a Unix time of 2000 to 2100 is one in a single unit; else the step, since a log has
    usually periods of 0.5 ms to 1 s. Steps of 1 to 500 may be s or ms: the speed of the joints decides
-   (`settle_unit_by_speed`). If several units remain, the user is asked; days and ticks are refused.
+   (`settle_unit_by_speed`). If several units remain, or none as of days and ticks, the user is asked.
 3. Without a clock (`even_clock`): rows at the period that the user gives, else at 5 ms, with a warning.
 """
 
@@ -26,7 +26,7 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_v
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, PASSED_OVER, Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.clock_columns import (
-    EPOCH,
+    GIVEN,
     MAX_PERIOD,
     MIN_PERIOD,
     OTHER_CLOCK,
@@ -34,9 +34,11 @@ from urmpipe_pipeline.logs.clock_columns import (
     TimeColumns,
     complete_time,
     find_time_columns,
+    find_unix_unit,
     has_form,
     is_named_time,
     runs_evenly,
+    start_and_step,
 )
 from urmpipe_pipeline.logs.columns import Column, find_column, unit_hints
 from urmpipe_pipeline.logs.formats.cells import MAX_NS, TextCells
@@ -62,8 +64,8 @@ from urmpipe_pipeline.logs.vocabulary import KnownSource, Unit, key, vocabulary
 DEFAULT_PERIOD = 0.005  # s, Tsp of the paper ([UrmArm2021]_ eq. 22), if nothing gives the time
 TIME_FILE = "time file"  # kind of the inference about a clock in a separate file
 
-MAX_PAUSE = 20.0  # s, median step of times since 1970, and of days or ticks
-UNUSUAL_PERIOD, IMPOSSIBLE_PERIOD = 0.0002, 1e-5  # s, below which a period is reported, or refused
+MIN_PERIOD_OF_S = 0.0002  # s; numbers without a unit with shorter steps are days or hours
+MAX_AGE = 1e8  # s, three years; no clock without a unit goes further from 0, except Unix time
 S_OR_MS = (1.0, 500.0)  # steps that may be in s or in ms
 MIN_STEP_MS = 5.0  # a log in ms rarely has shorter steps: 200 Hz
 MAX_SPEED = 30.0  # rad/s, which no joint exceeds
@@ -73,14 +75,6 @@ MIN_MOTION = 0.01  # share of the largest step below which the joints rest
 _ALLOWED = ", ".join(EXPONENTS)
 _EXAMPLES = "2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
 _ALLOWED_FORMS = f"numbers in s, ms, us or ns, or times such as {_EXAMPLES}"
-_DATES = (19_700_101_000_000, 21_000_101_000_000)  # YYYYMMDDhhmmss
-_OTHER_EPOCHS = (  # name, length of its unit [s], 2000 and 2100, the conversion to Unix time
-    ("Excel's days since 1900", 86_400.0, 36_526.0, 73_051.0, "(t - 25569) * 86400"),
-    ("MATLAB's datenum in days", 86_400.0, 730_486.0, 767_011.0, "(t - 719529) * 86400"),
-    ("Julian days", 86_400.0, 2_451_544.5, 2_488_069.5, "(t - 2440587.5) * 86400"),
-    (".NET's ticks of 100 ns", 1e-7, 6.308e17, 6.624e17, "(t - 621355968000000000) / 10"),
-    ("Windows' ticks of 100 ns", 1e-7, 1.259e17, 1.575e17, "(t - 116444736000000000) / 10"),
-)
 
 
 class Clock(NamedTuple):
@@ -90,8 +84,7 @@ class Clock(NamedTuple):
         columns: One column, or the two of a split time; none if the table has no time.
         parts: The same for the reader; none if the times are not read, as of static poses.
         unit: Its unit: s, ms, us, ns, or of text "date" or "time of day".
-        is_stated: Whether the user or the name of its column states that unit.
-        by_source: Whether the program that wrote the log does.
+        stated_by: What states that unit: "option", "name", "source" (the program that wrote the log), or "".
         are_durations: Whether each row has a duration, and the times are their sum.
         inferences: How columns and unit were found.
         warnings: About the columns and the unit.
@@ -100,8 +93,7 @@ class Clock(NamedTuple):
     columns: tuple[Column, ...] = ()
     parts: tuple[ClockColumn, ...] = ()
     unit: str = "s"
-    is_stated: bool = False
-    by_source: bool = False
+    stated_by: str = ""
     are_durations: bool = False
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
@@ -189,16 +181,14 @@ def make_clock(
     inference = Inference("time column", " and ".join(names), time.evidence, "", names, OTHER_TIME, basis)
     if is_label:
         return Clock(columns, inferences=(inference,))
-    forms = time.forms or _find_form_of_numbers(first, table, source, units)
-    if forms and not any(column.text for column in columns):
-        parts = tuple(ClockColumn(c.index, forms=(form,)) for c, form in zip(columns, forms, strict=True))
+    if forms := _find_form_of_numbers(first, table, source, units):
+        parts: tuple[ClockColumn, ...] = (ClockColumn(first.index, forms=forms),)
     elif first.text:
         parts = tuple(ClockColumn(c.index, forms=_find_text_forms(c, table, units)) for c in columns)
     elif time.rest_exponent is not None:
         parts = (ClockColumn(first.index, 9), ClockColumn(columns[1].index, time.rest_exponent))
     else:
         choice = find_unit(first, table, source, units, are_durations=time.are_durations)
-        _check_range(first, table, choice.unit)
         clock = Clock(columns, are_durations=time.are_durations, inferences=(inference,))
         return _with_unit(clock, choice)
     return Clock(columns, parts, _part_unit(parts[0]), inferences=(inference,))
@@ -242,40 +232,26 @@ def _wrong_unit(column: Column, unit: Unit, allowed: str) -> OptionError:
     return OptionError(Finding(parameter="unit", found=found, allowed=allowed, hints=OTHER_TIME))
 
 
-def _check_range(time: Column, table: LogTable, unit: str) -> None:
-    """Raise if 64 bits cannot store the times in [ns]: they are in another unit."""
-    for value in table.numbers(time.index)[:1]:
-        if abs(value) * 10.0 ** EXPONENTS[unit] >= MAX_NS:
-            of_epoch = [u for u, e in EXPONENTS.items() if EPOCH[0] <= value * 10.0 ** (e - 9) <= EPOCH[1]]
-            hint = Hint("unit", {time.called: (*of_epoch, "ns")[0]}, "applies this")
-            if unit == "s" and _DATES[0] <= value < _DATES[1]:
-                hint = Hint("", effect="a date is read if it is written as 2021-04-11 22:27:21.5")
-            message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
-            raise table.error(message, time.header, hint, *OTHER_TIME)
-
-
 class UnitChoice(NamedTuple):
-    """A unit of time, why, where it is from, and warnings about it."""
+    """A unit of time, why, what states it (as of `Clock`), and warnings about it."""
 
     unit: str
     evidence: str
+    stated_by: str = ""
     warnings: tuple[LogWarning, ...] = ()
-    is_stated: bool = False
-    by_source: bool = False
 
 
 def _with_unit(clock: Clock, choice: UnitChoice) -> Clock:
     (time,), unit = clock.columns, choice.unit
     other = (Hint("unit", {time.called: "s" if unit != "s" else "ms"}),)
     is_assumed = any(warning.assumption for warning in choice.warnings)
-    is_named = time.unit is not None or choice.is_stated or choice.by_source
+    is_named = time.unit is not None or choice.stated_by
     basis: Basis = "assumed" if is_assumed else "named" if is_named else "proved"
     inference = Inference("unit of the time", unit, choice.evidence, "", (time.name,), other, basis)
     return clock._replace(
         parts=(ClockColumn(time.index, EXPONENTS[unit]),),
         unit=unit,
-        is_stated=choice.is_stated,
-        by_source=choice.by_source,
+        stated_by=choice.stated_by,
         inferences=(clock.inferences[0], inference),
         warnings=choice.warnings,
     )
@@ -302,78 +278,62 @@ def find_unit(
         LogError: If the unit is one that is not read, or if it is ambiguous.
         OptionError: If the given unit is not a unit of time.
     """
+    numbers = table.numbers(time.index)
+    first = abs(numbers[0]) if numbers else 0.0
+    choice = _find_stated_unit(time, table, source, units)
+    if choice is not None and first * 10.0 ** EXPONENTS[choice.unit] >= MAX_NS:
+        hint = Hint("unit", {time.called: find_unix_unit(first) or "ns"}, "applies this")
+        message = f"found {first:g} {choice.unit}, allowed: times within 146 years of 0"
+        raise table.error(message, time.header, hint, *OTHER_TIME)
+    if choice is not None:
+        return choice
+    start, step = start_and_step(numbers, are_durations=are_durations)
+    usual = [u for u, e in EXPONENTS.items() if MIN_PERIOD < step * 10.0 ** (e - 9) <= MAX_PERIOD]
+    since_1970 = find_unix_unit(start, step)
+    if since_1970 is not None:
+        if usual and step * 10.0 ** (EXPONENTS[since_1970] - 9) > MAX_PERIOD:
+            raise _ask_unit(time, table, f"times of our years in steps of {step:g}", [since_1970, *usual])
+        return UnitChoice(since_1970, "it counts from 1970, so as Unix time it is of our years")
+    if 0 < step < MIN_PERIOD_OF_S:
+        found = f"found steps of {step:.3g}, as of days or hours"
+        hints = (*unit_hints([time], "s", "keeps them unchanged"), *OTHER_CLOCK)
+        raise table.error(f"{found}, allowed: times in {_ALLOWED}; convert them", time.header, *hints)
+    if step <= MIN_PERIOD:
+        choice = UnitChoice("s", "the usual unit")
+    elif ("s" in usual and len(usual) > 1) or (usual == ["ms"] and any(number % 1 for number in numbers)):
+        choice = UnitChoice("s", f"its steps of {step:g}", warnings=_assumed(time, step, "s"))
+    elif len(usual) == 1:
+        choice = UnitChoice(usual[0], f"its steps of {step:g}")
+    else:
+        raise _ask_unit(time, table, f"steps of {step:g}", usual or list(EXPONENTS))
+    unit = "ms" if S_OR_MS[0] <= step <= S_OR_MS[1] else choice.unit
+    if start * 10.0 ** (EXPONENTS[unit] - 9) > MAX_AGE:
+        message = f"found {start:g} in steps of {step:g}, as of dates or ticks since another year"
+        message += f", allowed: times in {_ALLOWED} within 3 years of 0, or Unix times; convert them"
+        hints = unit_hints([time], unit, "keeps them unchanged")
+        raise table.error(message, time.header, *hints, *OTHER_CLOCK)
+    return choice
+
+
+def _find_stated_unit(
+    time: Column, table: LogTable, source: KnownSource | None, units: Mapping[int, Unit]
+) -> UnitChoice | None:
     given_unit = units.get(time.number)
     if given_unit is not None:
         if given_unit.name not in EXPONENTS:
             raise _wrong_unit(time, given_unit, _ALLOWED)
-        return UnitChoice(given_unit.name, "given as an option", is_stated=True)
+        return UnitChoice(given_unit.name, GIVEN, "option")
     named = time.unit or vocabulary().unit(time.key)  # "seconds" has no other name
     if named is not None and named.name in EXPONENTS:
-        return UnitChoice(named.name, "its name", is_stated=True)
+        return UnitChoice(named.name, "its name", "name")
     long = time.unit_text or time.key.rpartition("_")[2]
     if long.lower() in vocabulary().long_times:
         message = f"found the unit {format_value(long)}, allowed: {_ALLOWED}; convert the times"
         raise table.error(message, time.header, *OTHER_CLOCK)
     if source is not None and "time" in source.units:
         unit = source.units["time"].name
-        return UnitChoice(unit, f"{source.name} writes {unit}", by_source=True)
-    return _find_unit_by_values(time, table, are_durations=are_durations)
-
-
-def _find_unit_by_values(time: Column, table: LogTable, *, are_durations: bool) -> UnitChoice:
-    start, step = _start_and_step(time, table, are_durations=are_durations)
-    usual = [u for u, e in EXPONENTS.items() if MIN_PERIOD < step * 10.0 ** (e - 9) <= MAX_PERIOD]
-    since_1970 = _unit_since_1970(start, step)
-    if since_1970 is not None:
-        if usual and step * 10.0 ** (EXPONENTS[since_1970] - 9) > MAX_PERIOD:
-            raise _ask_unit(time, table, f"times of our years in steps of {step:g}", [since_1970, *usual])
-        return UnitChoice(since_1970, "it counts from 1970, so as Unix time it is of our years")
-    _check_epoch(time, table, start, step)
-    if 0 < step < IMPOSSIBLE_PERIOD:
-        message = (
-            f"found steps of {step:.3g}, as of days or hours, allowed: times in {_ALLOWED}; convert them"
-        )
-        hints = unit_hints([time], "s", "keeps them unchanged")
-        raise table.error(message, time.header, *hints, *OTHER_CLOCK)
-    if step <= MIN_PERIOD:
-        return UnitChoice(
-            "s", "the usual unit", _assumed(time, step, "s") if 0 < step < UNUSUAL_PERIOD else ()
-        )
-    is_fractional = any(number % 1 for number in table.numbers(time.index))
-    if ("s" in usual and len(usual) > 1) or (usual == ["ms"] and is_fractional):
-        return UnitChoice("s", f"its steps of {step:g}", _assumed(time, step, "s"))
-    if len(usual) != 1:
-        raise _ask_unit(time, table, f"steps of {step:g}", usual or list(EXPONENTS))
-    return UnitChoice(usual[0], f"its steps of {step:g}")
-
-
-def _start_and_step(time: Column, table: LogTable, *, are_durations: bool) -> tuple[float, float]:
-    """Return the first time and the median of the steps that are positive, 0 without one, in its unit."""
-    times = table.numbers(time.index)
-    steps = np.array(times) if are_durations else np.diff(times)
-    steps = np.sort(steps[steps > 0])
-    start = times[0] if times and not are_durations else 0.0
-    return start, float(steps[len(steps) // 2]) if len(steps) else 0.0
-
-
-def _unit_since_1970(start: float, step: float) -> str | None:
-    """Return the unit in which a time is a Unix time of 2000 to 2100; or None."""
-    for unit, exponent in EXPONENTS.items():
-        scale = 10.0 ** (exponent - 9)
-        if EPOCH[0] <= start * scale <= EPOCH[1] and step * scale <= MAX_PAUSE:
-            return unit
+        return UnitChoice(unit, f"{source.name} writes {unit}", "source")
     return None
-
-
-def _check_epoch(time: Column, table: LogTable, start: float, step: float) -> None:
-    """Raise if times of 2000 to 2100 count days, or ticks of 100 ns, from another year than 1970."""
-    for kind, unit, first, last, conversion in _OTHER_EPOCHS:
-        if first <= start <= last and 0 < step * unit <= MAX_PAUSE:
-            unchanged, converted = ("s", "s") if unit > 1 else ("ns", "us")
-            message = f"found {start:.15g} in steps of {step:.3g}, as {kind}, allowed: times in {_ALLOWED}"
-            message += f"; convert them: {conversion} is Unix time in {converted}"
-            hints = unit_hints([time], unchanged, "keeps them unchanged")
-            raise table.error(message, time.header, *hints, *OTHER_CLOCK)
 
 
 def _assumed(time: Column, step: float, unit: str, why: str = "") -> tuple[LogWarning]:
@@ -395,14 +355,15 @@ def settle_unit_by_speed(
     Raises:
         LogError: If it may be s or ms.
     """
-    if len(clock.parts) != 1 or clock.parts[0].forms or clock.is_stated or clock.by_source:
+    if len(clock.parts) != 1 or clock.parts[0].forms or clock.stated_by:
         return clock
     (time,) = clock.columns
     table = tables.tables[time.table]
-    start, step = _start_and_step(time, table, are_durations=clock.are_durations)
-    if not S_OR_MS[0] <= step <= S_OR_MS[1] or _unit_since_1970(start, step):
+    numbers = table.numbers(time.index)
+    start, step = start_and_step(numbers, are_durations=clock.are_durations)
+    if not S_OR_MS[0] <= step <= S_OR_MS[1] or find_unix_unit(start, step):
         return clock
-    are_integers = not any(number % 1 for number in table.numbers(time.index))
+    are_integers = not any(number % 1 for number in numbers)
     speed = _speed_in_s(clock, tables, joints, units)
     if speed is None:
         why, unit = "no joint moves", "ms" if are_integers and step >= MIN_STEP_MS else "s"
@@ -418,7 +379,7 @@ def settle_unit_by_speed(
         raise _ask_unit(time, table, found, ["s", "ms"])
     passed_over = tuple(warning for warning in clock.warnings if warning.kind == PASSED_OVER)
     warnings = (*passed_over, *_assumed(time, step, unit, f", since {why}"))
-    return _with_unit(clock, UnitChoice(unit, f"its steps of {step:g}, and {why}", warnings))
+    return _with_unit(clock, UnitChoice(unit, f"its steps of {step:g}, and {why}", warnings=warnings))
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge numbers

@@ -5,20 +5,19 @@
 1. the column that the user gives, with the other part of a split time;
 2. with a header: a column named like a time; with a unit of time; without a name, if it always increases;
    text that is a date or a time of day (a date and a time of day in two columns are one clock); digits that
-   are dates (YYYYMMDDhhmmss, or YYYYMMDD next to hhmmss); durations, whose sum is the clock;
+   are dates (YYYYMMDDhhmmss); durations, whose sum is the clock;
 3. without a header: text and dates as above; Unix times; a split time; the column that alone increases,
    - first or last, in steps that jitter, as those of no joint do, or
    - first, in even steps, while other columns move.
    What increases in another way may be the time, a counter or a joint: the user is asked.
 
 A split time is whole seconds in one column, and the rest of a second in ns, us, ms or decimals in another: by
-their names, or because the rest falls back where the seconds step, and their sum continues there as it does
-within a second.
+their names, or because their sum continues where the seconds step as it does within a second.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -31,9 +30,6 @@ from urmpipe_pipeline.logs.formats.cells import TextCells, count_up, is_missing
 from urmpipe_pipeline.logs.formats.clock_forms import (
     DATE,
     DENSE_DATE,
-    DENSE_DAY,
-    DENSE_TIME,
-    DIGITS,
     EXPONENTS,
     SECOND_NS,
     TIME_OF_DAY,
@@ -60,7 +56,6 @@ OTHER_CLOCK = (*OTHER_TIME, Hint("period", None, "sets the time between rows the
 EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
 MIN_PERIOD, MAX_PERIOD = 0.0005, 1.0  # s, usual periods of a log
 MAX_PAUSE = 20.0  # s, median step of Unix times
-MIN_HOURS = 10_000  # hhmmss without leading zeros has hours from here on: 0:59:59 is 5959
 MAX_SEAM = 10.0  # steps within a second by which a split time may continue where the seconds step
 MIN_ROWS = 10  # with fewer rows a joint may increase by chance, and only the first column may be the time
 MAX_FAULTS = 0.02  # share of steps in which a damaged clock may stand still or run backwards; two at least
@@ -77,7 +72,6 @@ class TimeColumns(NamedTuple):
         columns: One column, or two that are added; empty without a time.
         evidence: Why they are the time.
         rest_exponent: Power of ten to [ns] of the rest of a split time.
-        forms: The form of each column of dates and times of day in digits.
         are_durations: Whether each row has a duration, and the times are their sum.
         passed_over: Times of the side that is not read.
     """
@@ -85,7 +79,6 @@ class TimeColumns(NamedTuple):
     columns: tuple[Column, ...]
     evidence: str
     rest_exponent: int | None = None
-    forms: tuple[ClockForm, ...] = ()
     are_durations: bool = False
     passed_over: tuple[Column, ...] = ()
 
@@ -111,15 +104,11 @@ def find_time_columns(
     if table.header is None:
         clock = _find_text(columns, table) or _find_without_header(columns, table, options, joints)
         return clock or TimeColumns((), "there is no header")
-    dates = _find_dates_in_digits(columns, table)
-    words = (*vocabulary().time, *vocabulary().dates)
-    if dates and len(dates.columns) == 2 and any(p.search(c.key) for p in words for c in dates.columns):
-        return dates
     return (
         _find_named(columns, table)
         or _find_by_unit(columns, table)
         or _find_text(columns, table)
-        or dates
+        or _find_date_in_digits(columns, table)
         or _find_durations(columns, table)
         or TimeColumns((), "no column is named like a time")
     )
@@ -128,10 +117,7 @@ def find_time_columns(
 def complete_time(column: Column, columns: Sequence[Column], table: LogTable) -> TimeColumns:
     """Return the clock of a column that the user gives, with the other part of a split time."""
     numeric = [other for other in columns if other.index in table.numeric_columns]
-    near = [other for other in numeric if abs(other.index - column.index) <= 1]
-    pairs = [*_iter_named_pairs(columns, table), _find_dates_in_digits(numeric, table)]
-    pairs += [_find_rest(other, near, table) for other in near]
-    for pair in pairs:
+    for pair in (_find_rest(other, numeric, table) for other in numeric):
         if pair and column in pair.columns:
             return pair._replace(evidence=GIVEN)
     return TimeColumns(
@@ -163,22 +149,22 @@ def is_named_time(name: str) -> bool:
 
 
 def _find_named(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
-    pairs = list(_iter_named_pairs(columns, table))
     words, numeric = vocabulary(), [column for column in columns if not column.text]
     keys = [column.key for column in numeric]
     if {"s", "l", "u", "r", "b"} <= set(keys) and keys.count("t") == 1:
         numeric = [column for column in numeric if column.key != "t"]  # Motoman's axes S, L, U, R, B, T
+    seconds = [c for c in numeric if words.time_seconds.search(c.key)]
     named = ([c for c in numeric if pattern.search(c.key)] for pattern in words.time)
     of_sides = ([c for c in numeric if c.kind != Kind.PLAIN and p.search(c.bare)] for p in words.time)
     times = next((some for some in (*named, *of_sides) if some), None)
     if times is None:
-        return pairs[0] if pairs else None
+        return next(filter(None, (_find_rest(c, numeric, table) for c in seconds)), None)
     joints = words.joint["position"]
     kinds = [c.kind for c in numeric if c not in times and any(p.search(c.bare) for p in joints)]
     side = min(kinds, default=Kind.MEASURED)
     time = min(times, key=lambda c: (c.kind != side, c.kind != Kind.PLAIN))
-    clock = next((pair for pair in pairs if time in pair.columns), None)
-    clock = clock or _find_rest(time, numeric, table) or TimeColumns((time,), "its name")
+    pairs = (_find_rest(c, numeric, table) for c in (*seconds, time))
+    clock = next((p for p in pairs if p and time in p.columns), TimeColumns((time,), "its name"))
     passed_over = (c for c in times if c.kind != time.kind and c not in clock.columns)
     return clock._replace(passed_over=tuple(passed_over))
 
@@ -225,6 +211,23 @@ def runs_evenly(numbers: Sequence[float]) -> bool:
     return len(steps) >= 2 and bool(steps.min() > 0 and np.ptp(steps) <= EVENLY * steps.max())
 
 
+def start_and_step(numbers: Sequence[float], *, are_durations: bool = False) -> tuple[float, float]:
+    """Return the first time and the median of the steps that are positive, 0 without one, in their unit."""
+    steps = np.array(numbers) if are_durations else np.diff(numbers)
+    steps = np.sort(steps[steps > 0])
+    start = numbers[0] if numbers and not are_durations else 0.0
+    return start, float(steps[len(steps) // 2]) if len(steps) else 0.0
+
+
+def find_unix_unit(start: float, step: float = 0.0) -> str | None:
+    """Return the unit in which a clock of this start and step is a Unix time of 2000 to 2100; or None."""
+    for unit, exponent in EXPONENTS.items():
+        scale = 10.0 ** (exponent - 9)
+        if EPOCH[0] <= start * scale <= EPOCH[1] and step * scale <= MAX_PAUSE:
+            return unit
+    return None
+
+
 # Text, and dates in digits
 
 
@@ -258,23 +261,14 @@ def _with_other_part(column: Column, columns: Sequence[Column], table: LogTable)
     return (column, parts[0]) if other_unit == TIME_OF_DAY else (parts[0], column)
 
 
-def _find_dates_in_digits(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
-    """Return the only column of dates with times, or a day and the only time of day next to it."""
-    numeric = [column for column in columns if not column.text]
-    dates = [column for column in numeric if has_form(column, DENSE_DATE, table)]
-    if len(dates) == 1:
-        return TimeColumns((dates[0],), "its numbers are dates, YYYYMMDDhhmmss", forms=(DENSE_DATE,))
-    days = [column for column in numeric if has_form(column, DENSE_DAY, table)]
-    times = [column for column in numeric if _has_hours(column, table)] if len(days) == 1 else []
-    if len(times) == 1:
-        forms = (DENSE_DAY, DENSE_TIME)
-        return TimeColumns((days[0], times[0]), "a date and a time of day in digits", forms=forms)
-    return None
+def _find_date_in_digits(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
+    dates = [column for column in columns if not column.text and has_form(column, DENSE_DATE, table)]
+    return TimeColumns((dates[0],), "its numbers are dates, YYYYMMDDhhmmss") if len(dates) == 1 else None
 
 
 def has_form(column: Column, form: ClockForm, table: LogTable) -> bool:
     """Return whether all sampled cells of a column, and one at least, are times of a form."""
-    if form in DIGITS and not column.text:
+    if form is DENSE_DATE and not column.text:
         cells = (expand_exponent(cell) for cell in table.number_texts(column.index))
     else:
         cells = (cell for cell in table.cells(column.index) if not is_missing(cell))
@@ -284,84 +278,55 @@ def has_form(column: Column, form: ClockForm, table: LogTable) -> bool:
     return bool((read_cells(TextCells.of([first, *cells]), form) > UNREADABLE).all())
 
 
-def _has_hours(column: Column, table: LogTable) -> bool:
-    """Return whether a column has times of day hhmmss with hours, not only seconds."""
-    if not has_form(column, DENSE_TIME, table):
-        return False
-    cells = [cell for cell in table.cells(column.index) if not is_missing(cell)]
-    numbers = table.numbers(column.index)
-    is_padded = all(len(cell.replace(",", ".").partition(".")[0]) >= 6 for cell in cells)
-    return (is_padded or min(numbers) >= MIN_HOURS) and len(set(numbers)) > 1
-
-
 # Split times
 
 
-def _iter_named_pairs(columns: Sequence[Column], table: LogTable) -> Iterator[TimeColumns]:
-    """Yield pairs of columns that are named as seconds and the rest of them, where the rest is below 1 s."""
-    words, numeric = vocabulary(), [column for column in columns if not column.text]
-    for first in (column for column in numeric if words.time_seconds.search(column.key)):
-        seconds, stem = table.numbers(first.index), words.time_seconds.sub("", first.key)
-        if any(number % 1 for number in seconds):
-            continue
-        for unit, pattern in words.time_rests.items():
-            limit = SECOND_NS / 10 ** EXPONENTS[unit]
-            for second in numeric:
-                is_rest = pattern.search(second.key) and pattern.sub("", second.key) == stem
-                if not is_rest or second is first:
-                    continue
-                rest = table.numbers(second.index)
-                if seconds and seconds[0] == seconds[-1]:  # the first rows are not enough
-                    rest = [*rest, np.nanmax(table.values([second.index]), initial=0.0)]
-                if all(0 <= number < limit for number in rest):
-                    name = "seconds and decimals of them" if unit == "s" else f"seconds and {unit}"
-                    yield TimeColumns((first, second), f"their names: {name} apart", EXPONENTS[unit])
-
-
 def _find_rest(seconds: Column, columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
-    """Return a column of whole seconds with the rest of them next to it, by their numbers; or None.
+    """Return a column of whole seconds with the rest of them: by both names, or next to it by its numbers.
 
-    If the log lies within one second, only a Unix time is taken as seconds, and only integers as the rest; in
-    a table with a header the rest has to be named like one.
+    If the log lies within one second, numbers show it only for a Unix time and integers; in a table with a
+    header the rest has to be named like one then.
     """
-    numbers = table.numbers(seconds.index)
-    steps = np.diff(numbers)
-    if (steps < 0).any() or not (steps == 0).any() or np.mod(numbers, 1).any():
+    words, numbers = vocabulary(), table.numbers(seconds.index)
+    if np.mod(numbers, 1).any():
         return None
+    stem = words.time_seconds.sub("", seconds.key) if words.time_seconds.search(seconds.key) else None
+    may_continue = (np.diff(numbers) == 0).any() and not (np.diff(numbers) < 0).any()
     for column in columns:
-        rest = table.numbers(column.index)
-        if abs(column.index - seconds.index) != 1 or column.text or not rest or min(rest) == max(rest):
+        unit = next((unit for unit, name in words.time_rests.items() if name.search(column.key)), None)
+        is_named = unit is not None and words.time_rests[unit].sub("", column.key) == stem
+        is_next = may_continue and abs(column.index - seconds.index) == 1
+        if column.text or column is seconds or not (is_named or is_next):
             continue
-        is_named = any(pattern.search(column.key) for pattern in vocabulary().time_rests.values())
-        values = table.values([seconds.index, column.index])
-        exponent = _fit_rest(*values.T, may_be_short=table.header is None or is_named)
-        if exponent is not None:
-            evidence = "whole seconds, and the rest of them in the next column"
-            return TimeColumns((seconds, column), evidence, exponent)
+        whole, rest = table.values([seconds.index, column.index]).T
+        if is_named and unit is not None:
+            if not ((whole % 1 > 0) | (rest < 0) | (rest * 10 ** EXPONENTS[unit] >= SECOND_NS)).any():
+                name = "decimals of them" if unit == "s" else unit
+                evidence = f"their names: seconds and {name} apart"
+                return TimeColumns((seconds, column), evidence, EXPONENTS[unit])
+        elif np.isfinite(whole + rest).all():
+            exponent = _fit_rest(whole, rest, may_be_short=table.header is None or unit is not None)
+            if exponent is not None:
+                evidence = "whole seconds, and the rest of them in the next column"
+                return TimeColumns((seconds, column), evidence, exponent)
     return None
 
 
 def _fit_rest(seconds: FloatArray, rest: FloatArray, *, may_be_short: bool) -> int | None:
     """Return the only power of ten to [ns] with which the rest continues seconds, both of shape (n,)."""
-    if len(seconds) < 3 or not (np.isfinite(seconds) & np.isfinite(rest)).all() or rest.min() < 0:
+    ticks, are_decimals, fitting = np.diff(seconds), bool((rest % 1 != 0).any()), []
+    if (seconds % 1 != 0).any() or (rest < 0).any():
         return None
-    ticks, steps = np.diff(seconds), np.diff(rest)
-    is_inside = ticks == 0
-    if (seconds % 1 != 0).any() or (ticks < 0).any() or not is_inside.any() or (steps[is_inside] < 0).any():
-        return None
-    are_decimals = bool((rest % 1 != 0).any())
-    fitting = []
     for exponent in (9,) if are_decimals else (0, 3, 6):
-        steps_ns = steps * 10.0**exponent
-        inside, across = steps_ns[is_inside], (ticks * SECOND_NS + steps_ns)[ticks == 1]
-        usual = float(inside.mean())
+        steps = ticks * SECOND_NS + np.diff(rest) * 10.0**exponent
+        inside, across = steps[ticks == 0], steps[ticks == 1]
+        if rest.max() * 10.0**exponent >= SECOND_NS or (steps < 0).any() or not inside.any():
+            continue
         if len(across):
-            longest = MAX_SEAM * max(usual, float(inside[inside > 0].mean())) if usual > 0 else 0.0
-            continues = (across >= 0).all() and np.mean(across <= longest) > 0.5
+            continues = np.mean(across <= MAX_SEAM * inside[inside > 0].mean()) > 0.5
         else:
             continues = may_be_short and not are_decimals and EPOCH[0] <= seconds[0] <= EPOCH[1]
-        is_usual = MIN_PERIOD * SECOND_NS < usual <= MAX_PERIOD * SECOND_NS
-        if is_usual and continues and rest.max() * 10.0**exponent < SECOND_NS:
+        if continues and MIN_PERIOD * SECOND_NS < inside.mean() <= MAX_PERIOD * SECOND_NS:
             fitting.append(exponent)
     return fitting[0] if len(fitting) == 1 else None
 
@@ -379,7 +344,7 @@ def _find_without_header(
         return pose_clock
     named = chosen_columns(columns, options.joints, parameter="joints")
     free = [column for column in columns if column not in named and column.index in table.numeric_columns]
-    clock = _find_dates_in_digits(free, table) or _find_unix_time(free, table)
+    clock = _find_date_in_digits(free, table) or _find_unix_time(free, table)
     if clock is not None:
         return clock
     pose = trailing_pose(free, table, path=is_path)
@@ -406,17 +371,13 @@ def _find_before_pose(columns: Sequence[Column], table: LogTable, options: LogMa
 def _find_unix_time(columns: Sequence[Column], table: LogTable) -> TimeColumns | None:
     """Return the first column of Unix times of 2000 to 2100, with the rest of its seconds."""
     for column in columns:
-        numbers = np.array(table.numbers(column.index))
-        if len(numbers) < 2 or len(numbers) != len(table.cells(column.index)) or not np.ptp(numbers):
+        numbers = table.numbers(column.index)
+        start, step = start_and_step(numbers)
+        if not step or len(numbers) < len(table.cells(column.index)):
             continue
-        steps = np.diff(numbers)
-        usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-        for exponent in EXPONENTS.values():
-            scale = 10.0 ** (exponent - 9)
-            is_epoch = EPOCH[0] <= numbers.min() * scale and numbers.max() * scale <= EPOCH[1]
-            if is_epoch and MIN_PERIOD < usual * scale <= MAX_PAUSE and np.mean(steps < 0) <= MAX_FAULTS:
-                single = TimeColumns((column,), "as Unix times its numbers are of our years")
-                return _find_rest(column, columns, table) or single
+        if find_unix_unit(start, step) and np.mean(np.diff(numbers) < 0) <= MAX_FAULTS:
+            single = TimeColumns((column,), "as Unix times its numbers are of our years")
+            return _find_rest(column, columns, table) or single
     return None
 
 

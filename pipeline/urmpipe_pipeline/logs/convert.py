@@ -319,7 +319,7 @@ def convert(reading: Reading, times: Times, proposal: Proposal) -> JointLog:
         ),
         warnings=(
             *tables.warnings,
-            *_unused_options(reading, uses_source=clock.by_source or proposal.uses_source),
+            *_unused_options(reading, uses_source=clock.stated_by == "source" or proposal.uses_source),
             *rows.warnings,
             *clock.warnings,
             *times.warnings,

@@ -309,7 +309,7 @@ def unknown_times(numbers: Numbers, clock: Clock) -> Iterator[Finding]:
 
 def _iter_times_of_day(times: IntArray, clock: Clock) -> Iterator[Finding]:
     """Yield where numbers go on as times of day written hhmmss do: 101159 is followed by 101200."""
-    if clock.is_stated or clock.are_durations or clock.unit not in EXPONENTS:
+    if clock.stated_by or clock.are_durations or clock.unit not in EXPONENTS:
         return
     unit = 10 ** EXPONENTS[clock.unit]
     if len(times) < 3 or times.min() <= UNREADABLE or (steps := np.diff(times)).max() <= 40 * unit:

@@ -37,7 +37,7 @@ from urmpipe_pipeline.logs.formats.cells import TextCells, is_number
 from urmpipe_pipeline.logs.formats.clock_forms import (
     DATE,
     DAY_NS,
-    DIGITS,
+    DENSE_DATE,
     EXPONENTS,
     REPORTED,
     TIME_OF_DAY,
@@ -95,7 +95,7 @@ def read_text_times(table: LogTable, parts: Sequence[ClockColumn], numbers: Numb
     if not numbers.texts:
         return numbers
     columns = [
-        _expand_exponents(cells) if part.forms[0] in DIGITS else cells
+        _expand_exponents(cells) if part.forms[0] is DENSE_DATE else cells
         for cells, part in zip(numbers.texts, parts, strict=True)
     ]
     readings, evidence = _choose_readings(columns, [part.forms for part in parts])

@@ -272,17 +272,10 @@ _PATTERNS = tuple(dict.fromkeys(form.pattern for form in FORMS))  # forms may di
 # Forms of numbers. They are tried only if all cells of a column have them.
 _THIS_CENTURY = r"(?P<year>(?:19[7-9]|20\d)\d)(?P<month>\d\d)(?P<day>\d\d)"
 _DENSE_END = r"(?:[.,](?P<decimals>\d{1,9})|(?P<count>\d{3}|\d{6}))?"
-DENSE_DATE = ClockForm(
+DENSE_DATE = ClockForm(  # may be written with an exponent
     "date and time, digits alone",
     DATE,
     rf"{_THIS_CENTURY}(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DENSE_END}",
-)
-DENSE_DAY = ClockForm("date, digits alone", DATE, rf"{_THIS_CENTURY}(?:\.0*)?", has_time=False)
-DENSE_TIME = ClockForm(  # leading zeros may be missing
-    "time of day, digits alone",
-    TIME_OF_DAY,
-    r"(?P<hour>\d{0,2}?)(?P<minute>\d{0,2}?)(?P<second>\d{1,2})"
-    r"(?:[.,](?P<decimals>\d{1,9})|(?<=\d{6})(?P<count>\d{3}|\d{6}))?",
 )
 UNPADDED_NS = ClockForm(  # 7.5000000 is 7 s and 5 ms
     "seconds, and nanoseconds not zero-padded behind the point",
@@ -290,7 +283,6 @@ UNPADDED_NS = ClockForm(  # 7.5000000 is 7 s and 5 ms
     r"(?P<integer>\d{1,10})[.,](?P<count>0|[1-9]\d{0,8})",
     tail="ns",
 )
-DIGITS = (DENSE_DATE, DENSE_DAY, DENSE_TIME)  # may be written with an exponent
 
 
 def expand_exponent(cell: str) -> str:
