@@ -57,7 +57,7 @@ EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
 MIN_PERIOD, MAX_PERIOD = 0.0005, 1.0  # s, usual periods of a log
 MAX_PAUSE = 20.0  # s, median step of Unix times
 MAX_SEAM = 10.0  # steps within a second by which a split time may continue where the seconds step
-MIN_ROWS = 10  # with fewer rows a joint may increase by chance, and only the first column may be the time
+MIN_ROWS = 10  # with fewer rows a joint may increase by chance: only the first column may be the time
 MAX_FAULTS = 0.02  # share of steps in which a damaged clock may stand still or run backwards; two at least
 MIN_CHANGES = 10  # of a coarse clock; no rest takes a larger share of the rows than one of these
 MAX_LISTED = 8  # columns in a question
@@ -205,7 +205,7 @@ def _increases(numbers: Sequence[float]) -> bool:
     return len(numbers) > 1 and bool((np.diff(numbers) > 0).all())
 
 
-def runs_evenly(numbers: Sequence[float]) -> bool:
+def runs_evenly(numbers: Sequence[float] | FloatArray) -> bool:
     """Return whether three numbers or more increase in steps that differ by less than 1 %."""
     steps = np.diff(numbers)
     return len(steps) >= 2 and bool(steps.min() > 0 and np.ptp(steps) <= EVENLY * steps.max())
@@ -390,39 +390,28 @@ def _find_rising(
     joints_given: bool,
 ) -> TimeColumns | None:
     """Return the column that alone increases from the first row to the last; ask if that proves nothing."""
-    increasing = [column for column in columns if _increases(table.numbers(column.index))]
-    if increasing:
-        is_increasing = dict(zip(table.numeric_columns, table.increasing.tolist(), strict=True))
-        increasing = [column for column in increasing if is_increasing[column.index]]
-    values = {column: table.values([column.index])[:, 0] for column in increasing}
+    is_increasing = dict(zip(table.numeric_columns, table.increasing.tolist(), strict=True))
+    values = {c: table.values([c.index])[:, 0] for c in columns if is_increasing[c.index]}
+    if len(table.samples.values) < MIN_ROWS:
+        values = {column: numbers for column, numbers in values.items() if column.index == 0}
+    steps = {column: kind_of_steps(numbers) for column, numbers in values.items()}
     is_one_more = joints is not None and len(table.names) == joints + 1
-    if increasing and len(values[increasing[0]]) < MIN_ROWS:
-        first = increasing[0]
-        if first.index != 0:
-            return None
-        even = [column for column in columns if runs_evenly(table.numbers(column.index))]
-        if even == [first] and not _counts_rows(values[first]):
-            return TimeColumns((first,), "the first column alone increases in even steps")
-        candidates = [first] if is_one_more or (values[first][0] == 0.0 and len(values[first]) > 2) else []
-    else:
-        steps = {column: kind_of_steps(values[column]) for column in increasing}
-        clocks = [c for c in increasing if is_one_more or steps[c] != "smooth" or values[c][0] == 0.0]
-        if len(clocks) == 1:
-            (clock,) = clocks
-            is_first, is_last = clock.index == 0, clock.index == len(table.names) - 1
-            if steps[clock] == "rough" and (is_first or is_last):
-                how = "" if len(increasing) == 1 else " in steps that jitter"
-                return TimeColumns((clock,), f"it alone increases{how} through the whole file")
-            is_even = steps[clock] == "even" and not _counts_rows(values[clock])
-            if is_first and is_even and _others_move(clock, table):
-                return TimeColumns((clock,), "the first column alone increases in even steps")
-        near = [column for column in columns if column not in clocks and _is_nearly_rising(column, table)]
-        near = near if len(near) == 1 or clocks else []
-        candidates = [*clocks, *(c for c in near if c.index == 0 or c not in increasing)]
+    clocks = [c for c in values if is_one_more or steps[c] != "smooth" or values[c][0] == 0.0]
+    if len(clocks) == 1:
+        (clock,) = clocks
+        is_first, is_last = clock.index == 0, clock.index == len(table.names) - 1
+        if steps[clock] == "rough" and (is_first or is_last):
+            how = "" if len(values) == 1 else " in steps that jitter"
+            return TimeColumns((clock,), f"it alone increases{how} through the whole file")
+        is_even = steps[clock] == "even" and not _counts_rows(values[clock])
+        if is_first and is_even and _others_move(clock, table):
+            return TimeColumns((clock,), "the first column alone increases in even steps")
+    near = [column for column in columns if column not in clocks and _is_nearly_rising(column, table)]
+    near = near if len(near) == 1 or clocks else []
+    candidates = [*clocks, *(c for c in near if c.index == 0 or c not in values)]
     if candidates and not joints_given:
-        raise _ask_time(
-            sorted(candidates, key=lambda column: column.number), increasing, table, is_path=is_path
-        )
+        candidates.sort(key=lambda column: column.number)
+        raise _ask_time(candidates, [*values], table, is_path=is_path)
     return None
 
 
@@ -432,11 +421,11 @@ def _counts_rows(values: FloatArray) -> bool:
 
 
 def _others_move(first: Column, table: LogTable) -> bool:
-    """Return whether another column changes, and none falls evenly, as a joint may while another rises."""
+    """Return whether another column changes, and none evenly all the way, as a joint may."""
     values = table.values([column for column in table.numeric_columns if column != first.index])
     steps = np.diff(values, axis=0)
-    falling = values[:, (steps < 0).all(axis=0)]
-    return bool((steps != 0).any()) and not any(kind_of_steps(-column) == "even" for column in falling.T)
+    ramps = values[:, (steps < 0).all(axis=0) | (steps > 0).all(axis=0)]
+    return bool((steps != 0).any()) and not any(kind_of_steps(np.abs(c - c[0])) == "even" for c in ramps.T)
 
 
 def _is_nearly_rising(column: Column, table: LogTable) -> bool:
@@ -481,21 +470,23 @@ SIZE_RESOLUTION = 1e-6  # share of the usual step below which sizes are equal
 
 
 def kind_of_steps(values: FloatArray) -> Steps:
-    """Return how ten or more increasing numbers of any unit, shape (n,), step.
+    """Return how increasing numbers of any unit, shape (n,), step; fewer than ten are even or smooth.
 
     A clock runs evenly, except for gaps and rounding, or it jitters: its steps are rough. The steps of a
     joint change smoothly; of clocks only that of a solver with variable steps does so, and it begins at 0.
     Numbers with few digits, or that rest, are unclear.
     """
+    if len(values) < MIN_ROWS:
+        return "even" if runs_evenly(values) else "smooth"
     steps = np.diff(values)
     usual = float(np.median(steps))
     distance, change = np.abs(steps - usual), np.abs(np.diff(steps))
     is_odd = distance > SIZE_RESOLUTION * usual
-    if is_odd.mean() <= MAX_GAPS and (steps[is_odd] > usual).all():
-        return "even"
+    has_gaps_only = is_odd.mean() <= MAX_GAPS and bool((steps[is_odd] > usual).all())
     digit = _last_digit(steps / usual) * usual
     line = np.linspace(values[0], values[-1], len(values))
-    if np.ptp(steps) <= MAX_ROUNDING * digit and np.abs(values - line).max() <= 2 * digit:
+    is_rounded = np.ptp(steps) <= MAX_ROUNDING * digit and np.abs(values - line).max() <= 2 * digit
+    if has_gaps_only or is_rounded:
         return "even"
     if np.mean(change > MAX_ROUNDING * digit) < MIN_UNROUNDED:
         return "unclear"
