@@ -19,7 +19,7 @@ from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, re
 from urmpipe_pipeline.joint_log import Basis, Inference, JointLog, LogColumn, Role
 from urmpipe_pipeline.logs.clock import TIME_FILE, split_file_column
 from urmpipe_pipeline.logs.formats.opening import PATH, TABLE
-from urmpipe_pipeline.logs.formats.row_choice import ROWS_READ
+from urmpipe_pipeline.logs.formats.shape import ROWS_READ
 from urmpipe_pipeline.logs.log_map import KEYS, READING, TABLES, Evidence, LogMap
 from urmpipe_pipeline.logs.rotation import PURE
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary

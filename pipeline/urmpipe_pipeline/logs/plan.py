@@ -43,7 +43,7 @@ from urmpipe_pipeline.logs.columns import (
 from urmpipe_pipeline.logs.formats.cells import is_missing
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.opening import PATH, Tables
-from urmpipe_pipeline.logs.formats.row_choice import ROWS_READ
+from urmpipe_pipeline.logs.formats.shape import ROWS_READ
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.roles import (
     Roles,

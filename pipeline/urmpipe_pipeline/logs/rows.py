@@ -24,9 +24,8 @@ from urmpipe_pipeline.logs.columns import Column, unit_hints
 from urmpipe_pipeline.logs.formats.cells import MAX_CELL_LENGTH
 from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS, NO_TIME, UNREADABLE
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import MAX_FINDINGS, Numbers
-from urmpipe_pipeline.logs.formats.padding import without_padding
-from urmpipe_pipeline.logs.formats.row_choice import ROWS_READ
+from urmpipe_pipeline.logs.formats.numbers import MAX_FINDINGS, Numbers, without_padding
+from urmpipe_pipeline.logs.formats.shape import ROWS_READ
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.roles import Roles

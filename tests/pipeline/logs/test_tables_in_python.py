@@ -24,7 +24,7 @@ from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.logs import LogMap, MemoryTable, arrays_to_table, dataframe_to_table, read_log
 from urmpipe_pipeline.runs.ingest import ingest_log
 
-OF_TEXT = ("encoding", "delimiter", "decimal sign", "header", "significant digits")
+OF_TEXT = ("encoding", "delimiter", "decimal sign", "header", "significant digits", "form of the time")
 """What only a text can tell."""
 
 T = np.arange(300) * 0.005
@@ -71,7 +71,6 @@ CLOCKS: dict[str, Callable[[Any], Any]] = {
     "zoned": lambda t: pd.Series(START + np.rint(t * 1e9).astype("timedelta64[ns]")).dt.tz_localize(
         "Asia/Tokyo"
     ),
-    "elapsed": lambda t: np.rint(t * 1e9).astype("timedelta64[ns]"),
 }
 
 

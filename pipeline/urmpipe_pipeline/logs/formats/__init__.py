@@ -2,11 +2,11 @@
 
 `opening` selects the format of each file, by its first bytes, and which source wrote it.
 
-- Text: `text` (bytes, compression, encoding), `merge_conflict`, `sniff` (delimiter, header, units), `cells`,
-  `sniff_rows` and `row_form` (labels, arrays in cells), `coppeliasim` (several tables), `text_table` (rows).
+- Text: `text` (bytes, compression, encoding), `sniff` (delimiter, header, units), `cells`, `sniff_rows` and
+  `row_form` (labels, arrays in cells), `text_table` (rows).
 - Typed columns: `parquet`, `matlab` (MAT, HDF5), `arrays` (NumPy, Python), `bag` and `bag_table` (MCAP, ROS),
-  `memory` over `arrow_columns`.
+  as tables in `memory`.
 - Other files: `json`, `workbook`, `programs` and `program_text` (robots, PLCs), `urmpipe_tables`.
-- Any table: `shape` (joints as rows, flat arrays), `row_choice` (rows, episodes), `padding`; `log_table` with
-  `numbers`, and times in the forms of `clock_forms`. `files` has access to files and optional libraries.
+- Any table: `shape` (joints as rows, flat arrays, rows, episodes); `log_table` with `numbers`, and times in
+  the forms of `clock_forms`. `files` has access to files and optional libraries.
 """

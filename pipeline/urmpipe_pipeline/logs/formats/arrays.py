@@ -37,8 +37,7 @@ from urmpipe_models.errors import (
 from urmpipe_pipeline.array_choice import Choice, Name, Question, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.files import question
-from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.numbers import ROLE, UNIT, arrow_column
+from urmpipe_pipeline.logs.formats.memory import ROLE, UNIT, MemoryTable, arrow_column
 from urmpipe_pipeline.logs.formats.parquet import is_table
 from urmpipe_pipeline.logs.formats.row_form import spread_names
 from urmpipe_pipeline.logs.formats.text import check_unpacked_size, check_width

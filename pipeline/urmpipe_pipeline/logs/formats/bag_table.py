@@ -23,8 +23,7 @@ from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.formats.bag import Message, make_decoder, open_bag
 from urmpipe_pipeline.logs.formats.files import choice_error, question
-from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.numbers import JOINT, ROLE, UNIT
+from urmpipe_pipeline.logs.formats.memory import JOINT, ROLE, UNIT, MemoryTable
 from urmpipe_pipeline.logs.formats.text import check_width
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import key, vocabulary

@@ -24,8 +24,7 @@ from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing, is_number, plain, to_float
 from urmpipe_pipeline.logs.formats.clock_forms import UNPADDED_NS
-from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers
-from urmpipe_pipeline.logs.formats.padding import MARKS, MIN_MARKS, end_rows
+from urmpipe_pipeline.logs.formats.numbers import MARKS, MIN_MARKS, ClockColumn, Numbers, end_rows
 
 MAX_SAMPLED_ROWS = 250  # rows whose cells decide how a table is written
 

@@ -22,12 +22,11 @@ from numpy.typing import NDArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.array_choice import Name, Question, choose_arrays
 from urmpipe_pipeline.logs.formats.arrays import ask_for_arrays, make_array_table, spread_array
-from urmpipe_pipeline.logs.formats.arrow_columns import EXPONENTS, decimals
+from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS
 from urmpipe_pipeline.logs.formats.files import read_separately
-from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.numbers import UNIT, arrow_column
+from urmpipe_pipeline.logs.formats.memory import UNIT, MemoryTable, arrow_column
 from urmpipe_pipeline.logs.formats.text import check_unpacked_size, unpacked_limit
-from urmpipe_pipeline.logs.formats.urmpipe_tables import ORDERS, POINT, RECORDED, with_roles
+from urmpipe_pipeline.logs.formats.urmpipe_tables import ORDERS, POINT, RECORDED, decimals, with_roles
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 
@@ -212,7 +211,7 @@ def _file_table(run: Mapping[str, Any]) -> pa.Table:
     columns: list[tuple[str, str, Any]] = []
     if len(clock):
         unit = units[0] if len(units) == 1 else "ns"
-        exponent = EXPONENTS.get(unit.encode())
+        exponent = EXPONENTS.get(unit)
         times = clock.astype("datetime64[ns]") if exponent is None else decimals(clock, exponent)
         columns.append((names[0] if len(names) == 1 else "t", unit, times))
     labels, units = _texts(run["names"]), _texts(run["units"])

@@ -1,7 +1,9 @@
 """The tables of a log: what its files are, which source wrote them, how each table is written.
 
 1. Each file is opened: typed columns, a program or JSON become a table in memory, all else is text.
-2. A text is refused if it holds a merge conflict; CoppeliaSim's export is several tables in one file.
+2. A text is refused if it holds a merge conflict: the rows of two versions may form one motion.
+   CoppeliaSim's export (File > Export > selected graphs as CSV) is several tables in one file. Each graph has
+   its path, its header `Time (s),<stream> (<unit>),...` and its rows.
 3. Each table is sniffed: JSON lines, labels in rows, arrays in cells, or plain cells.
 4. Its rows are chosen: a row per sample (`shape`), then the rows and the episode that options name.
 5. The source: given as an option, stated by a schema, or known by the names of columns.
@@ -9,25 +11,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value, map_collecting_errors
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, LogWarning
-from urmpipe_pipeline.logs.formats import coppeliasim
 from urmpipe_pipeline.logs.formats.bag import MAGIC, is_bag_folder, is_packed
-from urmpipe_pipeline.logs.formats.cells import is_number
+from urmpipe_pipeline.logs.formats.cells import is_number, printable
 from urmpipe_pipeline.logs.formats.files import first_bytes, import_optional
 from urmpipe_pipeline.logs.formats.json import read_json, sniff_json_lines
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.merge_conflict import check_rows_for_markers, find_markers
+from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.programs import read_program
-from urmpipe_pipeline.logs.formats.row_choice import choose_rows
-from urmpipe_pipeline.logs.formats.shape import orient_table
+from urmpipe_pipeline.logs.formats.shape import choose_rows, orient_table
 from urmpipe_pipeline.logs.formats.sniff import GIVEN, across, sniff
 from urmpipe_pipeline.logs.formats.sniff_rows import name_echoed_columns, sniff_arrays, sniff_labels
 from urmpipe_pipeline.logs.formats.text import Segment, check_line_lengths, open_text
@@ -41,6 +42,10 @@ COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
 
 Sniff: TypeAlias = Callable[[Segment, str | None, str | None], TextTable]
 # finds out how a plain table is written, with delimiter and decimal sign as options give them
+
+_MARKER = re.compile(r"\"?([<|=>])\1{6}(?!\1)")  # git's; spreadsheets may put quotes around it
+_GRAPHS = re.compile(r'\A\s*[^\r\n]*\r?\n"?Time \([^)]*\)"?,')  # how an export of CoppeliaSim begins
+_GRAPH = re.compile(rb'^(?:(?![-+0-9.]+,)[^\r\n]*\S[^\r\n]*\r?\n)?"?Time \(', re.MULTILINE)
 
 
 def source_names() -> tuple[str, ...]:
@@ -94,18 +99,16 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
     if options.sheet is not None and not options.shared and not any(text.delimiter for text in texts):
         sheet = format_value(options.sheet)
         raise OptionError(Finding(parameter="sheet", found=sheet, allowed="with a workbook"))
-    markers = map_collecting_errors(find_markers, texts)
+    map_collecting_errors(_check_no_conflict, texts)
     titles = tuple(log_stem(file) if isinstance(file, Path) else file.name for file in files)
     graphs: list[tuple[str, Segment]] = []
     is_export = options.source == COPPELIASIM
     if len(texts) == len(files) == 1 and options.source in (None, COPPELIASIM):
-        is_export = is_export or coppeliasim.is_export(texts[0])
-        graphs = coppeliasim.graphs(texts[0]) if is_export else []
+        is_export = is_export or bool(_GRAPHS.match(texts[0].head.lstrip("\r\n")))
+        graphs = _split_graphs(texts[0]) if is_export else []
     if graphs:
         titles, contents = tuple(title for title, _ in graphs), [segment for _, segment in graphs]
     tables = map_collecting_errors(lambda content: _sniff(content, options, sniff_plain), contents)
-    text_tables = [table for table in tables if isinstance(table, TextTable)]
-    map_collecting_errors(lambda pair: check_rows_for_markers(*pair), zip(text_tables, markers, strict=False))
     if len(files) > 1:
         tables = [across(table) for table in tables]
     if sniff_plain is sniff:
@@ -178,6 +181,40 @@ def _read_typed(path: Path, options: LogMap) -> MemoryTable | None:
 
         return read_bag(path, options)
     return None
+
+
+def _check_no_conflict(segment: Segment) -> None:
+    """Raise a `LogError` with the markers that git left in a file whose versions it could not merge."""
+    begin, end = ((sign * 7).encode(segment.encoding) for sign in "<>")
+    if not any(begin in block or end in block for block in _overlapping_blocks(segment)):
+        return
+    markers = [(line, text.strip(' ,;"')) for line, text in segment.lines() if _MARKER.match(text)]
+    if any(text[0] in "<>" for _, text in markers):
+        file, allowed = str(segment.path), "one version, without git's markers"
+        found = [(line, f"{format_value(text)}, a marker of a merge conflict") for line, text in markers]
+        findings = [Finding(file=file, line=line, found=text, allowed=allowed) for line, text in found]
+        raise LogError(*capped(findings, file))
+
+
+def _overlapping_blocks(segment: Segment, size: int = 1 << 20) -> Iterator[bytes]:
+    """Yield the bytes of a file in blocks, each with the last ones of the block before."""
+    before = b""
+    with segment.open() as file:
+        while block := file.read(size):
+            yield before + block
+            before = block[-32:]
+
+
+def _split_graphs(segment: Segment) -> list[tuple[str, Segment]]:
+    """Return the path of each graph of an export of CoppeliaSim, and where it stands."""
+    content, graphs, line = segment.data or segment.path.read_bytes(), [], segment.first_line
+    starts = [match.start() for match in _GRAPH.finditer(content, segment.start)]
+    line += content.count(b"\n", segment.start, starts[0] if starts else None)
+    for start, end in zip(starts, [*starts[1:], segment.end], strict=False):
+        title = content[start : content.find(b"\n", start)].decode(segment.encoding, "replace")
+        graphs.append((printable(title.strip()), segment.cut(start, end, line)))
+        line += content.count(b"\n", start, end)
+    return graphs
 
 
 def _sniff(content: Segment | MemoryTable, options: LogMap, sniff_plain: Sniff) -> LogTable:

@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.logs.formats.arrow_columns import exact_times, is_list
 from urmpipe_pipeline.logs.formats.files import choice_error, question
-from urmpipe_pipeline.logs.formats.memory import MemoryTable
+from urmpipe_pipeline.logs.formats.memory import MemoryTable, is_list
 from urmpipe_pipeline.logs.formats.text import check_unpacked_size
 from urmpipe_pipeline.logs.formats.urmpipe_tables import (
     MARK,
+    exact_times,
     mark_result,
     pandas_attributes,
     read_metadata_json,

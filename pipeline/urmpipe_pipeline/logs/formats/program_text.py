@@ -26,8 +26,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.arrays import has_clock, is_period, times_of_period
-from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.numbers import arrow_column
+from urmpipe_pipeline.logs.formats.memory import MemoryTable, arrow_column
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import SURELY_SECONDS, split_unit, vocabulary
 

@@ -31,8 +31,7 @@ import pyarrow as pa
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.logs.formats.memory import MemoryTable
-from urmpipe_pipeline.logs.formats.numbers import arrow_column
+from urmpipe_pipeline.logs.formats.memory import MemoryTable, arrow_column
 from urmpipe_pipeline.logs.formats.program_text import Program, read_arrays, shortened
 from urmpipe_pipeline.logs.formats.text import Segment
 from urmpipe_pipeline.logs.log_map import LogMap

@@ -1,33 +1,39 @@
-"""Tables without one row per sample: joints as rows, and arrays flattened to numbers one after another.
+"""The rows of a table: one per sample, and of these the ones that are read.
 
-Only the numbers show it: from sample to sample a joint continues nearly straight, while two joints have
-nothing in common. With numbers in the shape (samples, joints) that they may have, the roughness
+1. `orient_table`: joints as rows, and arrays flattened to numbers one after another. Only the numbers show
+   it: from sample to sample a joint continues nearly straight, while two joints have nothing in common. With
+   numbers in the shape (samples, joints) that they may have, the roughness
 
-    r = mean d2^2,    d2[i] = x[i + 1] - 2 x[i] + x[i - 1] down each column
+       r = mean d2^2,    d2[i] = x[i + 1] - 2 x[i] + x[i - 1] down each column
 
-falls to a part of what it is as they stand. A table of few rows that is smooth along them is asked about, and
-numbers one by one of which another shape is smoother. Rows that begin with a name are joints. Read so, a
-table is one in memory.
+   falls to a part of what it is as they stand. A table of few rows that is smooth along them is asked about,
+   and numbers one by one of which another shape is smoother. Rows that begin with a name are joints. Read so,
+   a table is one in memory.
+2. `choose_rows`: the rows of the option `rows`, and of these one episode. A table of some rows is like any
+   other: clock, joints and units are decided on these rows alone. Errors count the rows of the file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
 import numpy as np
 import pyarrow as pa
 
-from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, Hint, LogError
+from urmpipe_models.display import format_count
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.logs.formats.cells import is_missing, is_number, is_text, plain, to_float
+from urmpipe_pipeline.logs.formats.cells import is_number, is_text, plain, to_float
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.padding import steps
-from urmpipe_pipeline.logs.formats.sniff import across
+from urmpipe_pipeline.logs.formats.numbers import steps
+from urmpipe_pipeline.logs.formats.sniff import GIVEN, across
 from urmpipe_pipeline.logs.formats.text_table import TextTable
+from urmpipe_pipeline.logs.log_map import LogMap
+from urmpipe_pipeline.logs.vocabulary import key, split_unit, vocabulary
 
 AS_TABLE, TRANSPOSED = "table", "transposed"
 MAX_JOINTS = 16  # with times, rates or torques, that rows or a flat array may stand for
@@ -38,10 +44,13 @@ MAX_ROUGHNESS = {"flat": 0.1, "flat-by-joint": 0.35}  # of that as they stand; i
 MIN_ROUGHNESS = 1e-12  # of the variance, or of that as they stand: below it is rounding
 SIMILAR = 2.0  # roughness within this factor is the same: of two numbers of joints the smaller one is taken
 MAX_OFFERED = 3  # ways to read a flat array
-GIVEN = "given as an option"
+ROWS_READ = "rows read"  # the inference that counts the rows that are not read
+MAX_LISTED = 5  # episodes that a message names
+MIN_MEAN_ROWS = 4.0  # per episode: poses are measured three times
 
 _TABLE = Hint("layout", AS_TABLE, "takes each row as a sample")
 _Rows = Sequence[Sequence[str]]
+_Episodes = Mapping[str, IntArray]  # the rows of each episode by its name, from 0
 
 
 def orient_table(table: LogTable, layout: str | None, *, is_only: bool = True) -> LogTable:
@@ -183,7 +192,10 @@ def _transpose(table: LogTable, rows: _Rows, why: str, *otherwise: Hint) -> LogT
         found = f"found a row of {len(rows[short])} cells, allowed: {width}, as others have"
         raise LogError(Finding(found, table.file, row=short + 1))
     names, cells = _split_names(rows, table.decimal)
-    columns = [_to_column(row, table.decimal) for row in cells]
+    texts = (
+        [plain(c, table.decimal) if is_number(c, table.decimal) else c or None for c in row] for row in cells
+    )
+    columns = [pa.array(column, pa.string()) for column in texts]
     return _in_memory(table, columns, names, Inference("layout", TRANSPOSED, why, hints=otherwise))
 
 
@@ -218,13 +230,123 @@ def _split_names(rows: _Rows, decimal: str) -> tuple[tuple[str, ...], list[Seque
     return tuple(row[0] for row in rows), [row[1:] for row in rows]
 
 
-def _to_column(cells: Sequence[str], decimal: str) -> pa.Array:
-    """Return cells as a column of whole numbers, of numbers, or of text."""
-    known = [None if is_missing(cell) else cell for cell in cells]
-    if any(cell is not None and is_text(cell, decimal) for cell in known):
-        return pa.array(known, pa.string())
-    texts = [None if cell is None else plain(cell, decimal) for cell in known]
-    try:
-        return pa.array([None if text is None else int(text) for text in texts], pa.int64())
-    except (ValueError, pa.ArrowInvalid, OverflowError):
-        return pa.array([None if text is None else float(text) for text in texts], pa.float64())
+# The rows that are read
+
+
+def choose_rows(tables: Sequence[LogTable], options: LogMap) -> list[LogTable]:
+    """Return tables of the rows of the option `rows`, and of these the rows of one episode.
+
+    Raises:
+        LogError: If there are several episodes and none is given; the hints choose one.
+        OptionError: If there are no such rows, or no such episode.
+    """
+    if options.rows is not None:
+        tables = [_choose_ranges(table, options.rows) for table in tables]
+    if options.episode is None:
+        for table in tables if options.rows is None and not options.poses else ():
+            _check_episodes(table)
+        return list(tables)
+    chosen = [_choose_episode(table, options.episode) for table in tables]
+    if all(table is None for table in chosen) and not options.shared:
+        allowed = f"a column {', '.join(vocabulary().episode)}, or COLUMN=VALUE"
+        raise _unknown_episode(tables[0], options.episode, allowed)
+    return [episode or table for episode, table in zip(chosen, tables, strict=True)]
+
+
+def _choose_ranges(table: LogTable, ranges: str) -> LogTable:
+    """Return a table of the rows of ranges such as "2:-1", from 1; -1 is the last."""
+    count = table.count_rows()
+    is_read = np.zeros(count, dtype=np.bool_)
+    for text in ranges.split(","):
+        ends = (int(end or usual) for end, usual in zip(text.split(":"), (1, -1), strict=True))
+        first, last = (count + 1 + end if end < 0 else end for end in ends)
+        if not 1 <= first <= last <= count:
+            allowed = f"FIRST:LAST among rows 1 to {count}, FIRST no larger than LAST"
+            raise OptionError(Finding("", table.file, parameter="rows", found=text, allowed=allowed))
+        is_read[first - 1 : last] = True
+    if is_read.all():
+        return table
+    why = f"{GIVEN}: {ranges}"
+    return table.take(np.flatnonzero(is_read), _rows_read(int(is_read.sum()), count, why))
+
+
+def _rows_read(rows: int, count: int, why: str) -> Inference:
+    return Inference(ROWS_READ, f"{rows} of {count}", why, hints=(Hint("rows"),))
+
+
+def _check_episodes(table: LogTable) -> None:
+    """Raise the question which episode is read, if a column has several, each in one block of rows."""
+    for column in () if "episode" in table.applied else _episode_columns(table):
+        episodes = {name: rows for name, rows in _find_episodes(table, column).items() if name}
+        if not _are_blocks(episodes):
+            continue
+        hints = [
+            Hint("episode", name, f"reads its {format_count(len(rows), 'row')}")
+            for name, rows in list(episodes.items())[:MAX_LISTED]
+        ]
+        hints.append(Hint("rows", "1:-1", "reads all rows as one log"))
+        found = f"{len(episodes)} episodes: {_list_names(episodes)}"
+        column_name = table.names[column]
+        raise LogError(
+            Finding("", table.file, column=column_name, found=found, allowed="one", hints=tuple(hints))
+        )
+
+
+def _choose_episode(table: LogTable, episode: str) -> LogTable | None:
+    """Return a table of the rows of an episode; None without a column of episodes."""
+    if "episode" in table.applied:
+        return table
+    name, _, value = episode.partition("=")
+    columns, labels = _episode_columns(table), [split_unit(label)[0] for label in table.names]
+    named = [k for k, label in enumerate(labels) if value and name in (table.names[k], label, str(k + 1))]
+    if named:
+        columns, episode = named[:1], value
+    episodes: _Episodes = {}
+    for column in columns:
+        episodes = _find_episodes(table, column)
+        if (rows := episodes.get(_without_decimals(episode))) is not None:
+            why = f"{table.names[column]} is {episode}, given as an option: the other rows left out"
+            table = replace(table, applied=(*table.applied, "episode"))
+            return table.take(rows, _rows_read(len(rows), sum(map(len, episodes.values())), why))
+    if columns:
+        allowed = f"{_list_names(episodes)} of column {table.names[columns[-1]]}"
+        raise _unknown_episode(table, episode, allowed)
+    return None
+
+
+def _unknown_episode(table: LogTable, episode: str, allowed: str) -> OptionError:
+    found = format_value(episode)
+    return OptionError(Finding("", table.file, parameter="episode", found=found, allowed=allowed))
+
+
+def _episode_columns(table: LogTable) -> list[int]:
+    names = table.names if table.header is not None else ()
+    return [k for k, name in enumerate(names) if key(split_unit(name)[0]) in vocabulary().episode]
+
+
+def _find_episodes(table: LogTable, column: int) -> _Episodes:
+    """Return the rows of each value of a column, in the order in which the values appear."""
+    rows: dict[str, list[int]] = {}
+    for row, text in enumerate(table.texts(column)):
+        rows.setdefault(_without_decimals(text), []).append(row)
+    return {name: np.array(of_name, dtype=np.int64) for name, of_name in rows.items()}
+
+
+def _without_decimals(text: str) -> str:
+    """Return a whole number without decimals, any other text unchanged."""
+    value = to_float(text, ".") if is_number(text, ".") else None
+    return f"{value:.0f}" if value is not None and value.is_integer() else text
+
+
+def _are_blocks(episodes: _Episodes) -> bool:
+    """Return whether values are episodes: two or more whole numbers or texts, each in one block of rows."""
+    are_names = not any(is_number(name, ".") and "." in name for name in episodes)
+    are_together = all(rows[-1] - rows[0] == len(rows) - 1 for rows in episodes.values())
+    are_long = sum(map(len, episodes.values())) >= MIN_MEAN_ROWS * len(episodes)
+    return len(episodes) > 1 and are_names and are_together and are_long
+
+
+def _list_names(episodes: _Episodes) -> str:
+    names = [name for name in episodes if name]
+    more = f", ... ({len(names)} in total)" if len(names) > MAX_LISTED else ""
+    return ", ".join(names[:MAX_LISTED]) + more

@@ -11,12 +11,16 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, cast, get_args
 
+import numpy as np
 import pyarrow as pa
 
+from urmpipe_models.elementwise import IntArray
 from urmpipe_models.math3d import COLUMN_NAMES
 from urmpipe_pipeline.joint_log import Role
+from urmpipe_pipeline.logs.formats.cells import Bytes
+from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import JOINT, ROLE, UNIT
+from urmpipe_pipeline.logs.formats.memory import JOINT, ROLE, UNIT
 from urmpipe_pipeline.logs.vocabulary import split_unit
 
 MARK = "urmpipe"  # key of our metadata: of a Parquet file, and of the attributes of a table in pandas
@@ -151,3 +155,21 @@ def read_metadata_json(metadata: Mapping[bytes, bytes] | None, name: str) -> Map
 def as_mapping(value: object) -> Mapping[str, Any]:
     """Return a value that is a mapping; an empty one in the place of any other."""
     return value if isinstance(value, Mapping) else {}
+
+
+def exact_times(table: pa.Table, clock: pa.ChunkedArray) -> pa.Table:
+    """Return a table with the clock in integer [ns] in the place of its only column of times as doubles."""
+    units = [(field.metadata or {}).get(UNIT, b"").decode(errors="replace") for field in table.schema]
+    times = [k for k, unit in enumerate(units) if unit in EXPONENTS]
+    field = table.schema.field(times[0]) if len(times) == 1 else None
+    if field is None or not pa.types.is_floating(field.type) or clock.null_count:
+        return table
+    exact = decimals(clock.to_numpy(), EXPONENTS[units[times[0]]])
+    return table.set_column(times[0], field.with_type(exact.type), exact)
+
+
+def decimals(ns: IntArray, exponent: int) -> pa.Array:
+    """Return times in integer [ns], shape (n,), as exact decimals of a unit, powers of ten above it."""
+    words: Bytes = np.column_stack([ns, ns >> 63]).astype("<i8").view(np.uint8)  # 128 bits each
+    kind = pa.decimal128(19, exponent)
+    return pa.Array.from_buffers(kind, len(ns), [None, pa.py_buffer(np.ascontiguousarray(words))])
