@@ -158,8 +158,8 @@ def _skip_unread(
         warnings.append(LogWarning(SKIPPED, message, row))
     if len(faults) > MAX_FINDINGS:
         warnings.append(LogWarning(SKIPPED, f"{len(faults) - MAX_FINDINGS} more rows are left out"))
-    rows, lasting = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread)), numbers.lasting
-    return replace(numbers.at(rows), findings=lasting, wrong=len(lasting)), warnings, []
+    rows = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread))
+    return replace(numbers.at(rows), findings=numbers.lasting), warnings, []
 
 
 def _drop_empty_end(numbers: Numbers) -> tuple[Numbers, tuple[Inference, ...]]:
@@ -242,7 +242,7 @@ def find_row_errors(table: LogTable, numbers: Numbers, names: Sequence[str], clo
         clock: Its clock.
     """
     errors = [*_iter_clock_errors(numbers, clock), *_iter_infinities(numbers, names)]
-    total = numbers.wrong + len(errors)
+    total = len(numbers.findings) + len(errors)
     errors.sort(key=lambda error: (error.row or 0, error.column or "", error.message))
     rows = [numbers.file_row(error.row or 0) for error in errors[:MAX_FINDINGS]]
     lines, file = table.lines_of(rows), table.file

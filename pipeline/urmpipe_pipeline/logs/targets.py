@@ -352,7 +352,7 @@ def _read_rows(
         fault = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
         hints = (Hint("time", "none", "leaves the column out"),)
         raise LogError(Finding(fault, table.file, column=clock.columns[0].header, hints=hints))
-    timed = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=(), wrong=0).at(known)
+    timed = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=()).at(known)
     timed = separate_repeated(replace(timed, rows=known + 1))
     if findings := find_row_errors(table, timed, (), clock):
         raise LogError(*findings)

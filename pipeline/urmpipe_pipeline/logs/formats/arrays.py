@@ -68,6 +68,7 @@ def make_array_table(
     columns: Iterable[ArrayColumn],
     scalars: Mapping[str, float],
     separator: str,
+    options: LogMap,
     not_read: Sequence[str] = (),
     *,
     is_named: bool | None = None,
@@ -83,6 +84,7 @@ def make_array_table(
         columns: The columns.
         scalars: Single numbers of the file, of which one may be the time between samples.
         separator: Sign between groups in names.
+        options: Of these `time` and `period`.
         not_read: The other arrays of the file, as a message lists them.
         is_named: Whether the columns have names; None: unless all are entries of one array.
     """
@@ -102,7 +104,8 @@ def make_array_table(
             continue
         label = name[-1] if is_unique and k in same else separator.join(name[shared:])
         named[label if label not in named else separator.join(name)] = unit, values
-    times, reasons = find_even_times(scalars, named, choice.rows) if is_named is not False else ({}, [])
+    numbers = {} if is_named is False else scalars
+    times, reasons = find_even_times(path, numbers, named, choice.rows, options)
     named = {name: ("", values) for name, values in times.items()} | named
     fields, arrays = [], []
     for column, (unit, values) in named.items():
@@ -149,33 +152,55 @@ def has_clock(names: Iterable[str]) -> bool:
     return any(pattern.search(key(split_unit(name)[0])) for name in names for pattern in vocabulary().time)
 
 
-def is_period(name: str) -> bool:
-    """Return whether a number is named like the time between samples."""
-    return any(pattern.search(key(name)) for pattern in vocabulary().period)
-
-
-def times_of_period(period: float, rows: int, evidence: str) -> tuple[dict[str, Array], Inference]:
-    """Return the column of even times in [ns], shape (rows,), of a time between samples in [s]."""
-    times = np.rint(np.arange(rows) * (period * 1e9)).astype(np.int64)
-    inference = Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),), basis="named")
-    return {"t [ns]": times}, inference
-
-
 def find_even_times(
-    scalars: Mapping[str, float], names: Iterable[str], rows: int
+    path: Path, scalars: Mapping[str, float], names: Iterable[str], rows: int, options: LogMap
 ) -> tuple[dict[str, Array], list[Inference]]:
-    """Return the times of the only number that is a time between samples, if no column is named like a time.
+    """Return the column of even times in [ns], shape (rows,), of the number that is the time between samples.
 
-    A number of more than 0.05 may be in ms: it is not taken.
+    Args:
+        path: The file.
+        scalars: Its single numbers by name; one of more than 0.05 without a unit may be in s or in ms.
+        names: Of its columns: if one is named like a time, it is the clock.
+        rows: Number of rows.
+        options: Of these `time` and `period`, which come first.
+
+    Raises:
+        LogError: With the question which time it is, if several numbers may be, or the unit is not clear.
     """
-    periods = [
-        (name, value) for name, value in scalars.items() if 0.0 < value <= SURELY_SECONDS and is_period(name)
-    ]
-    if len(periods) != 1 or has_clock(names):
+    if options.time is not None or options.period is not None or has_clock(names):
         return {}, []
-    ((name, period),) = periods
-    times, inference = times_of_period(period, rows, f"{name} = {period:g} in the file")
-    return times, [inference]
+    patterns = vocabulary().period
+    periods = {
+        name: value
+        for name, value in scalars.items()
+        if 0.0 < value < math.inf and any(pattern.search(key(split_unit(name)[0])) for pattern in patterns)
+    }
+    readings = [
+        (seconds, f"{name} in {unit}")
+        for name, value in periods.items()
+        for seconds, unit in _in_seconds(name, value)
+    ]
+    if not readings:
+        return {}, []
+    period = readings[0][0]
+    evidence = " and ".join(f"{name} = {value:g}" for name, value in periods.items())
+    if any(not math.isclose(period, seconds, rel_tol=1e-9) for seconds, _ in readings):
+        hints = tuple(Hint("period", float(f"{seconds:.12g}"), f"reads {what}") for seconds, what in readings)
+        allowed = "one time between rows in s"
+        raise LogError(Finding(file=str(path), found=evidence, allowed=allowed, hints=hints))
+    times = np.rint(np.arange(rows) * (period * 1e9)).astype(np.int64)
+    inference = Inference(
+        "period", f"{period:g} s", f"{evidence} in the file", hints=(Hint("period"),), basis="named"
+    )
+    return {"t [ns]": times}, [inference]
+
+
+def _in_seconds(name: str, value: float) -> list[tuple[float, str]]:
+    """Return a time between samples in [s] by the unit in its name, or as it is small; else in each unit."""
+    unit = vocabulary().unit(split_unit(name)[1] or "")
+    if unit is not None and unit.quantity == "time":
+        return [(value * unit.factor, unit.name)]
+    return [(value, "s")] if value <= SURELY_SECONDS else [(value, "s"), (value / 1e3, "ms")]
 
 
 # NumPy files
@@ -223,7 +248,7 @@ def read_numpy(path: Path, options: LogMap) -> MemoryTable:
     }
     left_out = [f"{'/'.join(name)} {tables[name].shape}" for name in choice.left_out]
     columns = (column for part in spread for column in part)
-    return make_array_table(path, choice, columns, scalars, "/", left_out, is_named=is_named)
+    return make_array_table(path, choice, columns, scalars, "/", options, left_out, is_named=is_named)
 
 
 def _iter_stored(path: Path) -> Iterator[tuple[str, Array | None]]:

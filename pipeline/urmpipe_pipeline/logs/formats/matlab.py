@@ -70,7 +70,7 @@ def read_hdf5(path: Path, options: LogMap) -> MemoryTable:
         shown = ", ".join(not_read[:8]) or "no dataset"
         allowed = "datasets of numbers with one row per sample, such as t (n,) and q (n, joints)"
         raise LogError(Finding(file=str(path), found=shown, allowed=allowed))
-    return make_array_table(path, contents.choice, contents.columns, contents.scalars, "/", not_read)
+    return make_array_table(path, contents.choice, contents.columns, contents.scalars, "/", options, not_read)
 
 
 def _unpacked_size(path: Path) -> int:
@@ -114,7 +114,7 @@ def _make_variable_table(path: Path, variables: Mapping[str, Any], options: LogM
     scalars = {name: value for name, value in variables.items() if isinstance(value, (int, float))}
     left_out = [".".join(name) + f" {arrays[name].shape}" for name in choice.left_out]
     left_out += [f"{name} ({kind})" for name, (kind, command) in objects.items() if command]
-    return make_array_table(path, choice, columns, scalars, ".", left_out, is_named=True)
+    return make_array_table(path, choice, columns, scalars, ".", options, left_out, is_named=True)
 
 
 def _csv_command(name: str, kind: str) -> str:

@@ -33,7 +33,7 @@ from urmpipe_pipeline.logs.formats.cells import (
 )
 from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, UNREADABLE
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
-from urmpipe_pipeline.logs.formats.numbers import MAX_FINDINGS, ClockColumn, Numbers, RowFault
+from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers, RowFault
 from urmpipe_pipeline.logs.formats.row_form import spread_names
 from urmpipe_pipeline.logs.formats.sniff import only_count
 from urmpipe_pipeline.logs.formats.text import MAX_TABLE_COLUMNS, check_width
@@ -226,11 +226,11 @@ class ArrowTable(LogTable):
                 faults.setdefault(row, []).append(RowFault(message, (self.names[column],)))
         findings = tuple(
             Finding(fault.message, self.file, row=self.file_row(row + 1), column=fault.columns[0])
-            for row in sorted(faults)[:MAX_FINDINGS]
+            for row in sorted(faults)
             for fault in faults[row]
         )
         rows = None if self.rows is None else self.rows + 1
-        faulty = (findings[:MAX_FINDINGS], sum(map(len, faults.values())), (), faults, 0, rows)
+        faulty = (findings, faults, 0, rows)
         if not clock:
             return Numbers(values, None, *faulty)
         texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)

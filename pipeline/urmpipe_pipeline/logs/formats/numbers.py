@@ -82,9 +82,7 @@ class Numbers:
         values: Numbers in the file's own units, shape (n, columns); NaN where a sample is missing.
         clock: Time of each row in [ns] on the file's clock, shape (n,), or NO_TIME, REPORTED or UNREADABLE;
             None without a clock; without meaning while the texts of the clock are not read.
-        findings: The first faults of rows and cells.
-        wrong: How many such findings there are.
-        lasting: Those of the findings that leaving out rows does not mend.
+        findings: The faults of rows and cells.
         unread: Rows that could not be read, by their index, with all that is wrong with each.
         left_out: Lines among labelled rows that are not rows.
         rows: Data row of the file of each row, from 1, shape (n,), where some were left out.
@@ -97,8 +95,6 @@ class Numbers:
     values: FloatArray
     clock: IntArray | None
     findings: tuple[Finding, ...] = ()
-    wrong: int = 0
-    lasting: tuple[Finding, ...] = ()
     unread: Mapping[int, Sequence[RowFault]] = field(default_factory=dict)
     left_out: int = 0
     rows: IntArray | None = None
@@ -106,6 +102,12 @@ class Numbers:
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
     still: bool = False
+
+    @property
+    def lasting(self) -> tuple[Finding, ...]:
+        """The findings that leaving out the rows that cannot be read does not mend."""
+        unread = {self.file_row(row + 1) for row in self.unread}
+        return tuple(finding for finding in self.findings if finding.row not in unread)
 
     def at(self, rows: IntArray | slice) -> Numbers:
         """Return some of the rows: by index, shape (k,), ascending, or as a slice from the first on."""

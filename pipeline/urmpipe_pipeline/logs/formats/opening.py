@@ -160,7 +160,7 @@ def _read_typed(path: Path, options: LogMap) -> MemoryTable | None:
     if head.startswith((b"PAR1", b"PARE", b"ARROW1")):
         from urmpipe_pipeline.logs.formats.parquet import read_feather, read_parquet
 
-        return read_feather(path) if head.startswith(b"ARROW1") else read_parquet(path, head, options)
+        return read_feather(path) if head.startswith(b"ARROW1") else read_parquet(path, head)
     if head.startswith(b"MATLAB 5.0 MAT-file"):
         from urmpipe_pipeline.logs.formats.matlab import read_mat
 

@@ -2,7 +2,8 @@
 
 1. `dataframe_to_table`: a DataFrame of pandas, or what gives itself as an Arrow stream (polars, DuckDB).
 2. `read_parquet`, `read_feather`: the table of a file; of urmpipe's own files with what they state.
-3. `episode_file`: the file of an episode of LeRobot, a data set with names of joints in meta/info.json.
+3. `episode_file`: the file of an episode of LeRobot, a data set with names of joints in meta/info.json. Its
+   rows are chosen by the column `episode_index`, as those of any table.
 
        v2  data/chunk-000/episode_000003.parquet   one episode per file
        v3  data/chunk-000/file-000.parquet         several episodes, of which meta/episodes has the file
@@ -15,7 +16,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 from os.path import isdir, isfile
 from pathlib import Path
@@ -35,7 +36,6 @@ from urmpipe_pipeline.logs.formats.urmpipe_tables import (
     read_metadata_json,
     with_roles,
 )
-from urmpipe_pipeline.logs.log_map import LogMap
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,21 +133,17 @@ def _index_first(table: pa.Table) -> pa.Table:
 # Files
 
 
-def read_parquet(path: Path, head: bytes, options: LogMap) -> MemoryTable:
-    """Return the table of a Parquet file that begins with some bytes.
-
-    Of a file of episodes (LeRobot), only the rows of a given episode are read, and no images.
+def read_parquet(path: Path, head: bytes) -> MemoryTable:
+    """Return the table of a Parquet file that begins with some bytes, without images.
 
     Raises:
-        LogError: If it is encrypted or damaged; with the question which of several episodes is read.
+        LogError: If it is encrypted or damaged.
     """
-    import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
     if head.startswith(b"PARE"):
         fault = "found an encrypted Parquet file, allowed: one without encryption"
         raise LogError(Finding(fault, str(path)))
-    applied: list[str] = []
 
     def read() -> pa.Table:
         with pq.ParquetFile(path) as file:
@@ -159,15 +155,9 @@ def read_parquet(path: Path, head: bytes, options: LogMap) -> MemoryTable:
             if EPISODE not in file.schema_arrow.names:
                 return file.read()
             columns = [field.name for field in file.schema_arrow if not _is_image(field.type)]
-            numbers = sorted(pc.unique(file.read([EPISODE]).column(EPISODE)).drop_null().to_pylist())
-        column, _, value = (options.episode or "").rpartition("=")
-        is_chosen_here = options.rows is None and column in ("", EPISODE) and numbers
-        number = _choose_episode(path, numbers, value or None) if is_chosen_here else None
-        applied.extend(["episode"] * (number is not None))
-        rows = None if number is None else [(EPISODE, "==", number)]
-        return _name_entries(pq.read_table(path, columns=columns, filters=rows, partitioning=None), path)
+            return _name_entries(file.read(columns), path)
 
-    return _read_file(path, read, "Parquet", applied)
+    return _read_file(path, read, "Parquet")
 
 
 def read_feather(path: Path) -> MemoryTable:
@@ -187,10 +177,10 @@ def read_feather(path: Path) -> MemoryTable:
                 check_unpacked_size(path, size)
             return pa.Table.from_batches(batches, file.schema)
 
-    return _read_file(path, read, "Feather", ())
+    return _read_file(path, read, "Feather")
 
 
-def _read_file(path: Path, read: Callable[[], pa.Table], form: str, applied: Sequence[str]) -> MemoryTable:
+def _read_file(path: Path, read: Callable[[], pa.Table], form: str) -> MemoryTable:
     try:
         table = read()
         table.validate()
@@ -209,7 +199,7 @@ def _read_file(path: Path, read: Callable[[], pa.Table], form: str, applied: Seq
             table = exact_times(table.drop_columns([CLOCK]), table.column(CLOCK))
     else:
         table = mark_result(_index_first(table), pandas_attributes(metadata))
-    return MemoryTable(path.stem, table, path=path, applied=tuple(applied))
+    return MemoryTable(path.stem, table, path=path)
 
 
 # LeRobot
@@ -234,22 +224,16 @@ def episode_file(folder: Path, episode: str | None) -> Path:
         raise LogError(Finding(f"found a data set that cannot be read ({reason})", str(folder))) from None
     if not files:
         raise LogError(Finding(file=str(folder), found="a data set without episodes", allowed="one or more"))
-    number = _choose_episode(folder, tuple(files), episode)
-    return files[next(iter(files)) if number is None else number]
-
-
-def _choose_episode(path: Path, numbers: Sequence[int], episode: str | None) -> int | None:
-    """Return the episode that is given, among the numbers of those that there are; None if there is one."""
-    number = None if episode is None else episode.removeprefix(f"{EPISODE}=")
-    if number is not None and number.isdecimal() and int(number) in numbers:
-        return int(number)
-    shown = ", ".join(map(str, numbers[:MAX_LISTED])) + ", ..." * (len(numbers) > MAX_LISTED)
-    if number is not None:
-        raise choice_error(path, "episode", episode, f"the number of an episode: {shown}")
-    if len(numbers) == 1:
-        return None
-    choices = ((str(k), f"episode {k}") for k in numbers)
-    raise question(path, f"{len(numbers)} episodes: {shown}", "episode", choices)
+    shown = ", ".join(map(str, [*files][:MAX_LISTED])) + ", ..." * (len(files) > MAX_LISTED)
+    if episode is not None:
+        number = episode.removeprefix(f"{EPISODE}=")
+        if not number.isdecimal() or int(number) not in files:
+            raise choice_error(folder, "episode", episode, f"the number of an episode: {shown}")
+        return files[int(number)]
+    if len(files) > 1:
+        choices = ((str(k), f"episode {k}") for k in files)
+        raise question(folder, f"{len(files)} episodes: {shown}", "episode", choices)
+    return next(iter(files.values()))
 
 
 def _iter_episodes(folder: Path) -> Iterator[tuple[int, Path]]:

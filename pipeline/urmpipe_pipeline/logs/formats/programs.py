@@ -5,13 +5,16 @@
     RAPID  CONST jointtarget p10 := [[0,-30,20,0,90,0],[9E9,...]];        deg
            CONST robtarget p20 := [[600,0,800],[0,0,1,0],[0,0,0,0],[9E9,...]];    mm; quaternion w, x, y, z
            MoveAbsJ [[0,0,0,0,30,0],[9E9,...]], v100, fine, tool0;
+    ST     phi_1 : ARRAY[1..4] OF REAL := [0.0, 0.1, 2(0.5)];    structured text (IEC 61131-3): 0.5 twice
+           sample_time : LREAL := 0.0008;
 
 1. `read_program`: the language of a text by its head.
-2. `_read_krl`, `_read_rapid`: positions (of the joints, or of the tool) and moves; `program_text` has
-   structured text.
+2. `_read_krl`, `_read_rapid`: positions (of the joints, or of the tool) and moves.
 3. `_build_table`: an array of positions is a path, and what is declared next to it is not. Without an array
    the rows are the positions in the order of the moves, if every move names one or holds its numbers; else
    in the order of the text.
+4. `_read_arrays`: arrays of structured text of one length are columns; of two dimensions each column of the
+   array is one. A scalar that is named like the time between samples gives the clock.
 
 Sources: KUKA System Software, Operating and Programming Instructions for System Integrators; ABB, Technical
 reference manual: RAPID Instructions, Functions and Data types.
@@ -21,23 +24,72 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import groupby
+from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pyarrow as pa
 
 from urmpipe_models.display import format_count
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.logs.formats.arrays import find_even_times
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, arrow_column
-from urmpipe_pipeline.logs.formats.program_text import Program, read_arrays, shortened
 from urmpipe_pipeline.logs.formats.text import Segment
 from urmpipe_pipeline.logs.log_map import LogMap
 
 MIN_ABSENT = 8.99e9  # RAPID writes 9E9 for an axis that is not there
 MAX_DEPTH = 8  # lists within lists: a position in an array has three
+MAX_VALUES = 4_000_000  # of an array: a few letters repeat as many numbers as one likes
+MAX_COLUMNS = 32  # of an array of two dimensions that has fewer rows than columns
+
+
+class Program:
+    """The text of a program.
+
+    Attributes:
+        path: Its file.
+        text: All of it, comments as spaces, so that everything else keeps its place.
+        language: What it is written in, as its users call it.
+        options: What the user says about the log.
+    """
+
+    def __init__(
+        self, path: Path, text: str, comments: re.Pattern[str], language: str, options: LogMap
+    ) -> None:
+        self.path, self.language, self.options = path, language, options
+        self.text = comments.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
+
+    def statements(self) -> Iterator[tuple[int, str]]:
+        """Yield each statement that a semicolon or the file ends, with the offset where it begins."""
+        start = 0
+        for statement in self.text.split(";"):
+            lead = len(statement) - len(statement.lstrip())
+            yield start + lead, statement[lead:]
+            start += len(statement) + 1
+
+    def line(self, offset: int) -> int:
+        """Return the line of the file, from 1, of an offset of its text."""
+        return bisect_left(self._ends, offset) + 1
+
+    @cached_property
+    def _ends(self) -> list[int]:
+        return [match.start() for match in re.finditer("\n", self.text)]
+
+    def error(self, fault: str, allowed: str, offset: int | None = None, *hints: Hint) -> LogError:
+        """Return an error about the program, or about a place in it."""
+        line = None if offset is None else self.line(offset)
+        return LogError(Finding(file=str(self.path), line=line, found=fault, allowed=allowed, hints=hints))
+
+
+def shortened(text: str, length: int = 40) -> str:
+    """Return the beginning of a text in one line, for messages."""
+    line = " ".join(text.split())
+    return line if len(line) <= length else f"{line[: length - 3]}..."
 
 
 class _Kind(NamedTuple):
@@ -201,25 +253,6 @@ def _iter_targets(lists: _Lists, name: str, offset: int, *, in_array: bool) -> I
 # Rows of positions
 
 
-class _Rows(NamedTuple):
-    """Positions of a kind that make rows, by name if they are several arrays, and why."""
-
-    kind: _Kind
-    paths: Mapping[str, Sequence[_Target]]
-    why: str
-
-    @property
-    def targets(self) -> list[_Target]:
-        return [target for path in self.paths.values() for target in path]
-
-    @property
-    def length(self) -> int:
-        return len(next(iter(self.paths.values())))
-
-    def __str__(self) -> str:
-        return format_count(self.length, self.kind.name)
-
-
 def _build_table(
     program: Program, targets: Sequence[_Target], moves: Sequence[_Move], kinds: Sequence[_Kind]
 ) -> MemoryTable:
@@ -232,68 +265,209 @@ def _build_table(
         kinds: Of the joints, and of the tool.
 
     Raises:
-        LogError: If there are none, if there are paths of different lengths, or if positions of joints and
-            of the tool are no rows of one table.
+        LogError: If there are none, or several arrays; with the question which of the two kinds is read.
     """
     named = {target.name.lower(): target for target in targets if target.name and not target.in_array}
     reached = [named.get(move.lower()) if isinstance(move, str) else move for move in moves]
     followed = [target for target in reached if target is not None]
-    ordered = followed if followed and len(followed) == len(reached) else None
-    parts = [rows for kind in kinds if (rows := _select_rows(program, kind, targets, ordered)) is not None]
-    if not parts:
+    is_followed = bool(followed) and len(followed) == len(reached)
+    rows = dict[_Kind, list[_Target]]()
+    for kind in kinds:
+        of_kind = [target for target in targets if target.kind is kind]
+        arrays = dict.fromkeys(target.name for target in of_kind if target.in_array)
+        if len(arrays) > 1:
+            hint = Hint("", effect="delete the others")
+            raise program.error(
+                f"arrays {shortened(', '.join(arrays), 200)}", f"one array of {kind.name}s", None, hint
+            )
+        if arrays:
+            rows[kind] = [target for target in of_kind if target.in_array]
+        elif in_order := [target for target in (followed if is_followed else of_kind) if target.kind is kind]:
+            rows[kind] = in_order
+    if not rows:
         names = " or ".join(kind.name for kind in kinds)
         raise program.error(f"{program.language} without positions", f"a {names} with its numbers")
-    if len(parts) == 2 and not _are_pairs(*parts):
-        source = program.options.source
-        if source is None:
-            hints = (Hint("source", rows.kind.source, f"takes the {rows}") for rows in parts)
-            message = f"{' and '.join(map(str, parts))}, which are not rows of one table"
-            raise program.error(message, "one of the two", parts[0].targets[0].offset, *hints)
-        parts = [next((rows for rows in parts if rows.kind.source == source), parts[0])]
-    columns = dict[str, list[float]]()
-    for rows in parts:
-        for path, positions in rows.paths.items():
-            for name in positions[0].values:
-                values = [target.values.get(name, math.nan) for target in positions]
-                if not all(map(math.isnan, values)):  # an axis that is not there
-                    columns[name if len(rows.paths) == 1 else f"{path}_{name}"] = values
-    used = {id(target) for rows in parts for target in rows.targets}
-    unused = dict.fromkeys(target.name for target in targets if id(target) not in used and target.name)
-    why = ", ".join(dict.fromkeys(rows.why for rows in parts))
+    counts = {kind: format_count(len(of_kind), kind.name) for kind, of_kind in rows.items()}
+    if len(rows) == 2 and program.options.source is None:
+        hints = (Hint("source", kind.source, f"takes the {count}") for kind, count in counts.items())
+        first = next(iter(rows.values()))[0]
+        raise program.error(" and ".join(counts.values()), "one of the two", first.offset, *hints)
+    kind = next((kind for kind in rows if kind.source == program.options.source), next(iter(rows)))
+    positions, order = rows[kind], "moves" if is_followed else "text"
+    why = f"of {positions[0].name}" if positions[0].in_array else f"in the order of the {order}"
+    unused = dict.fromkeys(target.name for target in targets if target.name and target not in positions)
     why += f"; not among them: {shortened(', '.join(unused), 60)}" if unused else ""
-    table = pa.table({name: arrow_column(np.array(values)) for name, values in columns.items()})
-    inference = Inference("program", " and ".join(map(str, parts)), why)
+    columns = dict[str, FloatArray]()
+    for name in positions[0].values:
+        values = np.array([target.values.get(name, math.nan) for target in positions])
+        if not np.isnan(values).all():  # an axis that is not there
+            columns[name] = values
+    table = pa.table({name: arrow_column(values) for name, values in columns.items()})
+    inference = Inference("program", counts[kind], why)
     return MemoryTable(program.path.stem, table, path=program.path, inferences=(inference,))
 
 
-def _select_rows(
-    program: Program, kind: _Kind, targets: Sequence[_Target], ordered: Sequence[_Target] | None
-) -> _Rows | None:
-    """Return the positions of a kind that are rows; None without any."""
-    of_kind = [target for target in targets if target.kind is kind]
-    in_arrays = (target for target in of_kind if target.in_array)
-    arrays = {name: list(group) for name, group in groupby(in_arrays, lambda target: target.name)}
-    if arrays:
-        if len(set(map(len, arrays.values()))) > 1:
-            lengths = (f"{name} of {format_count(len(a), kind.name)}" for name, a in arrays.items())
-            delete = Hint("", effect="delete the others")
-            fault = shortened(", ".join(lengths), 200)
-            raise program.error(fault, "one array, or several of one length", None, delete)
-        return _Rows(kind, arrays, f"of {', '.join(arrays)}")
-    rows = of_kind if ordered is None else [target for target in ordered if target.kind is kind]
-    order = "text" if ordered is None else "moves"
-    return _Rows(kind, {"": rows}, f"in the order of the {order}") if rows else None
+# Arrays of structured text
 
 
-def _are_pairs(joints: _Rows, poses: _Rows) -> bool:
-    """Return whether every row has both: arrays of one length, or positions whose names pair by number."""
-    if joints.length != poses.length:
-        return False
-    pairs = list(zip(joints.targets, poses.targets, strict=False))
-    if all(joint.in_array and pose.in_array for joint, pose in pairs):
-        return len(joints.paths) == len(poses.paths) == 1
-    numbers = [[re.sub(r"\D", "", target.name) for target in pair] for pair in pairs]
-    return all(joint == pose != "" for joint, pose in numbers)
+_DECLARED = re.compile(
+    r"(?<!\w)(?P<name>\w+)\s*(?:AT\s*%[\w.*]+\s*)?:\s*"
+    r"(?P<arrays>(?:ARRAY\s*\[[^\[\]]{0,200}\]\s*OF\s+)*)\w++[^:\[\]]*+$",
+    re.IGNORECASE,
+)
+_BOUNDS = re.compile(r"([^\[,]+)\.\.([^\],]+)")
+_TOKENS = re.compile(r"[^\[\](),\s]+|[\[\](),]")
+_DURATION = re.compile(r"L?T(?:IME)?#(?=\d)((?:\d+(?:\.\d+)?(?:d|h|ms|us|ns|m|s))+)", re.IGNORECASE)
+_PARTS = re.compile(r"([\d.]+)(d|h|ms|us|ns|m|s)", re.IGNORECASE)
+_SECONDS = {"d": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_NUMBER = re.compile(r"(?!\d+#)(?:\w+#)?([+-]?\d[\d_]*(?:\.[\d_]+)?(?:e[+-]?\d+)?)", re.IGNORECASE)
+
+
+class _Array(NamedTuple):
+    """An array: its name, its values flat, the sizes of its dimensions, the first index of the last one."""
+
+    name: str
+    values: FloatArray
+    shape: tuple[int, ...]
+    first: int
+
+
+def _read_arrays(program: Program) -> MemoryTable:
+    """Return the arrays of a program in structured text as a table.
+
+    Raises:
+        LogError: If none has values, if their lengths differ, or the time between samples is unclear.
+    """
+    scalars, periods = dict[str, float](), dict[str, float]()
+    texts = list[tuple[re.Match[str], str, int]]()
+    for offset, statement in program.statements():
+        head, sign, text = statement.partition(":=")
+        declared, text = (_DECLARED.search(head) if sign else None), text.strip()
+        if declared and declared["arrays"]:
+            texts.append((declared, text, offset + declared.start()))
+        elif declared and (value := _number(text)) is not None:
+            name = declared["name"]
+            scalars[name.lower()] = value
+            periods[f"{name} [s]" if _DURATION.fullmatch(text.replace("_", "")) else name] = value
+    arrays = [array for item in texts if (array := _read_array(program, *item, scalars)) is not None]
+    if not arrays:
+        form = "name : ARRAY[1..n] OF REAL := [...]"
+        raise program.error(f"{program.language} without an array of numbers", form)
+    columns = _columns(program, arrays)
+    rows = len(next(iter(columns.values())))
+    count = f"{format_count(len(arrays), 'array')} of {rows} values"
+    times, inferences = find_even_times(program.path, periods, columns, rows, program.options)
+    table = pa.table({name: arrow_column(values) for name, values in (times | columns).items()})
+    inferences = (Inference("program", "structured text", count), *inferences)
+    return MemoryTable(program.path.stem, table, path=program.path, inferences=inferences)
+
+
+def _number(text: str) -> float | None:
+    """Return the number of a literal, of a duration such as T#4ms in [s]; None of any other text."""
+    if (match := _NUMBER.fullmatch(text)) is not None:
+        return float(match[1].replace("_", ""))
+    if (match := _DURATION.fullmatch(text.replace("_", ""))) is not None:
+        return math.fsum(float(count) * _SECONDS[unit.lower()] for count, unit in _PARTS.findall(match[1]))
+    return {"true": 1.0, "false": 0.0}.get(text.lower())
+
+
+def _read_array(
+    program: Program, declared: re.Match[str], text: str, offset: int, scalars: Mapping[str, float]
+) -> _Array | None:
+    """Return an array if its values are numbers; None also of a single one where more are declared.
+
+    Raises:
+        LogError: If its list has no end, or other than as many values as declared.
+    """
+    name = declared["name"]
+    if text.startswith("[") and text.count("[") != text.count("]"):
+        raise program.error(f"a list of {name} that does not end", "its values, then ];", offset)
+    shape, first = list[int](), 1
+    for ends in _BOUNDS.findall(declared["arrays"]):
+        low, high = (scalars.get(end.strip().lower(), _number(end.strip())) for end in ends)
+        size = math.nan if low is None or high is None else high - low + 1
+        shape.append(max(0, int(size)) if math.isfinite(size) else 0)  # 0: not known
+        first = int(low) if low is not None and math.isfinite(low) else 1
+    shape = shape or [0]
+    known = math.prod(size for size in shape if size)
+    try:
+        values = _values(text, MAX_VALUES if 0 in shape else known)
+    except OverflowError:
+        raise program.error(f"more than {MAX_VALUES} values in {name}", "as many as that", offset) from None
+    except ValueError:
+        return None
+    if len(values) == 1 < known:
+        return None
+    if shape.count(0) == 1 and len(values) % known == 0:
+        shape[shape.index(0)] = len(values) // known
+    if len(values) != math.prod(shape):
+        allowed = f"{' x '.join(str(size or '?') for size in shape)}, as it is declared"
+        raise program.error(f"{len(values)} values in {name}", allowed, offset)
+    return _Array(name, values, tuple(shape), first)
+
+
+def _values(text: str, most: int) -> FloatArray:
+    """Return the numbers of a list, flat: it may have brackets, and n(values) repeats them.
+
+    More than `most` repetitions count as one more than that.
+
+    Raises:
+        ValueError: If it holds anything but numbers.
+        OverflowError: If they are more than `MAX_VALUES`.
+    """
+    try:
+        inside = text.removeprefix("[").removesuffix("]").replace("_", "")
+        return np.array([float(cell) for cell in inside.split(",")])
+    except ValueError:
+        pass
+    numbers: list[list[float]] = [[]]
+    counts: list[int] = []
+    tokens = _TOKENS.findall(text)
+    for token, following in zip(tokens, [*tokens[1:], ""], strict=True):
+        if following == "(":
+            counts.append(min(int(token), most + 1))
+        elif token == "(":
+            numbers.append([])
+        elif token == ")" and counts:
+            repeated, count = numbers.pop(), counts.pop()
+            if len(numbers[-1]) + len(repeated) * count > MAX_VALUES:
+                raise OverflowError
+            numbers[-1] += repeated * count
+        elif token not in "[],":
+            if (number := _number(token)) is None:
+                raise ValueError(token)
+            numbers[-1].append(number)
+    return np.array(numbers[0])
+
+
+def _columns(program: Program, arrays: Sequence[_Array]) -> dict[str, FloatArray]:
+    """Return the columns of the arrays by name, those of an array of two dimensions numbered as it is.
+
+    Its rows are the first index, unless only the second has as many values as the plain arrays, or the first
+    has few and the second more than any arm has joints. The last index runs fastest.
+
+    Raises:
+        LogError: If their lengths differ.
+    """
+    plain = {array.shape[0] for array in arrays if len(array.shape) == 1}
+    columns, by_length = dict[str, FloatArray](), dict[int, list[str]]()
+    for name, values, shape, first in arrays:
+        if len(shape) == 1:
+            parts = {name: values}
+        else:
+            matrix = values.reshape(shape[0], -1)
+            high, wide = matrix.shape
+            matrix = (
+                matrix.T if wide in plain or (high not in plain and high <= MAX_COLUMNS < wide) else matrix
+            )
+            parts = {f"{name}_{first + k}": column.copy() for k, column in enumerate(matrix.T)}
+        columns |= parts
+        by_length.setdefault(len(next(iter(parts.values()))), []).append(name)
+    if len(by_length) > 1:
+        counts = (f"{n} values in {shortened(', '.join(names))}" for n, names in by_length.items())
+        delete = Hint("", effect="delete the arrays that are not columns of the log")
+        raise program.error("; ".join(counts), "arrays of one length", None, delete)
+    return columns
 
 
 # Languages
@@ -358,7 +532,7 @@ _LANGUAGES = (
             r"\w+(?:\s+AT\s*%\S+)?\s*:\s*(?:ARRAY\s*\[.*\bOF\b|(?:L?REAL|U?[SDL]?INT|L?TIME)\s*:=)",
         ),
         re.compile(r"\(\*.*?(?:\*\)|\Z)|//[^\n]*", re.DOTALL),
-        read_arrays,
+        _read_arrays,
         (r"VAR(?:_[A-Z_]+)?", "END_VAR"),
     ),
 )

@@ -29,7 +29,7 @@ from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_number, is_text, plain, to_float
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.numbers import steps
+from urmpipe_pipeline.logs.formats.numbers import capped, steps
 from urmpipe_pipeline.logs.formats.sniff import GIVEN, across
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap
@@ -204,7 +204,7 @@ def _unflatten(table: LogTable, layout: str) -> LogTable:
     order, _, text = layout.partition(":")
     numbers, count = across(table).all_rows, int(text)
     if numbers.findings:
-        raise LogError(*numbers.findings)
+        raise LogError(*capped(numbers.findings, table.file))
     x = numbers.values.ravel()
     if not len(x) or len(x) % count:
         found = f"found {len(x)} numbers, allowed with {layout}: a multiple of {count}"

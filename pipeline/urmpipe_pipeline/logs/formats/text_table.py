@@ -42,12 +42,7 @@ from urmpipe_pipeline.logs.formats.cells import (
 )
 from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, REPORTED
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
-from urmpipe_pipeline.logs.formats.numbers import (
-    MAX_FINDINGS,
-    ClockColumn,
-    Numbers,
-    RowFault,
-)
+from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers, RowFault
 from urmpipe_pipeline.logs.formats.row_form import RowError, RowForm, Value
 from urmpipe_pipeline.logs.formats.text import COMMENTS, MAX_HEAD_BYTES, Segment
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
@@ -384,24 +379,8 @@ def find_missing(chunk: pa.Array) -> BoolArray:
     return np.asarray(bits[chunk.offset : chunk.offset + len(chunk)] == 0)
 
 
-@dataclass(slots=True)
-class _Fault:
-    """Something wrong with a row, and with how many rows after it in the same way."""
-
-    message: str
-    line: int
-    row: int
-    column: str | None
-    more: int = 0
-    hints: tuple[Hint, ...] = ()
-
-    def finding(self, file: str) -> Finding:
-        more = f" (and so {self.more} more row{'s' * (self.more > 1)} below it)" if self.more else ""
-        return Finding(self.message + more, file, self.line, self.row, self.column, hints=self.hints)
-
-
 class RowReader:
-    """Goes through rows one by one and keeps the first findings.
+    """Goes through rows one by one and keeps the findings.
 
     Args:
         table: The table.
@@ -426,10 +405,7 @@ class RowReader:
         self._used = (*columns, *(part.column for part in clock))
         self._rows_read = None if table.rows is None else frozenset(table.rows.tolist())
         self._next_line, self._line, self._row = table.first_line, 0, 0
-        self._faults: list[_Fault] = []
-        self._lasting: list[_Fault] = []
-        self._last: _Fault | None = None
-        self._wrong = 0
+        self._findings: list[tuple[Finding, int]] = []  # with the number of rows below with the same fault
         self._unread: dict[int, list[RowFault]] = {}
 
     def pass_over(self, rows: int, lines: int) -> None:
@@ -463,15 +439,13 @@ class RowReader:
 
     def summary(self) -> Numbers:
         """Return what was found to be wrong, without numbers."""
-        file = self._table.file
-        return Numbers(
-            np.empty((0, len(self._columns))),
-            None,
-            findings=tuple(fault.finding(file) for fault in self._faults),
-            wrong=self._wrong,
-            lasting=tuple(fault.finding(file) for fault in self._lasting),
-            unread=self._unread,
+        findings = tuple(
+            replace(finding, message=f"{finding.message} (and so {format_count(more, 'more row')} below it)")
+            if more
+            else finding
+            for finding, more in self._findings
         )
+        return Numbers(np.empty((0, len(self._columns))), None, findings, self._unread)
 
     def check_last_row(self) -> None:
         """Report the last row if the file ends within its last cell, which then lacks decimals."""
@@ -520,11 +494,12 @@ class RowReader:
         names = self._table.form.names if self._table.form else self._table.names
         width = len(names)
         if again := self._header_again(text, values, names):
-            self._report(f"found {again}, allowed: one log per file; a second log begins here", lasting=True)
-            if self._last and not self._allowed:  # a table of targets has no such option
-                first = 1 + min(self._rows_read or [0])
-                parts = [f"{first}:{self._row - 1}", f"{self._row + 1}:-1"][: 2 if again == HEADER else 1]
-                self._last.hints = tuple(Hint("rows", part, "reads these rows") for part in parts)
+            message = f"found {again}, allowed: one log per file; a second log begins here"
+            first = 1 + min(self._rows_read or [0])
+            parts = [f"{first}:{self._row - 1}", f"{self._row + 1}:-1"][: 2 if again == HEADER else 1]
+            parts = [] if self._allowed else parts  # a table of targets has no such option
+            hints = tuple(Hint("rows", part, "reads these rows") for part in parts)
+            self._findings.append((replace(self._finding(message), hints=hints), 0))
             self.has_ended = True
             return False
         if len(values) == width - 1 and not names[-1]:
@@ -579,21 +554,18 @@ class RowReader:
             total += time
         return total
 
-    def _report(self, message: str, column: str | None = None, *, lasting: bool = False) -> None:
-        """Keep a finding about this row: a lasting one stays without it, repeated ones are counted."""
-        if not lasting:
-            fault = RowFault(message, (column,) if column else ())
-            self._unread.setdefault(self._row - 1, []).append(fault)
-        last = self._last
-        if last and (last.message, last.column, last.row + last.more + 1) == (message, column, self._row):
-            last.more += 1
-            return
-        self._last = _Fault(message, self._line, self._row, column)
-        self._wrong += 1
-        if len(self._faults) < MAX_FINDINGS:
-            self._faults.append(self._last)
-        if lasting:
-            self._lasting.append(self._last)
+    def _report(self, message: str, column: str | None = None) -> None:
+        """Keep a finding about this row; the same in the rows below it is counted."""
+        self._unread.setdefault(self._row - 1, []).append(RowFault(message, (column,) if column else ()))
+        if self._findings:
+            first, more = self._findings[-1]
+            if (first.message, first.column, (first.row or 0) + more + 1) == (message, column, self._row):
+                self._findings[-1] = first, more + 1
+                return
+        self._findings.append((self._finding(message, column), 0))
+
+    def _finding(self, message: str, column: str | None = None) -> Finding:
+        return Finding(message, self._table.file, self._line, self._row, column)
 
 
 def _shorten(text: str) -> str:
