@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -122,18 +122,12 @@ class Proposal(NamedTuple):
     Attributes:
         groups: The columns of joints, rates, accelerations, position, orientation.
         form: The form of the orientation; None without one.
-        inferences: The units.
-        warnings: Units that are assumed or contradicted, rows that are no orientation.
-        uncertainties: Why the unit of a column is only assumed, by its number.
-        uses_source: Whether the source stated a unit.
+        units: The evidence and warnings.
     """
 
     groups: tuple[Group, Group, Group, Group, Group]
     form: RotationForm | None
-    inferences: Sequence[Inference]
-    warnings: Sequence[LogWarning]
-    uncertainties: Mapping[int, str]
-    uses_source: bool
+    units: UnitFinder
 
 
 def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Proposal:
@@ -169,36 +163,20 @@ def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Prop
         else []
     )
     position = _in_si(position, lengths)
-    planar = []
     if len(roles.position) == 2:
         position = np.column_stack((position, np.zeros(len(position))))
-        planar = [Inference("z of the position", "0 m", "x and y are given alone")]
-    turned = settle_rotation(
-        roles.rotation,
-        roles.forms,
-        rotation,
-        stated := sources.of_rotation(roles.rotation, roles.forms),
-        (robot, q) if robot and roles.joints else None,
-        finder.kinematic.base if finder.kinematic else None,
-        form_given=reading.options.rotation is not None,
+        finder.noted.append(Inference("z of the position", "0 m", "x and y are given alone"))
+    arm = (robot, q) if robot and roles.joints else None
+    form_given = reading.options.rotation is not None
+    turned = settle_rotation(finder, roles.rotation, roles.forms, rotation, arm, form_given=form_given)
+    groups = (
+        Group(roles.joints, q, units),
+        Group(roles.rates, _in_si(qd, rates), rates),
+        Group(roles.accelerations, _in_si(qdd, accelerations), accelerations),
+        Group(roles.position, position, lengths),
+        Group(turned.columns, turned.values, turned.units),
     )
-    if turned.form:
-        finder.warn_not_reached(roles.rotation, stated, turned.units, "rotation")
-    rotated = [column.number for column in turned.columns]
-    return Proposal(
-        groups=(
-            Group(roles.joints, q, units),
-            Group(roles.rates, _in_si(qd, rates), rates),
-            Group(roles.accelerations, _in_si(qdd, accelerations), accelerations),
-            Group(roles.position, position, lengths),
-            Group(turned.columns, turned.values, turned.units),
-        ),
-        form=turned.form,
-        inferences=(*finder.inferences, *planar, *turned.inferences),
-        warnings=(*finder.warnings, *turned.warnings),
-        uncertainties=finder.uncertainties | dict.fromkeys(rotated, turned.uncertainty),
-        uses_source=finder.uses_source,
-    )
+    return Proposal(groups, turned.form, finder)
 
 
 def _record(reading: Reading, robot: Chain | None) -> Recorded:
@@ -290,7 +268,7 @@ def convert(reading: Reading, times: Times, proposal: Proposal) -> JointLog:
     coarse = "every joint value is written with as many"
     groups = [group for group in proposal.groups if group.columns]
     named = ((group.values, [column.name for column in group.columns]) for group in groups)
-    row_warnings = (*roles.warnings, *proposal.warnings, *missing_warnings(named))
+    row_warnings = (*roles.warnings, *proposal.units.warnings, *missing_warnings(named))
     return JointLog(
         name=reading.name,
         source=PATH if not roles.joints and tables.source == TABLE else tables.source,
@@ -314,12 +292,12 @@ def convert(reading: Reading, times: Times, proposal: Proposal) -> JointLog:
             *times.inferences,
             *roles.inferences,
             *rows.inferences,
-            *proposal.inferences,
+            *proposal.units.inferences,
             *([Inference("significant digits", str(digits), coarse)] if digits else []),
         ),
         warnings=(
             *tables.warnings,
-            *_unused_options(reading, uses_source=clock.stated_by == "source" or proposal.uses_source),
+            *_unused_options(reading, uses_source=clock.stated_by == "source" or proposal.units.uses_source),
             *rows.warnings,
             *clock.warnings,
             *times.warnings,
@@ -366,7 +344,7 @@ def _log_columns(reading: Reading, proposal: Proposal) -> Iterator[LogColumn]:
                 sign=sign,
                 offset=offset,
                 number=column.number,
-                uncertainty=proposal.uncertainties.get(column.number, ""),
+                uncertainty=proposal.units.uncertainties.get(column.number, ""),
             )
 
 

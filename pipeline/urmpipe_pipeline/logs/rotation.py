@@ -15,7 +15,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -51,7 +51,7 @@ from urmpipe_pipeline.logs.units import (
     GIVEN,
     UNIT_CONTRADICTION,
     StatedUnit,
-    uncertain_unit_warning,
+    UnitFinder,
 )
 from urmpipe_pipeline.logs.vocabulary import Unit, vocabulary
 
@@ -137,94 +137,80 @@ class Choice:
         return f"{self.form} by columns" if self.by_columns else self.form
 
 
-class SettledRotation(NamedTuple):
-    """What a recorded orientation is.
+class Orientation(NamedTuple):
+    """A recorded orientation.
 
     Attributes:
         form: Its form; None if nothing shows it, and then it is not used.
         columns: The columns in the order of the form.
         units: The unit of each.
         values: In [rad] or [-], shape (n, columns); NaN in rows without an orientation.
-        inferences: Form and unit with their evidence.
-        warnings: What is assumed or contradicted, and rows that are not used.
-        uncertainty: Why the unit is only assumed; empty if it is known.
     """
 
     form: RotationForm | None = None
     columns: tuple[Column, ...] = ()
     units: tuple[Unit, ...] = ()
     values: FloatArray = np.empty((0, 0))
-    inferences: tuple[Inference, ...] = ()
-    warnings: tuple[LogWarning, ...] = ()
-    uncertainty: str = ""
 
 
 class _Decision(NamedTuple):
-    """The choice, why, what contradicts it, and how its unit is known."""
+    """The choice, and how and why it is known."""
 
     choice: Choice
     why: str
-    warnings: tuple[LogWarning, ...] = ()
     basis: Basis = "named"
 
 
 def settle_rotation(
+    finder: UnitFinder,
     columns: Sequence[Column],
     forms: Sequence[RotationForm],
     values: FloatArray,
-    stated: Sequence[StatedUnit | None],
     arm: Arm | None,
-    base: FloatArray | None = None,
     *,
     form_given: bool = False,
-) -> SettledRotation:
-    """Return form and units of a recorded orientation, and its values in SI.
+) -> Orientation:
+    """Return a recorded orientation in SI; the finder keeps the evidence of its form and unit, and warnings.
 
     Where the arm's kinematics agree in another form or unit than those that are stated, they decide, unless
     the user gave them.
 
     Args:
+        finder: The units of joints and positions, which are settled before.
         columns: The columns.
         forms: The forms that their names allow, or the one that the user gave.
         values: Their values in the file's own units, shape (n, columns).
-        stated: The stated unit of each column, if there is one.
         arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
-        base: Rotation from the recorded frame to the robot's [-], shape (3, 3); None for the same frame.
         form_given: Whether the user gave the form.
     """
     if not columns:
-        return SettledRotation()
-    names = ", ".join(column.name for column in columns)
-    values, warnings = _without_odd_rows(names, values, arm)
+        return Orientation()
+    names, stated = [column.name for column in columns], finder.sources.of_rotation(columns, forms)
+    values, warnings = _without_odd_rows(", ".join(names), values, arm)
+    finder.warnings += warnings
     if np.isnan(values).any(axis=1).all():
-        return SettledRotation(warnings=tuple(warnings))
+        return Orientation()
     choices = [Choice(form, units) for form in forms for units in _possible_units(form, stated)]
     decision = None
     if arm is not None:
-        every = list(dict.fromkeys((*choices, *_other_choices(choices[0].units))))
-        fit = _fit_arm(every, choices, values, arm, base)
+        fit = _fit_arm(choices, values, arm, finder.kinematic.base if finder.kinematic else np.eye(3))
         if fit is not None and fit.is_proof:
             unit_given = any(item and item.by == "user" for item in stated)
-            decision = _decide_by_arm(columns, choices, fit, unit_given=unit_given, form_given=form_given)
+            decision = _decide_by_arm(
+                finder, columns, choices, fit, unit_given=unit_given, form_given=form_given
+            )
         elif fit is not None:
             choices = [fit.choice]
     if decision is None and len({choice.form for choice in choices}) > 1:
-        message = f"{names} may be of several forms: the recorded orientation is not used"
+        message = f"{', '.join(names)} may be of several forms: the recorded orientation is not used"
         hints = tuple(Hint("rotation", form, "specifies it") for form in forms)
-        return SettledRotation(warnings=(*warnings, LogWarning(ORIENTATION, message, hints=hints)))
-    choice, why, objections, basis = decision or _decide_by_values(columns, choices, values, stated)
-    assumed = (warning.message for warning in objections if warning.assumption and basis != "given")
-    inference = form_inference([column.name for column in columns], choice.form, choice.units[0], why, basis)
-    ordered, warnings = tuple(columns[k] for k in choice.order), [*warnings, *objections]
-    return SettledRotation(
-        choice.form,
-        ordered,
-        choice.units,
-        choice.in_si(values),
-        (inference,),
-        tuple(warnings),
-        next(assumed, ""),
-    )
+        finder.warnings.append(LogWarning(ORIENTATION, message, hints=hints))
+        return Orientation()
+    choice, why, basis = decision or _decide_by_values(finder, columns, choices, values, stated)
+    finder.noted.append(form_inference(names, choice.form, choice.units[0], why, basis))
+    finder.warn_not_reached(columns, stated, choice.units, "rotation")
+    ordered = tuple(columns[k] for k in choice.order)
+    return Orientation(choice.form, ordered, choice.units, choice.in_si(values))
 
 
 def form_inference(
@@ -289,25 +275,19 @@ class _ArmFit(NamedTuple):
     is_proof: bool
 
 
-def _fit_arm(
-    every: Sequence[Choice],
-    stated: Sequence[Choice],
-    values: FloatArray,
-    arm: Arm,
-    base: FloatArray | None,
-) -> _ArmFit | None:
+def _fit_arm(stated: Sequence[Choice], values: FloatArray, arm: Arm, base: FloatArray) -> _ArmFit | None:
     """Return the choice with which the arm agrees; None if none stands out.
 
     As it is, else with a turned tool, else with a turned base as well. Of several that agree it is the only
-    stated one. Every choice begins with the stated ones.
+    stated one. The base is the rotation from the recorded frame to the robot's [-], shape (3, 3).
     """
     (robot, q), rows = arm, spread(len(values))
+    every = list(dict.fromkeys((*stated, *_other_choices(stated[0].units))))
     q, values = q[rows], values[rows]
     known = np.isfinite(q).all(axis=1) & np.isfinite((values**2).sum(axis=1))  # huge ones have no direction
     if not known.any() or len(every) < 2:
         return None
-    rotation = poses_over_log(robot, q[known])[1]
-    rotation = rotation if base is None else base.T @ rotation
+    rotation = base.T @ poses_over_log(robot, q[known])[1]
     computed = to_quaternions(rotation.reshape(-1, 9), "matrix")
     recorded = [to_quaternions(choice.in_si(values[known]), choice.form) for choice in every]
     for distances in np.array([rotation_distances(computed, quat) for quat in recorded]).T:
@@ -328,12 +308,18 @@ def _fit_arm(
 
 
 def _decide_by_arm(
-    columns: Sequence[Column], stated: Sequence[Choice], fit: _ArmFit, *, unit_given: bool, form_given: bool
+    finder: UnitFinder,
+    columns: Sequence[Column],
+    stated: Sequence[Choice],
+    fit: _ArmFit,
+    *,
+    unit_given: bool,
+    form_given: bool,
 ) -> _Decision:
     """Return what the arm proves, or what the user gave, with a warning if they differ."""
     best, first = fit.choice, fit.stated if unit_given or form_given else stated[0]
     if best in stated:
-        return _Decision(best, fit.evidence, basis="proved")
+        return _Decision(best, fit.evidence, "proved")
     is_same_form = any((choice.form, choice.by_columns) == (best.form, best.by_columns) for choice in stated)
     was, now = str(first), str(best)
     if best.by_columns:
@@ -347,15 +333,18 @@ def _decide_by_arm(
         hints = unit_hints(columns, now) if is_same_form else (Hint("rotation", best.form, "overrides this"),)
         taken = f"the orientation is {'in ' if is_same_form else ''}{was}"
         warning = LogWarning(UNIT_CONTRADICTION, message, hints=hints, assumption=taken, role="rotation")
-        return _Decision(first, GIVEN, (warning,), "given")
+        finder.warn(columns, warning, by_user=True)
+        return _Decision(first, GIVEN, "given")
     hints = unit_hints(columns, was) if is_same_form else (Hint("rotation", first.form, "overrides this"),)
     if best.by_columns:
         hints = (Hint("rotation", "matrix", "reads it by rows"),)
-    warning = LogWarning(UNIT_CONTRADICTION, f"{message} {now}: {fit.evidence}", hints=hints)
-    return _Decision(best, fit.evidence, (warning,), "proved")
+    message = f"{message} {now}: {fit.evidence}"
+    finder.warnings.append(LogWarning(UNIT_CONTRADICTION, message, hints=hints))
+    return _Decision(best, fit.evidence, "proved")
 
 
 def _decide_by_values(
+    finder: UnitFinder,
     columns: Sequence[Column],
     choices: Sequence[Choice],
     values: FloatArray,
@@ -363,8 +352,7 @@ def _decide_by_values(
 ) -> _Decision:
     """Return one form in its stated unit, with a warning if wraps or size contradict it, or by these.
 
-    A controller writes no orientation of two turns. No verdict rests on a unit that they exclude, unless the
-    user gave it.
+    A controller writes no orientation of two turns.
     """
     choice, why = choices[0], "their names"
     by = [item for item in stated if item and item.by != "urmpipe"]
@@ -376,24 +364,22 @@ def _decide_by_values(
     if len(choices) > 1:  # in rad and in deg
         choice = choices[likely == "deg"]
         if wrapped or size > TWO_TURNS:
-            return _Decision(choice, wrapped[1] if wrapped else f"values of {size:.6g}", basis="proved")
+            return _Decision(choice, wrapped[1] if wrapped else f"values of {size:.6g}", "proved")
         names = ", ".join(column.name for column in columns)
         message = f"no unit is given for {names}: they are taken as {likely}"
-        warning = LogWarning(
-            ASSUMED_UNIT, message, hints=unit_hints(columns, OTHER_UNIT[likely]),
-            assumption=f"the orientation is in {likely}", role="rotation",
-        )  # fmt: skip
-        return _Decision(choice, why, (warning,))
+        hints, assumption = unit_hints(columns, OTHER_UNIT[likely]), f"the orientation is in {likely}"
+        warning = LogWarning(ASSUMED_UNIT, message, hints=hints, assumption=assumption, role="rotation")
+        finder.warn(columns, warning)
+        return _Decision(choice, why)
     unit = choice.units[0].name
     is_confirmed = not wrapped and any(item.is_confirmed for item in by)
     if likely == unit or is_confirmed or not peak(values) > 0:
         return _Decision(choice, why)
     reason = f"values of {size:.6g} {'are more than a turn as rad' if is_large else 'may be rad as well'}"
-    warning = uncertain_unit_warning(columns, by, unit, wrapped[1] if wrapped else reason, "rotation")
-    by_user = by[0].by == "user"
     is_excluded = bool(wrapped) or size > TWO_TURNS
-    warning = replace(warning, blocks_verdict=is_excluded and not by_user)
-    return _Decision(choice, why, (warning,), "given" if by_user else "named")
+    reason = wrapped[1] if wrapped else reason
+    finder.doubt(columns, by, unit, reason, "rotation", is_excluded=is_excluded)
+    return _Decision(choice, why, "given" if by[0].by == "user" else "named")
 
 
 def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | None:

@@ -77,14 +77,12 @@ class StatedUnit(NamedTuple):
         unit: The unit.
         by: Who states it: the user, the column's name, the source, or the name in a file that urmpipe wrote.
         why: The same as text.
-        for_every: Whether a unit that the user gives for every angle reaches the column.
         is_confirmed: Whether the user gives what the name states, or the source that states it.
     """
 
     unit: Unit
     by: Literal["user", "name", "source", "urmpipe"]
     why: str
-    for_every: bool = False
     is_confirmed: bool = False
 
 
@@ -130,12 +128,12 @@ class UnitSources:
             by_urmpipe = self.source is not None and self.source.own
             return StatedUnit(by_name, "urmpipe" if by_urmpipe else "name", "its name")
         if every is not None:
-            return StatedUnit(every, "user", GIVEN, for_every=True, is_confirmed=by_name == every)
+            return StatedUnit(every, "user", GIVEN, is_confirmed=by_name == every)
         default = self.source.units.get(allowed[0]) if self.source else None
         if self.source is None or default is None:
             return None
         why = f"{self.source.name} writes {default.name}"
-        return StatedUnit(default, "source", why, for_every=True, is_confirmed=self.is_source_given)
+        return StatedUnit(default, "source", why, is_confirmed=self.is_source_given)
 
     def find_of_column(self, column: Column, likely: Quantity = "angle") -> Unit | None:
         """Return the unit that the user or the name gives this very column.
@@ -208,28 +206,6 @@ def find_objection(
     return Objection(f"values of {size:.6g} are more than {limit} as rad")
 
 
-def uncertain_unit_warning(
-    columns: Sequence[Column],
-    stated: Collection[StatedUnit],
-    unit: str,
-    why: str,
-    role: Role,
-    *,
-    are_all: bool = True,
-) -> LogWarning:
-    """Return the warning why columns of a role, or all of them, may not be in their unit; it is used."""
-    evidence = " and ".join(sorted({item.why for item in stated}))
-    message = f"{_list_names(columns)}: {unit} ({evidence})"
-    every = role == "joint" and all(item.by == "source" for item in stated)
-    hints = which_unit(columns, unit, every=every)
-    if all(item.by == "user" for item in stated):
-        message, hints = f"{message} is used, though {why}", hints[:1]
-    else:
-        message = f"{message} is doubted: {why}"
-    assumption = f"{_subject(columns, role, are_all=are_all)} in {unit}"
-    return LogWarning(DOUBTED_UNIT, message, hints=hints, assumption=assumption, role=role)
-
-
 def _list_names(columns: Sequence[Column]) -> str:
     return ", ".join(column.name for column in columns)
 
@@ -268,7 +244,8 @@ class UnitFinder:
     Attributes:
         sources: What states units.
         kinematic: The units that the kinematics prove, if they do.
-        warnings: Units that are assumed or uncertain, and contradictions.
+        warnings: Units that are assumed or uncertain, contradictions, rows without an orientation.
+        noted: Inferences about the orientation and a planar position.
         uncertainties: Why the unit of a column is only assumed, by its number.
         uses_source: Whether the source stated a unit.
     """
@@ -276,17 +253,19 @@ class UnitFinder:
     sources: UnitSources
     kinematic: KinematicUnits | None = None
     warnings: list[LogWarning] = field(default_factory=list)
+    noted: list[Inference] = field(default_factory=list)
     uncertainties: dict[int, str] = field(default_factory=dict)
     uses_source: bool = False
-    _notes: dict[tuple[str, str, Basis, bool], list[Column]] = field(default_factory=dict)
+    _notes: dict[tuple[str, str, Basis], list[Column]] = field(default_factory=dict)
 
     @property
     def inferences(self) -> list[Inference]:
-        """The units, columns of one unit and evidence together."""
-        return [
-            unit_inference(columns, unit, why, basis, every=every)
-            for (unit, why, basis, every), columns in self._notes.items()
-        ]
+        """The units, columns of one unit and evidence together, and the others."""
+        inferences = []
+        for (unit, why, basis), columns in self._notes.items():
+            every = all(c.unit is None and c.number not in self.sources.options for c in columns)
+            inferences.append(unit_inference(columns, unit, why, basis, every=every))
+        return [*inferences, *self.noted]
 
     def settle_joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -335,8 +314,7 @@ class UnitFinder:
             allowed = "a unit that fits the data"
             raise LogError(Finding(f"{message}, allowed: {allowed}", self.sources.file, hints=hints))
         if objection.columns or (is_open and not all(item.is_confirmed for item in by)):
-            warning = uncertain_unit_warning(columns, by, unit, objection.why, "joint", are_all=are_all)
-            self._warn(columns, warning, by_user=by_user)
+            self.doubt(columns, by, unit, objection.why, "joint", are_all=are_all)
 
     def settle_rates(self, columns: Sequence[Column], joints: Sequence[Unit], order: int) -> list[Unit]:
         """Return the units of recorded rates (order 1) or accelerations (2): the joints' own by default."""
@@ -360,15 +338,9 @@ class UnitFinder:
         default = _find_common(known, "length")
         if unstated and default is not None:
             self._note(unstated, default, "named", "as the other position columns")
-        elif unstated and size <= MAX_METRES:
-            default = vocabulary().units["m"]
-            self._assume(unstated, default, _ALL_OF["position"], "position", unit_hints(columns[:1], "mm"))
         elif unstated:
-            default = vocabulary().units["mm" if has_joints else "m"]
-            why = f", though values of {size:.6g} reach further than any arm"
-            why = f", as values of {size:.6g} are beyond any arm in m" if has_joints else why
-            hints, is_open = which_unit(columns, "m", every=False), not has_joints
-            self._assume(unstated, default, _ALL_OF["position"], "position", hints, why, is_open=is_open)
+            subject = _ALL_OF["position"]
+            default = self._assume_length(unstated, size, subject, "position", has_joints=has_joints)
         units = [unit or default or vocabulary().units["m"] for unit in known]
         by = {item for item in stated if item and item.by != "urmpipe" and not item.is_confirmed}
         reach = size * units[0].factor if units else 0.0
@@ -376,8 +348,7 @@ class UnitFinder:
             is_far = reach > MAX_REACH
             why = "reach further than any arm" if is_far else "are closer to the origin than any arm works"
             why = f"values of {size:.6g} {why}"
-            warning = uncertain_unit_warning(columns, by, units[0].name, why, "position")
-            self._warn(columns, warning, by_user=all(item.by == "user" for item in by))
+            self.doubt(columns, by, units[0].name, why, "position")
         return units
 
     def _overrule(
@@ -424,13 +395,9 @@ class UnitFinder:
         slides = [j for j in unknown if robot and robot.moving[j].kind == "prismatic"]
         turns = [j for j in unknown if j not in slides]
         if slides:
-            sliding = joints.select(slides)
-            size, why = usual_peak(sliding.values), ""
-            if size > MAX_METRES:
-                why = f", as values of {size:.6g} are beyond any arm in m"
-            unit = vocabulary().units["mm" if why else "m"]
-            hints = unit_hints(sliding.columns, OTHER_UNIT[unit.name])
-            self._assume(sliding.columns, unit, "the prismatic joints are", "joint", hints, why)
+            sliding, subject = joints.select(slides), "the prismatic joints are"
+            size = usual_peak(sliding.values)
+            unit = self._assume_length(sliding.columns, size, subject, "joint", has_joints=True)
             units |= dict.fromkeys(slides, unit)
         if turns:
             turning, angle = joints.select(turns), _find_common(list(units.values()), "angle")
@@ -441,13 +408,28 @@ class UnitFinder:
             units |= dict.fromkeys(turns, angle)
         return [units[j] for j in range(len(joints.columns))]
 
+    def _assume_length(
+        self, columns: Sequence[Column], size: float, subject: str, role: Role, *, has_joints: bool
+    ) -> Unit:
+        """Return m, or beyond any arm mm beside joints; without joints it stays open."""
+        is_far = size > MAX_METRES
+        unit = vocabulary().units["mm" if is_far and has_joints else "m"]
+        why = f", though values of {size:.6g} reach further than any arm"
+        why = f", as values of {size:.6g} are beyond any arm in m" if has_joints else why
+        hints = unit_hints(columns if role == "joint" else columns[:1], OTHER_UNIT[unit.name])
+        hints = which_unit(columns, "m", every=False) if is_far else hints
+        self._assume(
+            columns, unit, subject, role, hints, why if is_far else "", is_open=is_far and not has_joints
+        )
+        return unit
+
     def _settle_angles(self, joints: _Joints, *, may_slide: bool) -> Unit:
         """Return the unit of joints that nothing states: proved by wraps, or assumed.
 
         Raises:
             LogError: If it is to be asked.
         """
-        columns, values = joints.columns, joints.values
+        columns, values, largest = joints.columns, joints.values, peak(joints.values)
         rad, deg = (vocabulary().units[name] for name in ("rad", "deg"))
         each = [(column, x[:, np.newaxis]) for column, x in zip(columns, values.T, strict=True)]
         for unit, proof in ((deg, wraps_as_degrees(values)), (rad, wraps_as_radians(values))):
@@ -457,45 +439,40 @@ class UnitFinder:
             if may_slide and unit == deg:
                 still = [column for column, x in each if peak(x) > 0 and not count_wraps(x, "deg").any()]
             elif may_slide and (large := [column for column, x in each if usual_peak(x) > TWO_TURNS]):
-                raise LogError(self._ask_slides(large, peak(values)))
-            proved = [column for column in columns if column not in still]
-            self._note(proved, unit, "proved", proof, every=True)
+                raise LogError(self._ask_angle(large, largest, large))
+            self._note([column for column in columns if column not in still], unit, "proved", proof)
             if still:
                 hints = (Hint("unit", {"": "deg"}, "confirms it"), *unit_hints(still, "mm", "if they slide"))
                 subject = _subject(still, "joint", are_all=False)
                 self._assume(still, deg, subject, "joint", hints, f", as the others have {proof}")
             return unit
         large = [column for column, x in each if peak(x) > ONE_TURN]
-        if may_slide and len(columns) > 2 and len(large) == 1 and peak(values) > 2 * TWO_TURNS:
-            raise LogError(self._ask_slides(large, peak(values)))
-        fast = too_fast_as_radians(values, joints.t_ns) if peak(values) <= MAX_DEGREES else None
+        if may_slide and len(columns) > 2 and len(large) == 1 and largest > 2 * TWO_TURNS:
+            raise LogError(self._ask_angle(large, largest, large))
+        fast = too_fast_as_radians(values, joints.t_ns) if largest <= MAX_DEGREES else None
         if not fast and usual_peak(values) > TWO_TURNS:
-            raise LogError(self._ask_angle(columns, peak(values), may_slide=may_slide))
+            all_slide = may_slide and len(columns) == MAX_SLIDES
+            sliding = columns if all_slide else () if may_slide else None
+            raise LogError(self._ask_angle(columns, largest, sliding))
         unit, why = (deg, f": {fast}") if fast else (rad, "")
         hints = (Hint("unit", {"": OTHER_UNIT[unit.name]}, "overrides this"),)
         self._assume(columns, unit, _ALL_OF["joint"], "joint", hints, why)
         return unit
 
-    def _ask_slides(self, columns: Sequence[Column], largest: float) -> Finding:
-        """Return the question whether the only columns with values too large for rad are lengths."""
-        message = f"found values up to {largest:.6g} in {_list_names(columns)} alone and no unit"
-        lengths = {column.called: "mm" for column in columns}
-        choices = ({"": "rad", **lengths}, {"": "deg"}, {"": "rad"})
-        hints = tuple(Hint("unit", choice, "specifies it") for choice in choices)
-        allowed = "the unit of a joint that slides, or one unit for all"
-        return Finding(f"{message}, allowed: {allowed}", self.sources.file, hints=hints)
-
-    def _ask_angle(self, columns: Sequence[Column], largest: float, *, may_slide: bool) -> Finding:
-        """Return the question whether joints are in rad or deg."""
+    def _ask_angle(
+        self, columns: Sequence[Column], largest: float, sliding: Sequence[Column] | None
+    ) -> Finding:
+        """Return the question whether joints are in rad or deg, or some in mm; None if no joint may slide."""
+        ticks = "; convert ticks and counts" if largest > MAX_DEGREES else ""
         message = f"found values up to {largest:.6g} in {_list_names(columns)} and no unit"
-        message += ", allowed: rad or deg" + ("; convert ticks and counts" if largest > MAX_DEGREES else "")
-        hints = [Hint("unit", {"": name}, "specifies it") for name in ("rad", "deg")]
+        choices = [{"": "rad"}, {"": "deg"}]
+        choices += [{"": "rad"} | {column.called: "mm" for column in sliding}] if sliding else []
+        hints = [Hint("unit", choice, "specifies it") for choice in choices]
         if all(column.header.isdigit() for column in columns):
-            if may_slide and len(columns) == MAX_SLIDES:
-                hints += unit_hints(columns, "mm", "is for joints that slide")
-            if may_slide and len(columns) in PATH_WIDTHS:
+            if sliding is not None and len(columns) in PATH_WIDTHS:
                 hints.append(Hint("source", "path", "reads x, y, z, and an orientation after them"))
             hints.append(NAME_JOINTS)
+        message += f", allowed: rad or deg{', or mm where they slide' if sliding else ''}{ticks}"
         return Finding(message, self.sources.file, hints=tuple(hints))
 
     def warn_not_reached(
@@ -516,22 +493,46 @@ class UnitFinder:
             hints = unit_hints(some, every.name, "does")
             assumption = f"{_subject(some, role, are_all=len(some) == len(columns))} in {name}"
             warning = LogWarning(UNIT_NOT_REACHED, message, hints=hints, assumption=assumption, role=role)
-            self._warn(some, warning)
+            self.warn(some, warning)
 
     def _note_stated(self, columns: Sequence[Column], stated: Sequence[StatedUnit | None]) -> None:
         for column, item in zip(columns, stated, strict=True):
             if item is not None:
                 basis: Basis = "given" if item.by == "user" else "named"
-                self._note([column], item.unit, basis, item.why, every=item.for_every)
+                self._note([column], item.unit, basis, item.why)
                 self.uses_source |= item.by == "source"
 
-    def _note(
-        self, columns: Sequence[Column], unit: Unit, basis: Basis, why: str, *, every: bool = False
-    ) -> None:
-        """Keep the evidence of a unit, and whether a unit for every angle would reach its columns."""
-        self._notes.setdefault((unit.name, why, basis, every), []).extend(columns)
+    def _note(self, columns: Sequence[Column], unit: Unit, basis: Basis, why: str) -> None:
+        self._notes.setdefault((unit.name, why, basis), []).extend(columns)
 
-    def _warn(self, columns: Sequence[Column], warning: LogWarning, *, by_user: bool = False) -> None:
+    def doubt(
+        self,
+        columns: Sequence[Column],
+        stated: Collection[StatedUnit],
+        unit: str,
+        why: str,
+        role: Role,
+        *,
+        are_all: bool = True,
+        is_excluded: bool = False,
+    ) -> None:
+        """Warn why columns of a role, or all of them, may not be in their unit, which is used.
+
+        No verdict rests on a unit that the values exclude, unless the user gave it.
+        """
+        evidence = " and ".join(sorted({item.why for item in stated}))
+        message, by_user = f"{_list_names(columns)}: {unit} ({evidence})", all(s.by == "user" for s in stated)
+        every = role == "joint" and all(item.by == "source" for item in stated)
+        hints = which_unit(columns, unit, every=every)[: 1 if by_user else None]
+        message += f" is used, though {why}" if by_user else f" is doubted: {why}"
+        assumption = f"{_subject(columns, role, are_all=are_all)} in {unit}"
+        blocks = is_excluded and not by_user
+        warning = LogWarning(
+            DOUBTED_UNIT, message, hints=hints, assumption=assumption, role=role, blocks_verdict=blocks
+        )
+        self.warn(columns, warning, by_user=by_user)
+
+    def warn(self, columns: Sequence[Column], warning: LogWarning, *, by_user: bool = False) -> None:
         """Keep a warning: unless the user gave the unit, it is only assumed."""
         self.warnings.append(warning)
         if not by_user:
@@ -549,8 +550,8 @@ class UnitFinder:
         is_open: bool = False,
     ) -> None:
         """Warn that columns are taken to be in a unit that nothing states or proves."""
-        self._note(columns, unit, "assumed", "assumed", every=unit.quantity == "angle")
+        self._note(columns, unit, "assumed", "assumed")
         names = "" if subject.startswith(_list_names(columns)) else f" for {_list_names(columns)}"
         message = f"no unit is given{names}: {subject} taken as {unit.name}{why}"
         warning = LogWarning(ASSUMED_UNIT, message, hints=tuple(hints), role=role, blocks_verdict=is_open)
-        self._warn(columns, replace(warning, assumption=f"{subject} in {unit.name}"))
+        self.warn(columns, replace(warning, assumption=f"{subject} in {unit.name}"))
