@@ -49,7 +49,6 @@ from urmpipe_pipeline.logs.roles import (
     Roles,
     assign,
     check_not_long_form,
-    joint_inference,
     own_joints,
     signal_roles,
     written_roles,
@@ -215,19 +214,11 @@ def _find_roles(
     if main.header is None and not are_several:
         return without_header(columns, tables.tables, options, robot, path=options.source == PATH)
     if are_several and not options.joints:
-        plots = one_plot_a_file(columns, tables.paths, robot)
-        if plots is not None:
-            return _plot_roles(*plots, tables)
-    try:
-        is_own = tables.known is not None and tables.known.own and not (tables.foreign or options.joints)
-        roles = _roles_by_names(columns, tables, options, robot, own_joints(columns) if is_own else None)
-    except LogError:
-        if are_several:
-            _check_one_log(columns, tables, options, robot)
-        raise
-    if are_several and not options.joints and len({column.table for column in roles.joints}) == 1:
-        _check_one_log(columns, tables, options, None, joints=len(roles.joints))
-    return roles
+        if plots := one_plot_a_file(columns, tables, robot):
+            return plots
+        _check_one_log(columns, tables, options)
+    is_own = tables.known is not None and tables.known.own and not (tables.foreign or options.joints)
+    return _roles_by_names(columns, tables, options, robot, own_joints(columns) if is_own else None)
 
 
 def _roles_by_names(
@@ -250,44 +241,25 @@ def _roles_by_names(
     return roles
 
 
-def _check_one_log(
-    columns: Sequence[Column],
-    tables: Tables,
-    options: LogMap,
-    robot: Chain | None,
-    *,
-    joints: int | None = None,
-) -> None:
-    """Raise a `LogError` if two files or more are separate logs, each with two joints or more.
-
-    If a number of joints is given, only logs with as many count.
-    """
-    logs = []
-    for index, (path, table) in enumerate(zip(tables.paths, tables.tables, strict=True)):
+def _check_one_log(columns: Sequence[Column], tables: Tables, options: LogMap) -> None:
+    """Raise a `LogError` if two files or more are separate logs, each with as many joints, two or more."""
+    counts = dict.fromkeys(tables.paths, 1)
+    for index, path in enumerate(tables.paths):
         of_table = [column for column in columns if column.table == index]
         try:
-            if table.header is None and joints is None:
-                count = sum(not column.text for column in of_table)
+            if all(table.header is None for table in tables.tables):
+                counts[path] = sum(not column.text for column in of_table)
             else:
-                count = len(_roles_by_names(of_table, tables, options, robot).joints)
+                counts[path] = len(_roles_by_names(of_table, tables, options, None).joints)
         except LogError:
             continue
-        logs += [path] if count > 1 and count == (joints or count) else []
+    logs = [path for path, count in counts.items() if count == max(counts.values()) > 1]
     if len(logs) > 1:
         listed_logs = ", ".join(path.name for path in logs[:MAX_LISTED])
         more = f" and {len(logs) - MAX_LISTED} more" if len(logs) > MAX_LISTED else ""
         message = f"found {len(logs)} logs, each with its joints ({listed_logs}{more})"
         allowed = "allowed: one log, or its plots with one joint per file; name the logs one by one"
-        raise LogError(Finding(f"{message}, {allowed}", str(logs[0].parent))) from None
-
-
-def _plot_roles(plots: Sequence[Column], warnings: tuple[LogWarning, ...], tables: Tables) -> Roles:
-    """Return the roles of one plot per file, named by their columns or, if these repeat, by their files."""
-    names = [column.header for column in plots]
-    if len(set(names)) < len(names) or tables.tables[0].header is None:
-        plots = [replace(column, name=tables.titles[column.table]) for column in plots]
-    inference = joint_inference(plots, "one plot per file")
-    return Roles(joints=tuple(plots), inferences=(inference,), warnings=warnings)
+        raise LogError(Finding(f"{message}, {allowed}", str(logs[0].parent)))
 
 
 # Several topics in one table

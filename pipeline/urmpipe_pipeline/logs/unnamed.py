@@ -14,7 +14,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
-from pathlib import Path
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from urmpipe_pipeline.logs.columns import (
     which_joints,
 )
 from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.opening import Tables
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import (
     Pose,
@@ -292,43 +292,38 @@ def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[S
 # 4. Plots
 
 
-def one_plot_a_file(
-    columns: Sequence[Column], paths: Sequence[Path], robot: Chain | None
-) -> tuple[tuple[Column, ...], tuple[LogWarning, ...]] | None:
-    """Return the joint columns, in order, of files that hold one result each; None if one holds more.
+def one_plot_a_file(columns: Sequence[Column], tables: Tables, robot: Chain | None) -> Roles | None:
+    """Return the roles of files that hold one joint each; None if one holds more.
 
-    The order is that of the numbers in the columns' names, if these differ only by a number; else that of
+    Their order is that of the numbers in the columns' names, if these differ only by a number; else that of
     the numbers in the files' names; else the order of the files as given. Where both have numbers and the
-    orders differ, a warning tells it.
+    orders differ, a warning tells it. Columns of one name are called as their files.
 
     Raises:
         LogError: If a number is missing among those of the plots, and there is no robot.
     """
+    paths, titles = tables.paths, tables.titles
     numeric = [column for column in columns if not column.text and not column.counts_rows]
-    if [column.table for column in numeric] != list(range(len(paths))):
-        return None
-    if robot is not None and len(numeric) != len(robot.coordinates):
+    has_others = [column.table for column in numeric] != list(range(len(paths)))
+    if has_others or (robot is not None and len(numeric) != len(robot.coordinates)):
         return None
     by_name = find_numbers([split_unit(column.header)[0] for column in numeric])
     by_file = find_numbers([path.stem for path in paths])
-    numbers = by_name or by_file
-    if numbers is None:
-        return tuple(numeric), ()
+    numbers = by_name or by_file or list(range(len(numeric)))
     missing = [n for n in range(min(numbers), max(numbers)) if n not in numbers]
     if robot is None and missing and len(missing) < len(numbers):  # 1, 2, 4, but not 1, 2, 10
         known = ", ".join(map(str, sorted(numbers)))
         message = f"found plots with the numbers {known} and none with {', '.join(map(str, missing))}"
         message = f"{message}, allowed: a plot for each joint; add the missing one"
         raise LogError(Finding(message, str(paths[0].parent), hints=(NAME_JOINTS,)))
-    in_order, by_files = (
-        tuple(column for _, column in sorted(zip(order, numeric, strict=True), key=lambda pair: pair[0]))
-        for order in (numbers, by_file or numbers)
-    )
-    if in_order == by_files:
-        return in_order, ()
-    names = ", ".join(f"{column.name} of {paths[column.table].name}" for column in in_order)
-    message = "the plots are joined by the numbers of their columns, which are not those of the files"
-    message = f"{message}: {names}"
-    return in_order, (
-        LogWarning("plot-order", message, hints=(Hint("joints", None, "gives another order"),)),
-    )
+    order, warnings = np.argsort(numbers).tolist(), list[LogWarning]()
+    plots = [numeric[k] for k in order]
+    if by_file and order != np.argsort(by_file).tolist():
+        names = ", ".join(f"{column.name} of {paths[column.table].name}" for column in plots)
+        message = "the plots are joined by the numbers of their columns, which are not those of the files"
+        hints = (Hint("joints", None, "gives another order"),)
+        warnings.append(LogWarning("plot-order", f"{message}: {names}", hints=hints))
+    if len({column.header for column in plots}) < len(plots) or tables.tables[0].header is None:
+        plots = [replace(column, name=titles[column.table]) for column in plots]
+    inference = joint_inference(plots, "one plot per file")
+    return Roles(tuple(plots), inferences=(inference,), warnings=tuple(warnings))
