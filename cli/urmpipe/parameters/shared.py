@@ -87,7 +87,10 @@ class TableReading(TextTable, total=False):
     time: Annotated[str | int | None, _reading(kinds.TIME, "Time column; none if the log has none.")]
     unit: Annotated[
         str | Mapping[str, str] | None,
-        _reading(kinds.UNIT, "Unit of angles (rad, deg) where the names give none, or unit of one column."),
+        _reading(
+            kinds.UNIT,
+            "Unit of angles (rad, deg, turn/4096) where the names give none, or unit of one column.",
+        ),
     ]
 
 
@@ -101,7 +104,10 @@ class LogReading(TextTable, total=False):
     time: Annotated[str | int | None, _reading(kinds.TIME_OF_FILE, "Time column; none if the log has none.")]
     unit: Annotated[
         str | Mapping[str, str] | None,
-        _reading(kinds.UNIT, "Unit of angles (rad, deg) where the names give none, or unit of one column."),
+        _reading(
+            kinds.UNIT,
+            "Unit of angles (rad, deg, turn/4096) where the names give none, or unit of one column.",
+        ),
     ]
     source: Annotated[
         str | None, _reading(kinds.SOURCE, "Program that wrote the log: coppeliasim, solidworks, ...")

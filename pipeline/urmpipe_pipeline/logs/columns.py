@@ -567,7 +567,8 @@ def unit_hints(columns: Sequence[Column], unit: str, does: str = "overrides this
 def which_unit(columns: Sequence[Column], unit: str, *, every: bool) -> tuple[Hint, ...]:
     """Return the hints that give some columns the other unit or confirm theirs, as every angle's or each."""
     names = [""] if every else [column.called for column in columns]
-    return tuple(Hint("unit", dict.fromkeys(names, u), "specifies it") for u in (OTHER_UNIT[unit], unit))
+    units = dict.fromkeys((OTHER_UNIT.get(unit, unit), unit))
+    return tuple(Hint("unit", dict.fromkeys(names, u), "specifies it") for u in units)
 
 
 def unit_inference(

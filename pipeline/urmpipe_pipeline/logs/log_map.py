@@ -126,7 +126,7 @@ class LogMap:
         orientation: Names or numbers of the columns of the recorded orientation, in the order of its form.
         rotation: Form of the recorded orientation, as `RotationForm` lists them.
         unit: Unit of a column by its name or number; by "" that of every angle (joints that turn, recorded
-            orientation) of which neither its own name nor the kinematics tell one.
+            orientation) of which neither its own name nor the kinematics tell one; turn/N of N counts.
         period: Time between rows in [s], of a log without a time column.
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
         interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that

@@ -125,9 +125,10 @@ def map_of(
     values |= {"position": () if outside else place, "orientation": () if outside else turn}
     values["unit"] = _unit_entries(log, by_kind, options, values["time"])
     intervals = {name: options.interval.get(name, options.interval.get("")) for name in log.joints}
-    turning = [column.unit in ("rad", "deg") for column in joints]
     values["interval"] = {
-        name: ends for (name, ends), turns in zip(intervals.items(), turning, strict=False) if ends and turns
+        name: ends
+        for (name, ends), unit in zip(intervals.items(), log.joint_units, strict=False)
+        if ends and unit == "rad"
     }
     return LogMap(**values, evidence=dict(_evidence(log, by_kind, options)))
 

@@ -361,7 +361,7 @@ def prove_by_kinematics(robot: Chain | None, recorded: Recorded) -> KinematicUni
 
 def _flip(units: Units, j: int) -> Units:
     """Return units with that of one column exchanged for the other angle."""
-    return (*units[:j], vocabulary().units[OTHER_UNIT[units[j].name]], *units[j + 1 :])
+    return (*units[:j], vocabulary().units[OTHER_UNIT.get(units[j].name, "rad")], *units[j + 1 :])
 
 
 def _scale(units: Units, scale: float) -> Units:
@@ -370,7 +370,7 @@ def _scale(units: Units, scale: float) -> Units:
 
 def _complete(stated: Sequence[Unit | None], quantity: Quantity) -> list[Units]:
     """Return the stated units of columns, those without one in each unit of a quantity."""
-    units = (vocabulary().units[name] for name in vocabulary().spelled(quantity))
+    units = dict.fromkeys(unit for unit in vocabulary().units.values() if unit.quantity == quantity)
     return list(dict.fromkeys(tuple(column or unit for column in stated) for unit in units))
 
 

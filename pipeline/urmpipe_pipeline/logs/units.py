@@ -39,6 +39,7 @@ from urmpipe_pipeline.logs.columns import (
 from urmpipe_pipeline.logs.proofs import (
     MAX_DEGREES,
     ONE_TURN,
+    TURN,
     TWO_TURNS,
     KinematicUnits,
     count_wraps,
@@ -60,6 +61,8 @@ MAX_REACH = 10.0  # [m], of a coordinate; no arm reaches further
 MIN_REACH = 0.02  # [m]; a tool that moves has a larger coordinate
 MAX_METRES = 20.0  # larger values without a unit are not in [m]
 MAX_SLIDES = 3  # joints of a gantry or a delta robot
+COUNTS_PER_TURN = (1024, 4096, 16384, 65536)  # of the encoders of servos and motors
+USUAL_COUNTS = 4096  # Dynamixel, Feetech
 PATH_WIDTHS = (3, 6, 7)  # columns of a path: x, y, z, and three angles or a quaternion
 
 _ALLOWED: dict[JointKind | None, tuple[Quantity, ...]] = {
@@ -144,7 +147,7 @@ class UnitSources:
         if column.number in self.options:
             return self.options[column.number]
         if column.unit_text and column.unit is None:
-            message = f"found the unit {format_value(column.unit_text)}, allowed: rad, deg, m, mm, cm"
+            message = f"found the unit {format_value(column.unit_text)}, allowed: rad, deg, turn/N, m, mm, cm"
             hints = unit_hints([column], "mm" if likely == "length" else "deg", "keeps the values unchanged")
             raise LogError(
                 Finding(f"{message}; convert the values", self.file, column=column.header, hints=hints)
@@ -176,7 +179,7 @@ class Objection(NamedTuple):
 
 
 def find_objection(
-    unit: str, values: FloatArray, t_ns: IntArray | None, turns: float = ONE_TURN
+    unit: Unit, values: FloatArray, t_ns: IntArray | None, turns: float = ONE_TURN
 ) -> Objection | None:
     """Return the objection to a unit of joint values, None if they may be in it.
 
@@ -184,26 +187,28 @@ def find_objection(
     speed, if the values are of more than two turns: of smaller ones the clock may be wrong.
 
     Args:
-        unit: rad or deg.
+        unit: rad, deg or turn/N, whose size alone is compared.
         values: In the file's own units, shape (n, columns).
         t_ns: Times in [ns], shape (n,), or None.
-        turns: Size in [rad] from which values in rad are unlikely.
+        turns: Size in [rad] from which values in rad are unlikely; two turns in counts.
     """
     columns, size = list(enumerate(values.T)), usual_peak(values)
-    if unit == "deg":
+    if unit.name == "deg":
         if wraps := wraps_as_radians(values):
             return Objection(wraps, tuple(j for j, column in columns if peak(column) <= TWO_TURNS))
         is_small = size <= TWO_TURNS and peak(values) > 0
         if not is_small or wraps_as_degrees(values) or too_fast_as_radians(values, t_ns):
             return None
         return Objection(f"values of no more than {peak(values):.6g} may be rad as well")
-    why = wraps_as_degrees(values) or (too_fast_as_radians(values, t_ns) if size > TWO_TURNS else None)
+    why, turns = None, TWO_TURNS if unit.name != "rad" else turns
+    if unit.name == "rad":
+        why = wraps_as_degrees(values) or (too_fast_as_radians(values, t_ns) if size > TWO_TURNS else None)
     if why:
         return Objection(why, tuple(j for j, x in columns if not wraps_as_radians(x[:, np.newaxis])))
-    if size <= turns or wraps_as_radians(values):
+    if size * unit.factor <= turns or wraps_as_radians(values):
         return None
     limit = "a turn" if turns == ONE_TURN else "two turns"
-    return Objection(f"values of {size:.6g} are more than {limit} as rad")
+    return Objection(f"values of {size:.6g} are more than {limit} as {unit.name}")
 
 
 def _list_names(columns: Sequence[Column]) -> str:
@@ -288,10 +293,10 @@ class UnitFinder:
             units, proved = self._overrule(columns, stated, "angle"), self.kinematic.proved
         else:
             units = self._complete_joints(joints, robot)
-        groups: dict[tuple[bool, str], list[int]] = {}
+        groups: dict[tuple[bool, Unit], list[int]] = {}
         for j, item in enumerate(stated):
             if item is not None and item.by != "urmpipe" and units[j].quantity == "angle":
-                groups.setdefault((item.by == "user", units[j].name), []).append(j)
+                groups.setdefault((item.by == "user", units[j]), []).append(j)
         for (by_user, unit), group in groups.items():
             if unproved := [j for j in group if not proved[j]]:
                 is_open = len(unproved) == len(group) and (by_user or 0 not in self.sources.options)
@@ -300,7 +305,7 @@ class UnitFinder:
         self.warn_not_reached(columns, stated, units, "joint")
         return units
 
-    def _compare_stated(self, joints: _Joints, unit: str, *, is_open: bool, are_all: bool) -> None:
+    def _compare_stated(self, joints: _Joints, unit: Unit, *, is_open: bool, are_all: bool) -> None:
         """Compare a stated unit with the values: ask if they contradict it, warn if they are unlikely."""
         columns, by = joints.columns, [item for item in joints.stated if item]
         by_user = all(item.by == "user" for item in by)
@@ -309,12 +314,14 @@ class UnitFinder:
             return
         if objection.columns and not by_user:
             contradicting = [columns[j] for j in objection.columns]
-            message = f"found {_list_names(contradicting)} in {unit} by name or source, but {objection.why}"
-            hints = which_unit(contradicting, unit, every=all(item.by == "source" for item in by))
+            message = (
+                f"found {_list_names(contradicting)} in {unit.name} by name or source, but {objection.why}"
+            )
+            hints = which_unit(contradicting, unit.name, every=all(item.by == "source" for item in by))
             allowed = "a unit that fits the data"
             raise LogError(Finding(f"{message}, allowed: {allowed}", self.sources.file, hints=hints))
         if objection.columns or (is_open and not all(item.is_confirmed for item in by)):
-            self.doubt(columns, by, unit, objection.why, "joint", are_all=are_all)
+            self.doubt(columns, by, unit.name, objection.why, "joint", are_all=are_all)
 
     def settle_rates(self, columns: Sequence[Column], joints: Sequence[Unit], order: int) -> list[Unit]:
         """Return the units of recorded rates (order 1) or accelerations (2): the joints' own by default."""
@@ -439,7 +446,7 @@ class UnitFinder:
             if may_slide and unit == deg:
                 still = [column for column, x in each if peak(x) > 0 and not count_wraps(x, "deg").any()]
             elif may_slide and (large := [column for column, x in each if usual_peak(x) > TWO_TURNS]):
-                raise LogError(self._ask_angle(large, largest, large))
+                raise LogError(self._ask_angle(large, values, large))
             self._note([column for column in columns if column not in still], unit, "proved", proof)
             if still:
                 hints = (Hint("unit", {"": "deg"}, "confirms it"), *unit_hints(still, "mm", "if they slide"))
@@ -448,31 +455,36 @@ class UnitFinder:
             return unit
         large = [column for column, x in each if peak(x) > ONE_TURN]
         if may_slide and len(columns) > 2 and len(large) == 1 and largest > 2 * TWO_TURNS:
-            raise LogError(self._ask_angle(large, largest, large))
+            raise LogError(self._ask_angle(large, values, large))
         fast = too_fast_as_radians(values, joints.t_ns) if largest <= MAX_DEGREES else None
         if not fast and usual_peak(values) > TWO_TURNS:
             all_slide = may_slide and len(columns) == MAX_SLIDES
             sliding = columns if all_slide else () if may_slide else None
-            raise LogError(self._ask_angle(columns, largest, sliding))
+            raise LogError(self._ask_angle(columns, values, sliding))
         unit, why = (deg, f": {fast}") if fast else (rad, "")
         hints = (Hint("unit", {"": OTHER_UNIT[unit.name]}, "overrides this"),)
         self._assume(columns, unit, _ALL_OF["joint"], "joint", hints, why)
         return unit
 
     def _ask_angle(
-        self, columns: Sequence[Column], largest: float, sliding: Sequence[Column] | None
+        self, columns: Sequence[Column], values: FloatArray, sliding: Sequence[Column] | None
     ) -> Finding:
-        """Return the question whether joints are in rad or deg, or some in mm; None if no joint may slide."""
-        ticks = "; convert ticks and counts" if largest > MAX_DEGREES else ""
+        """Return the question whether joints are in rad, deg, counts, or some in mm; None if none slide."""
+        largest, are_whole = peak(values), bool((np.isnan(values) | (values == np.rint(values))).all())
+        finer = [n for n in COUNTS_PER_TURN if largest < n] if are_whole and largest > TURN["deg"] else []
+        counts = dict.fromkeys((*finer[:1], USUAL_COUNTS)) if finer else ()
         message = f"found values up to {largest:.6g} in {_list_names(columns)} and no unit"
-        choices = [{"": "rad"}, {"": "deg"}]
+        choices = [{"": "rad"}, {"": "deg"}, *({"": f"turn/{n}"} for n in counts)]
         choices += [{"": "rad"} | {column.called: "mm" for column in sliding}] if sliding else []
         hints = [Hint("unit", choice, "specifies it") for choice in choices]
         if all(column.header.isdigit() for column in columns):
             if sliding is not None and len(columns) in PATH_WIDTHS:
                 hints.append(Hint("source", "path", "reads x, y, z, and an orientation after them"))
             hints.append(NAME_JOINTS)
-        message += f", allowed: rad or deg{', or mm where they slide' if sliding else ''}{ticks}"
+        allowed = (
+            "rad, deg or turn/N with N counts a turn" if counts or largest > MAX_DEGREES else "rad or deg"
+        )
+        message += f", allowed: {allowed}{', or mm where they slide' if sliding else ''}"
         return Finding(message, self.sources.file, hints=tuple(hints))
 
     def warn_not_reached(
@@ -523,7 +535,7 @@ class UnitFinder:
         evidence = " and ".join(sorted({item.why for item in stated}))
         message, by_user = f"{_list_names(columns)}: {unit} ({evidence})", all(s.by == "user" for s in stated)
         every = role == "joint" and all(item.by == "source" for item in stated)
-        hints = which_unit(columns, unit, every=every)[: 1 if by_user else None]
+        hints = which_unit(columns, unit, every=every)[: -1 if by_user else None]
         message += f" is used, though {why}" if by_user else f" is doubted: {why}"
         assumption = f"{_subject(columns, role, are_all=are_all)} in {unit}"
         blocks = is_excluded and not by_user

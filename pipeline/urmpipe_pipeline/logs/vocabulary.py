@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,7 @@ _INSIDE = re.compile(
 
 _CAPITAL = re.compile(r"(?<=[a-z\d])(?=[A-Z])")
 _BEGINS, _ENDS = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # of a word of letters
+_TURN = re.compile(r"turn/(?P<counts>[1-9][0-9]{0,8})")  # counts of an encoder
 _PER_SECOND = re.compile(r"\s*(?:/|per\s+)\s*(?:s|sec|second|sek)\s*(?:\^|\*\*)?\s*(?P<power>[2²]?)$")
 
 
@@ -35,7 +37,7 @@ class Unit:
     """A unit of a column.
 
     Attributes:
-        name: How urmpipe spells it: rad, deg/s, mm, ...
+        name: How urmpipe spells it: rad, deg/s, mm, turn/4096, ...
         quantity: What it measures.
         factor: To SI: value in SI = factor * value in this unit.
         order: How often time divides it: 0 for deg, 1 for deg/s, 2 for deg/s2.
@@ -162,17 +164,20 @@ class Vocabulary:
         )
 
     def unit(self, text: str) -> Unit | None:
-        """Return the unit that a text means, such as deg, "°", mm or rad/s^2; None if it means none."""
+        """Return the unit that a text means, such as deg, "°", turn/4096, rad/s^2; None if there is none."""
         words = text.strip().lower()
         rate = _PER_SECOND.search(words)
-        base = self.units.get(words[: rate.start()] if rate else words)
+        word = words[: rate.start()] if rate else words
+        counts = _TURN.fullmatch(word)
+        base = Unit(word, "angle", math.tau / int(counts["counts"])) if counts else self.units.get(word)
         if base is None or rate is None:
             return base
         return base.per_second(2 if rate["power"] else 1)
 
     def spelled(self, quantity: Quantity) -> list[str]:
         """Return the names of the units of a quantity."""
-        return list(dict.fromkeys(unit.name for unit in self.units.values() if unit.quantity == quantity))
+        names = dict.fromkeys(unit.name for unit in self.units.values() if unit.quantity == quantity)
+        return [*names, "turn/N"] if quantity == "angle" else [*names]
 
     def source(self, name: str | None) -> KnownSource | None:
         """Return the known source of this name."""
