@@ -14,7 +14,7 @@ of a table of targets are independent: a wrong row is a fault of that row.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -29,7 +29,7 @@ from urmpipe_models.math3d import FORMS, RotationForm, column_count, is_angular,
 from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.logs.clock import DEFAULT_PERIOD, Clock, split_file_column
 from urmpipe_pipeline.logs.columns import Column, columns_of, listed, unit_hints, unit_inference
-from urmpipe_pipeline.logs.formats.cells import DECIMALS, DELIMITERS, count_up, is_number, split_line
+from urmpipe_pipeline.logs.formats.cells import DECIMALS, DELIMITERS, is_number, split_line
 from urmpipe_pipeline.logs.formats.clock_forms import UNREADABLE
 from urmpipe_pipeline.logs.formats.files import unchanged
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
@@ -40,7 +40,7 @@ from urmpipe_pipeline.logs.formats.text import COMMENTS, HeadLine, Segment, head
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.plan import Plan, make_plan
-from urmpipe_pipeline.logs.pose_columns import ORTHOGONAL
+from urmpipe_pipeline.logs.pose_columns import ORTHOGONAL, holds_orientation
 from urmpipe_pipeline.logs.roles import Roles
 from urmpipe_pipeline.logs.rotation import PURE, form_inference
 from urmpipe_pipeline.logs.rows import find_row_errors, unknown_times
@@ -217,7 +217,7 @@ def sniff_targets(
 
     These are the rows with a cell for each name and the most numbers for x, y, z. All lines below the header
     are rows then, except comments and a line of units. If no row is sound, the first line that is no comment
-    may be such a header still, or the next one below a title.
+    may be such a header still, or the next one below a title: a row of zeros shows how it is written.
 
     Raises:
         LogError: If it holds no rows, no numbers below a header without x, y, z, or a header that does not
@@ -225,20 +225,22 @@ def sniff_targets(
         OptionError: As `sniff`.
     """
     lines = list(islice(head_lines(segment), MAX_SAMPLED_ROWS))
-    for place, line in enumerate(lines):
-        below = [other for other in lines[place + 1 :] if not other.is_comment]
-        if sound := _soundest_lines(below, _find_headers(line.text, position)):
-            # The first line may show the delimiter; any other above the header shows nothing.
-            table = sniff(segment, delimiter, decimal, [*lines[: min(place, 1)], line, *sound])
-            is_header = table.header == line.number
-            return _with_rows(table, below) if is_header else sniff(segment, delimiter, decimal)
     body = [line for line in lines if not line.is_comment]
-    for place, line in enumerate(body[:2] if delimiter is None else ()):
-        below = body[place + 1 :]
-        if header := _fitting_header(below, _find_headers(line.text, position)):  # all rows are wrong
-            zeros = replace(below[0], text=header.delimiter.join(["0"] * header.width))
-            table = _with_rows(sniff(segment, None, decimal, [*body[: place + 1], zeros]), below)
-            texts = (line.text for line in below if line.number >= table.first_line)
+    below = {line.number: [other for other in body if other.number > line.number] for line in lines}
+    for line in lines:
+        if sound := _soundest_lines(below[line.number], _find_headers(line.text, position)):
+            # The first line may show the delimiter; any other above the header shows nothing.
+            table = sniff(segment, delimiter, decimal, [*lines[: line is not lines[0]], line, *sound])
+            is_header = table.header == line.number
+            return _with_rows(table, below[line.number]) if is_header else sniff(segment, delimiter, decimal)
+    for line in body[:2] if delimiter is None else ():  # all rows are wrong
+        rows, headers = below[line.number], _find_headers(line.text, position)
+        extra = [[len(split_line(row.text, h.delimiter)) - h.width for row in rows] for h in headers]
+        if rows and headers and not (len(rows) > 1 and [1] * len(rows) in extra):  # an index has no name
+            header = headers[int(np.argmax([cells.count(0) for cells in extra]))]
+            zeros = replace(rows[0], text=header.delimiter.join(["0"] * header.width))
+            table = _with_rows(sniff(segment, None, decimal, [*body[: body.index(line) + 1], zeros]), rows)
+            texts = (row.text for row in rows if row.number >= table.first_line)
             return replace(table, sample=tuple(tuple(split_line(text, header.delimiter)) for text in texts))
     return sniff(segment, delimiter, decimal)
 
@@ -299,20 +301,6 @@ def _soundest_lines(below: Sequence[HeadLine], headers: Sequence[_Header]) -> li
             if (most, len(sound)) > (best[0], len(best[1])):
                 best = most, sound
     return best[1]
-
-
-def _fitting_header(below: Sequence[HeadLine], headers: Sequence[_Header]) -> _Header | None:
-    """Return the header that fits most of some rows; None without one, or if they begin with an index."""
-    fits = []
-    for header in headers if below else ():
-        rows = [split_line(line.text, header.delimiter) for line in below]
-        fits.append((sum(len(cells) == header.width for cells in rows), header, rows))
-    if not fits:
-        return None
-    _, best, rows = max(fits, key=lambda fit: fit[0])
-    is_wider = all(len(cells) == best.width + 1 for cells in rows)
-    is_indexed = is_wider and len(rows) > 1 and count_up([cells[0] for cells in rows])
-    return None if is_indexed or (len(rows) == 1 and _are_units(rows[0])) else best
 
 
 # Rows and their faults
@@ -547,23 +535,20 @@ def _to_rotations(
     Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and has no fault.
     """
     names = tuple(column.header for column in columns)
-    faults = {row: RowFault(reason, names) for row, reason in _iter_no_rotations(values, form)}
-    sound = values.copy()
-    sound[list(faults)] = np.nan
+    if form.startswith("quat"):
+        is_wrong = np.abs(np.linalg.norm(values, axis=1) - 1.0) > MAX_NORM_ERROR
+    else:
+        is_wrong = np.isfinite(values).all(axis=1) & ~holds_orientation(values)
+    faults = {row: RowFault(_no_rotation(values[row]), names) for row in np.flatnonzero(is_wrong).tolist()}
+    sound = np.where(is_wrong[:, np.newaxis], np.nan, values)
     return to_matrices(to_quaternions(sound, form)), faults
 
 
-def _iter_no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int, str]]:
-    """Yield index and reason of rows that hold no rotation: by a quaternion's norm, a matrix's R R^T."""
-    if form.startswith("quat"):
-        norm = np.linalg.norm(values, axis=1)
-        for row in np.flatnonzero(np.abs(norm - 1.0) > MAX_NORM_ERROR).tolist():
-            yield row, f"found a quaternion of norm {norm[row]:.6g}, allowed: 1 within {MAX_NORM_ERROR:g}"
-    elif form == "matrix":
-        r = values.reshape(-1, 3, 3)
-        off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-        with np.errstate(invalid="ignore"):  # rows with NaN, which have faults already
-            det = np.linalg.det(r)
-        for row in np.flatnonzero((off > ORTHOGONAL) | (det < 0)).tolist():
-            fault = f"R R^T off I by {off[row]:.3g} and det R = {det[row]:.3g}"
-            yield row, f"found {fault}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"
+def _no_rotation(values: FloatArray) -> str:
+    """Return why four or nine numbers are no rotation: by a quaternion's norm, a matrix's R R^T."""
+    if len(values) == 4:
+        length = f"found a quaternion of norm {np.linalg.norm(values):.6g}"
+        return f"{length}, allowed: 1 within {MAX_NORM_ERROR:g}"
+    r = values.reshape(3, 3)
+    fault = f"R R^T off I by {np.abs(r @ r.T - np.eye(3)).max():.3g} and det R = {np.linalg.det(r):.3g}"
+    return f"found {fault}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"
