@@ -395,9 +395,7 @@ def _speed_in_s(
     q = tables.tables[main[0].table].values([joint.index for joint in main]) if main else times[:0]
     if len(q) != len(times) or len(q) < 2:
         return None
-    q, turns = joints_in_si(q, main, units, tables.known)
-    steps = np.diff(q, axis=0)
-    steps -= np.rint(steps / FULL_TURN) * turns
+    steps = joint_steps(q, main, units, tables.known)
     durations = times[1:] if clock.are_durations else np.diff(times)
     size = np.fmax.reduce(np.abs(steps), axis=1, initial=0.0)
     moves = (size > MIN_MOTION * np.fmax.reduce(size, initial=0.0)) & (durations > 0)
@@ -405,19 +403,23 @@ def _speed_in_s(
     return float(speeds[int(0.9 * (len(speeds) - 1))]) if len(speeds) else None
 
 
-def joints_in_si(
+def joint_steps(
     values: FloatArray, joints: Sequence[Column], units: Mapping[int, Unit], source: KnownSource | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return joint values in [rad] or [m], shape (..., joints), and the period of each, 0 if it slides.
+) -> FloatArray:
+    """Return the steps of joints between rows, without whole turns, in [rad] or [m], shape (n - 1, joints).
 
-    By the units of the columns; without one, values beyond a turn in rad are taken as deg.
+    Args:
+        values: Joint values in the file's own units, shape (n, joints).
+        joints: Their columns. Without a unit, values beyond a turn in rad are taken as deg.
+        units: Units that the user gives, by the column's number; by 0 that of every angle.
+        source: The program that wrote the log, if it is known.
     """
     angle = source.units.get("angle") if source else None
-    is_beyond = peak(values.reshape(-1, values.shape[-1])) > FULL_TURN
-    usual = angle or vocabulary().units["deg" if is_beyond else "rad"]
+    usual = angle or vocabulary().units["deg" if peak(values) > FULL_TURN else "rad"]
     column_units = [units.get(joint.number) or units.get(0) or joint.unit or usual for joint in joints]
-    is_sliding = np.array([unit.quantity == "length" for unit in column_units])
-    return values * [unit.factor for unit in column_units], np.where(is_sliding, 0.0, FULL_TURN)
+    is_turning = np.array([unit.quantity != "length" for unit in column_units])
+    steps = np.diff(values * [unit.factor for unit in column_units], axis=0)
+    return np.asarray(steps - np.rint(steps / FULL_TURN) * np.where(is_turning, FULL_TURN, 0.0))
 
 
 def even_clock(

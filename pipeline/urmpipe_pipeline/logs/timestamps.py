@@ -28,9 +28,8 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Hint, LogError, format_value
-from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import GAP, Inference, LogWarning
-from urmpipe_pipeline.logs.clock import DEFAULT_PERIOD, Clock, joints_in_si
+from urmpipe_pipeline.logs.clock import DEFAULT_PERIOD, Clock, joint_steps
 from urmpipe_pipeline.logs.clock_columns import GIVEN, OTHER_CLOCK, OTHER_TIME
 from urmpipe_pipeline.logs.columns import Column
 from urmpipe_pipeline.logs.formats.cells import TextCells, is_number
@@ -310,26 +309,11 @@ def _fit_line(timestamps: IntArray, rows: IntArray, resolution: int) -> Regular 
     return Regular(period, resolution, np.rint(line).astype(np.int64) + origin)
 
 
-class Spread(NamedTuple):
-    """Times of rows that shared timestamps.
-
-    Attributes:
-        t_ns: Times of the rows in [ns], strictly increasing, shape (n,).
-        period: Usual time between rows in [ns].
-        is_backwards: Whether they are spread back to the previous timestamp; else up to the next.
-        is_assumed: Whether they are many, and their numbers do not show on which side they belong.
-    """
-
-    t_ns: IntArray
-    period: float
-    is_backwards: bool
-    is_assumed: bool
-
-
-def spread_repeated(timestamps: IntArray) -> Spread | None:
+def spread_repeated(timestamps: IntArray) -> tuple[IntArray, str, str] | None:
     """Return the times of rows of which some share timestamps in [ns], shape (n,), in order; or None.
 
-    Over a gap the rows stay together.
+    They are strictly increasing, in [ns], shape (n,). Over a gap the rows stay together. Also how they are
+    spread, and what is assumed: if they are many, their numbers may not show on which side they belong.
     """
     first_rows = np.flatnonzero(np.diff(timestamps, prepend=timestamps[0] - 1))
     counts, ticks = np.diff(first_rows, append=len(timestamps)), np.diff(timestamps[first_rows])
@@ -340,9 +324,7 @@ def spread_repeated(timestamps: IntArray) -> Spread | None:
     variations = [float(np.log(periods).std()) for periods in (to_next, to_previous)]
     is_backwards = many and variations[1] < MAX_VARIATION_RATIO * variations[0]
     periods, weights = (to_previous, counts[1:]) if is_backwards else (to_next, counts[:-1])
-    order = np.argsort(periods)
-    half = np.searchsorted(np.cumsum(weights[order]), weights.sum() / 2.0)
-    period = float(periods[order][half])  # the median over rows
+    period = float(np.median(np.repeat(periods, weights)))
     is_like = (periods < MAX_PERIOD_RATIO * period) & (periods > period / MAX_PERIOD_RATIO)
     if weights[is_like].sum() < MIN_LIKE * weights.sum():
         return None
@@ -355,7 +337,9 @@ def spread_repeated(timestamps: IntArray) -> Spread | None:
     if (np.diff(times) <= 0).any():
         return None
     is_assumed = many and not is_backwards and variations[0] >= MAX_VARIATION_RATIO * variations[1]
-    return Spread(times, period, is_backwards, is_assumed)
+    side = "back to the time before" if is_backwards else "up to the next time"
+    how = f"rows of one time are spread evenly {side}, usually {period / 1e9:.6g} s apart"
+    return times, how, "rows that share a time were sampled after it" if is_assumed else ""
 
 
 def are_many(count: int, rows: int) -> bool:
@@ -375,20 +359,16 @@ def separate_repeated(numbers: Numbers) -> Numbers:
         warning = LogWarning(REBUILT, f"{seen}: a regular clock of {period} is used instead")
         separate = clock.t_ns
     elif (spread := spread_repeated(times)) is not None:
+        separate, how, assumption = spread
         is_repeated = np.diff(times) == 0
         count = int(np.count_nonzero(is_repeated))
         verb = "repeats" if count == 1 else "repeat"
         seen = f"{count} of {len(times)} rows {verb} the time of the row before"
-        side = "back to the time before" if spread.is_backwards else "up to the next time"
-        done = f"rows of one time are spread evenly {side}"
-        usual = f"{done}, usually {spread.period / 1e9:.6g} s apart"
-        inference = Inference("clock", usual, seen, hints=OTHER_CLOCK)
-        assumption = "rows that share a time were sampled after it" if spread.is_assumed else ""
+        inference = Inference("clock", how, seen, hints=OTHER_CLOCK)
         warning = LogWarning(
-            SPREAD if are_many(count, len(times)) else REPEATED, f"{seen}: {done}",
+            SPREAD if are_many(count, len(times)) else REPEATED, f"{seen}: {how}",
             int(np.argmax(is_repeated)) + 2, hints=OTHER_CLOCK, assumption=assumption, role="time",
         )  # fmt: skip
-        separate = spread.t_ns
     else:
         return numbers
     inferences, warnings = (*numbers.inferences, inference), (*numbers.warnings, warning)
@@ -405,7 +385,7 @@ TURN_QUANTILE = 0.75  # of both: a grid continues straight for some poses, a log
 MIN_JUMPS = 0.03  # share of steps of a grid that are twice their neighbours; three at least
 MIN_PAUSE_NS = 2e9  # median time between rows that are no samples of a motion with such steps
 MIN_STANDSTILL = 0.1  # share of times that repeat or run backwards; a damaged clock has less
-BLOCKS, BLOCK_SIZE = 8, 500  # rows that decide
+MAX_ROWS = 4000  # rows that decide
 _LIKE_POSES = (
     f"no clock, and half of the steps are of {MIN_STEP:g} rad (or m) and more, as between static poses"
 )
@@ -436,10 +416,10 @@ def _find_static_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) 
     poses = _find_large_steps(plan, columns, numbers)
     if poses is None:
         return ""
-    rows, steps, unit = poses
+    rows, steps = poses
     lengths, turned = np.linalg.norm(steps, axis=1), np.linalg.norm(np.diff(steps, axis=0), axis=1)
     is_aimless = _quantile(turned, TURN_QUANTILE) >= MIN_TURN * _quantile(lengths, TURN_QUANTILE)
-    seen = f"the joints step by up to {np.abs(steps).max():.2g} {unit} from row to row, in"
+    seen = f"the joints step by up to {np.abs(steps).max():.2g} rad (or m) from row to row, in"
     if numbers.clock is None:
         jumps = np.count_nonzero(lengths[1:-1] > 2 * np.maximum(lengths[:-2], lengths[2:]))
         if not is_aimless and jumps < max(3, MIN_JUMPS * len(lengths)):
@@ -460,39 +440,27 @@ def _find_static_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) 
 
 def _find_large_steps(
     plan: Plan, columns: Sequence[Column], numbers: Numbers
-) -> tuple[IntArray, FloatArray, str] | None:
-    """Return rows before and after steps between poses, (2, n), the steps, (n, joints), and their unit.
+) -> tuple[IntArray, FloatArray] | None:
+    """Return rows before and after steps between poses, (2, n), and the steps in [rad] or [m], (n, joints).
 
     None if they are those of a motion at the assumed period, or if recorded rates explain them.
     """
     roles = plan.roles
     joints = [columns.index(joint) for joint in roles.joints if joint in columns]
-    count = len(numbers.values)
-    if not joints or len(joints) < len(roles.joints) or count < MIN_ROWS:
+    values = numbers.values[:, joints]
+    rows = np.flatnonzero(np.isfinite(values[:MAX_ROWS]).all(axis=1))
+    if not joints or len(joints) < len(roles.joints) or len(rows) < MIN_ROWS:
         return None
-    rows = np.arange(count)
-    if count > BLOCKS * BLOCK_SIZE:
-        starts = np.linspace(0, count - BLOCK_SIZE, BLOCKS).astype(np.int64)
-        rows = np.add.outer(starts, np.arange(BLOCK_SIZE)).ravel()
-    values = numbers.values[rows[:, np.newaxis], joints]
-    q, turns = joints_in_si(values, roles.joints, plan.units, plan.tables.known)
-    rows, q = rows[is_known := np.isfinite(q).all(axis=1)], q[is_known]
-    steps = np.diff(q, axis=0)
-    steps -= np.rint(steps / FULL_TURN) * turns
+    steps = joint_steps(values[rows], roles.joints, plan.units, plan.tables.known)
     size = np.abs(steps).max(axis=1)
     moves = np.flatnonzero(size > MIN_POSE_STEP)
-    motion = size[moves].sum()
-    if (
-        len(moves) < max(MIN_ROWS - 1, MAX_REST_SHARE * len(size))
-        or size.sum() > (1 + MAX_REST_SHARE) * motion
-    ):
+    are_few = len(moves) < max(MIN_ROWS - 1, MAX_REST_SHARE * len(size))
+    if are_few or size.sum() > (1 + MAX_REST_SHARE) * size[moves].sum():
         return None
     rates = [columns.index(rate) for rate in roles.rates if rate in columns]
-    if _quantile(size[moves], 0.5) <= MIN_STEP or (
-        rates and period_of(numbers.values[:, joints], numbers.values[:, rates])
-    ):
+    if _quantile(size[moves], 0.5) <= MIN_STEP or (rates and period_of(values, numbers.values[:, rates])):
         return None
-    return np.stack([rows[moves], rows[moves + 1]]), steps[moves], "rad" if turns.any() else "m"
+    return np.stack([rows[moves], rows[moves + 1]]), steps[moves]
 
 
 def _quantile(values: FloatArray, share: float) -> float:
