@@ -43,7 +43,7 @@ from urmpipe_pipeline.logs.pose_columns import (
     trailing_pose,
     with_form,
 )
-from urmpipe_pipeline.logs.rates import MAX_JOINTS, SURE, proved_blocks
+from urmpipe_pipeline.logs.rates import MAX_JOINTS, proved_blocks
 from urmpipe_pipeline.logs.roles import (
     GIVEN,
     Roles,
@@ -60,7 +60,6 @@ NO_HEADER = "no header tells what they are"
 TWO_TURNS = 720.0, 2.0 * math.tau  # [deg], [rad]: no joint goes further, as clocks, wheels and counts do
 MAX_SELDOM = 0.2  # a column that moves in a smaller share of the rows than others may be a gripper's
 MAX_UNASKED = 7  # columns that are joints where no robot tells how many there are; more may be blocks
-MIN_SURE_JOINTS = 4  # fewer may go on as others say by chance, where no robot tells how many there are
 USUAL_COUNTS = (6, 7, 5, 4)  # joints of arms, the usual first
 
 
@@ -228,9 +227,9 @@ def _joints_among(
         message = "one column, which always increases, as times do"
         raise which_joints(table.file, message, [free], UNKNOWN, TIMES_OF_ANOTHER)
     blocks = proved_blocks(values, count)
-    if len(blocks) == 1 and (count or len(blocks[0].joints) >= MIN_SURE_JOINTS or blocks[0].weakest >= SURE):
+    if len(blocks) == 1:
         joints, rates = (tuple(free[k] for k in place) for place in (blocks[0].joints, blocks[0].rates))
-        evidence = f"steps and rates correlate by {blocks[0].correlation:.3g}"
+        evidence = f"half of the steps agree within {100 * blocks[0].variation:.2g} %"
         return joints, rates, f"columns {listed(rates)} are their rates: {evidence}"
     odd = find_odd_columns(values)
     if not blocks and count is None and len(free) <= MAX_UNASKED and not odd.any():
