@@ -16,7 +16,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
 from tokenize import TokenError
-from typing import IO, Any, NoReturn, TypeAlias
+from typing import IO, Any, TypeAlias
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
@@ -36,7 +36,7 @@ from urmpipe_models.errors import (
 )
 from urmpipe_pipeline.array_choice import Choice, Name, Question, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.logs.formats.files import question
+from urmpipe_pipeline.logs.formats.files import choice_error
 from urmpipe_pipeline.logs.formats.memory import ROLE, UNIT, MemoryTable, arrow_column
 from urmpipe_pipeline.logs.formats.parquet import is_table
 from urmpipe_pipeline.logs.formats.row_form import spread_names
@@ -132,16 +132,12 @@ def spread_array(name: Name, values: Array, rows: int) -> Iterator[ArrayColumn]:
         yield (*name[:-1], label if name[-1] else label[1:]), "", np.ascontiguousarray(column)
 
 
-def ask_for_arrays(path: Path, open_choice: Question) -> NoReturn:
-    """Raise the question which episode, or which arrays of one length, are read."""
-    values = [value for value, _ in open_choice.choices]
-    shown = ", ".join(values[:MAX_LISTED]) + ", ..." * (len(values) > MAX_LISTED)
-    parts = (
-        f"{len(values)} episodes" if open_choice.option == "episode" else f"arrays of {len(values)} lengths"
-    )
-    if open_choice.requested is not None:
-        parts = f"no {open_choice.option} {open_choice.requested} among {parts}"
-    raise question(path, f"{parts}: {shown}", open_choice.option, open_choice.choices)
+def settle_choice(path: Path, choice: Choice | Question) -> Choice:
+    """Return the arrays of a table; raise the question which episode, or which of several lengths, it is."""
+    if isinstance(choice, Choice):
+        return choice
+    what = "episodes" if choice.option == "episode" else "arrays, each of another length"
+    raise choice_error(path, choice.option, choice.requested, dict(choice.choices), what)
 
 
 # The clock of a number
@@ -231,9 +227,8 @@ def read_numpy(path: Path, options: LogMap) -> MemoryTable:
         if array.dtype.kind in "biufmM" and array.ndim in (1, 2) and array.size > 1
     }
     shapes = {name: array.shape for name, array in tables.items()}
-    choice = choose_arrays(shapes, options.episode, options.topic, separator="/", by_rows=True)
-    if isinstance(choice, Question):
-        ask_for_arrays(path, choice)
+    read = choose_arrays(shapes, options.episode, options.topic, separator="/", by_rows=True)
+    choice = settle_choice(path, read)
     if not choice.names:
         raise LogError(_describe_no_table(path, stored))
     in_order = all(len(name) == 1 and _IN_ORDER.fullmatch(name[0]) for name in tables)

@@ -42,7 +42,8 @@ _PACKED = (".mcap.zstd", ".db3.zstd")  # as a whole, by `ros2 bag record --compr
 _SUFFIXES = (*MAGIC.values(), *_PACKED)
 _ZSTD = b"\x28\xb5\x2f\xfd"  # begins a packed message; one of ROS 2 begins with 0
 _SPLIT = re.compile(r"[-_]?\d+(?=\.[^.]+(\.zstd)?$)")  # what names of the parts of a recording differ by
-_CODECS = {"zstd": "zstd", "lz4": "lz4", "bz2": "bz2"}  # of MCAP and ROS 1, as pyarrow calls them
+_LISTED = re.compile(r"^\s*- (\S+\.(?:mcap|db3)(?:\.zstd)?)\s*$", re.MULTILINE)  # parts, in their metadata
+_CODECS = ("zstd", "lz4", "bz2")  # of MCAP and ROS 1, as pyarrow calls them
 
 
 class Topic(NamedTuple):
@@ -138,26 +139,17 @@ def _list_files(folder: Path) -> list[Path]:
 
 
 def _find_parts(folder: Path) -> tuple[Path, ...]:
-    """Return the files of a recording in a folder."""
-    files = _list_files(folder)
-    if not (folder / METADATA).is_file():
-        if len({_SPLIT.sub("", path.name) for path in files}) > 1:
-            names = ", ".join(path.name for path in files[:6])
-            message = f"found several recordings ({names}), allowed: one, or its parts NAME_0, NAME_1, ..."
-            raise LogError(Finding(f"{message}; give one of the files", str(folder)))
-        return tuple(files)
-    from ruamel.yaml import YAML  # rosbags depends on it
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        text = (folder / METADATA).read_text(encoding="utf-8")
-        names = YAML(typ="safe").load(text)["rosbag2_bagfile_information"].get("relative_file_paths")
-        parts = [folder / Path(name).name for name in names or ()]
-    except (YAMLError, OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise LogError(Finding("found no metadata of a recording of ROS 2", str(folder / METADATA))) from None
+    """Return the files of a recording in a folder: those that its metadata name, else all."""
+    files, metadata = _list_files(folder), folder / METADATA
+    text = metadata.read_text(encoding="utf-8", errors="replace") if metadata.is_file() else ""
+    parts = [folder / name.rpartition("/")[2] for name in _LISTED.findall(text)]
     if missing := [path.name for path in parts if not path.is_file()]:
         message = f"found no {', '.join(missing)}, allowed: every file that {METADATA} names"
         raise LogError(Finding(message, str(folder)))
+    if not parts and len({_SPLIT.sub("", path.name) for path in files}) > 1:
+        names = ", ".join(path.name for path in files[:6])
+        message = f"found several recordings ({names}), allowed: one, or its parts NAME_0, NAME_1, ..."
+        raise LogError(Finding(f"{message}; give one of the files", str(folder)))
     return tuple(parts or files)
 
 
@@ -217,7 +209,7 @@ def _unpack(data: bytes, codec: str, most: int) -> bytes:
     if codec not in _CODECS:
         raise _DamageError(f"messages are packed by {format_value(codec)}, which is not known")
     try:
-        with pa.CompressedInputStream(pa.BufferReader(data), _CODECS[codec]) as stream:
+        with pa.CompressedInputStream(pa.BufferReader(data), codec) as stream:
             unpacked: bytes = stream.read(most + 1)
     except (pa.ArrowException, OSError) as error:
         raise _DamageError(f"packed messages are damaged ({_reason(error)})") from error

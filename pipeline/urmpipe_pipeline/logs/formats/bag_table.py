@@ -22,7 +22,7 @@ from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.formats.bag import Message, make_decoder, open_bag
-from urmpipe_pipeline.logs.formats.files import choice_error, question
+from urmpipe_pipeline.logs.formats.files import choice_error, choose_part, question
 from urmpipe_pipeline.logs.formats.memory import JOINT, ROLE, UNIT, MemoryTable
 from urmpipe_pipeline.logs.formats.text import check_width
 from urmpipe_pipeline.logs.log_map import LogMap
@@ -141,8 +141,8 @@ def _choose_topic(topics: _Topics, option: str | None) -> tuple[str, str, str]:
             name = next((name for name in names if topic in (name, name.lstrip("/"))), None)
             if name and (not frame or topics.kind(name) in TRANSFORMS):
                 return name, frame, "given as an option"
-        allowed = f"a topic of the recording: {topics.format_list(names)}"
-        raise choice_error(topics.path, "topic", option, allowed)
+        described = {name: topics.describe(name) for name in names}
+        raise choice_error(topics.path, "topic", option, described, "topics")
     for kinds in KINDS:
         matching = [name for name in names if topics.kind(name) in kinds]
         if len(matching) == 1:
@@ -150,10 +150,8 @@ def _choose_topic(topics: _Topics, option: str | None) -> tuple[str, str, str]:
         if matching:
             names = matching
             break
-    if len(names) == 1:
-        return names[0], "", "the only one"
-    choices = [(name, topics.describe(name)) for name in names]
-    raise question(topics.path, f"{len(names)} topics that may be the log", "topic", choices)
+    choices = {name: topics.describe(name) for name in names}
+    return choose_part(topics.path, "topic", None, choices, "topics that may be the log"), "", "the only one"
 
 
 # Rows
@@ -224,12 +222,8 @@ def _array_names(fields: Mapping[str, Any]) -> tuple[str, ...]:
 def _select_points(rows: Sequence[_Row], episode: str | None, path: Path, name: str) -> list[_Row]:
     """Return the points of a trajectory or the poses of a path as rows, those of the message `episode`."""
     points = [_fields(row.message).get("points") or _fields(row.message).get("poses") or () for row in rows]
-    if episode is None and len(rows) > 1:
-        choices = [(str(k), format_count(len(part), "point")) for k, part in enumerate(points, start=1)]
-        raise question(path, f"{len(rows)} trajectories of {name}", "episode", choices)
-    number = 1 if episode is None else int(episode) if episode.isdecimal() else 0
-    if not 1 <= number <= len(rows):
-        raise choice_error(path, "episode", episode, f"1 to {len(rows)}, the trajectories of {name}")
+    choices = {str(k): format_count(len(part), "point") for k, part in enumerate(points, start=1)}
+    number = int(choose_part(path, "episode", episode, choices, f"trajectories of {name}"))
     row = rows[number - 1]
     return [row._replace(stamp=_stamp(_fields(point)), message=point) for point in points[number - 1]]
 
@@ -242,15 +236,10 @@ def _select_frame(rows: Sequence[_Row], path: Path, name: str, frame: str) -> tu
             fields = _fields(transform)
             placed = _Row(_stamp(fields), row.log_ns, transform, ())
             frames.setdefault(str(fields.get("child_frame_id", "")), []).append(placed)
-    if not frame and len(frames) > 1:
-        in_order = sorted(frames.items(), key=lambda item: -len(item[1]))
-        choices = [(f"{name}:{child}", format_count(len(part), "transform")) for child, part in in_order]
-        raise question(path, f"{len(frames)} frames of {name} that may be the log", "topic", choices)
-    frame = frame or next(iter(frames), "")
-    if frame not in frames:
-        allowed = f"a frame of {name}: {', '.join([*frames][:MAX_LISTED])}"
-        raise choice_error(path, "topic", frame, allowed)
-    return frames[frame], f"{name}:{frame}"
+    in_order = sorted(frames.items(), key=lambda item: -len(item[1]))
+    choices = {f"{name}:{child}": format_count(len(part), "transform") for child, part in in_order}
+    title = choose_part(path, "topic", f"{name}:{frame}" if frame else None, choices, "frames")
+    return frames[title.removeprefix(f"{name}:")], title
 
 
 def _select_joints(

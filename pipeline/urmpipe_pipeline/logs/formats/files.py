@@ -5,7 +5,7 @@
    bytes go into a file without a name that takes over that number. Other pipes and devices are no logs.
 2. `import_optional`: a library of the extra `logs`, or the error that names it.
 3. `read_separately`: the contents of a file whose library may crash, from a separate process.
-4. `question`: which of several tables of a file is read.
+4. `choose_part`: which of several tables of a file is read.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import re
 import stat
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import islice
@@ -165,12 +165,37 @@ def first_bytes(path: Path, count: int) -> bytes:
         return b""
 
 
+def choose_part(path: Path, option: str, requested: str | None, choices: Mapping[str, str], what: str) -> str:
+    """Return the part of a file that is read: the one that an option requests, or the only one.
+
+    Args:
+        path: The file.
+        option: The option that selects one, such as "episode".
+        requested: Its value, or None.
+        choices: What each value reads, by value.
+        what: What the parts are: "episodes".
+
+    Raises:
+        OptionError: If there is no such part.
+        LogError: With the question which of several parts is read.
+    """
+    if requested in choices or (requested is None and len(choices) == 1):
+        return requested or next(iter(choices))
+    raise choice_error(path, option, requested, choices, what)
+
+
+def choice_error(
+    path: Path, option: str, requested: str | None, choices: Mapping[str, str], what: str
+) -> LogError | OptionError:
+    """Return the error that there is no requested part, or the question which is read; see `choose_part`."""
+    shown = ", ".join([*choices][:MAX_CHOICES]) + ", ..." * (len(choices) > MAX_CHOICES)
+    if requested is None:
+        return question(path, f"{len(choices)} {what}: {shown}", option, choices.items())
+    found = format_value(requested)
+    return OptionError(Finding(file=str(path), parameter=option, found=found, allowed=shown))
+
+
 def question(path: Path, fault: str, option: str, choices: Iterable[tuple[Any, str]]) -> LogError:
     """Return the question which table of a file is read: values of an option, each with what that reads."""
     hints = (Hint(option, value, f"reads {what}") for value, what in islice(choices, MAX_CHOICES))
     return LogError(Finding(file=str(path), found=fault, allowed="one", hints=tuple(hints)))
-
-
-def choice_error(path: Path, option: str, value: str | None, allowed: str) -> OptionError:
-    """Return the error about a table that a file does not have."""
-    return OptionError(Finding(file=str(path), parameter=option, found=format_value(value), allowed=allowed))

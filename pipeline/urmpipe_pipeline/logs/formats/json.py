@@ -24,9 +24,9 @@ import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.files import log_stem
-from urmpipe_pipeline.array_choice import Name, Question, choose_arrays
+from urmpipe_pipeline.array_choice import Name, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.logs.formats.arrays import ask_for_arrays
+from urmpipe_pipeline.logs.formats.arrays import settle_choice
 from urmpipe_pipeline.logs.formats.cells import is_number, printable
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
@@ -116,9 +116,8 @@ def read_json(segment: Segment, options: LogMap) -> MemoryTable | None:
         allowed = "an array of objects, or arrays of one length"
         raise LogError(Finding(file=file, found="JSON without an array of numbers", allowed=allowed))
     shapes = {path: (len(next(iter(columns.values()))),) for path, columns in arrays.items()}
-    choice = choose_arrays(shapes, options.episode, options.topic, separator="/", by_rows=True)
-    if isinstance(choice, Question):
-        ask_for_arrays(segment.path, choice)
+    read = choose_arrays(shapes, options.episode, options.topic, separator="/", by_rows=True)
+    choice = settle_choice(segment.path, read)
     columns = {name: cells for path in choice.names or arrays for name, cells in arrays[path].items()}
     shared = os.path.commonprefix([*columns]).rpartition("/")[0]  # noqa: RUF071 (names, not paths)
     columns = {name.removeprefix(f"{shared}/"): cells for name, cells in columns.items()}

@@ -24,7 +24,7 @@ from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing, is_number, plain, to_float
 from urmpipe_pipeline.logs.formats.clock_forms import UNPADDED_NS
-from urmpipe_pipeline.logs.formats.numbers import MARKS, MIN_MARKS, ClockColumn, Numbers, end_rows
+from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers, end_rows
 
 MAX_SAMPLED_ROWS = 250  # rows whose cells decide how a table is written
 
@@ -159,17 +159,6 @@ class LogTable(ABC):
         """Return all cells of a column as text, without spaces and quotes around them."""
         cells = self._read((), [ClockColumn(column, forms=(UNPADDED_NS,))], {}).texts[0]
         return [cells.text(row).strip(" \"'") for row in range(len(cells))]
-
-    def without_sampled_ends(self) -> Self:
-        """Return the table without sampled rows at the end that hold no sample: they describe no column."""
-        width = min(map(len, self.sample), default=0)
-        last = self.sample[-1][:width] if self.sample else ()
-        if sum(to_float(cell, self.decimal) in MARKS for cell in last) < MIN_MARKS:
-            return self
-        columns = [[to_float(row[k], self.decimal) for row in self.sample] for k in range(width)]
-        numeric = [column for column in columns if None not in column]
-        count = end_rows(np.array(numeric, dtype=np.float64).T) if numeric else 0
-        return replace(self, sample=self.sample[:-count]) if count else self
 
     @cached_property
     def numeric_columns(self) -> tuple[int, ...]:

@@ -20,8 +20,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_pipeline.array_choice import Name, Question, choose_arrays
-from urmpipe_pipeline.logs.formats.arrays import ask_for_arrays, make_array_table, spread_array
+from urmpipe_pipeline.array_choice import Name, choose_arrays
+from urmpipe_pipeline.logs.formats.arrays import make_array_table, settle_choice, spread_array
 from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS
 from urmpipe_pipeline.logs.formats.files import read_separately
 from urmpipe_pipeline.logs.formats.memory import UNIT, MemoryTable, arrow_column
@@ -63,14 +63,14 @@ def read_hdf5(path: Path, options: LogMap) -> MemoryTable:
     check_unpacked_size(path, contents.size)
     if contents.variables is not None:
         return _make_variable_table(path, contents.variables, options)
-    if isinstance(contents.choice, Question):
-        ask_for_arrays(path, contents.choice)
+    assert contents.choice is not None
+    choice = settle_choice(path, contents.choice)
     not_read = [f"{name} {shape}" for name, shape in contents.not_read]
     if not contents.columns:
         shown = ", ".join(not_read[:8]) or "no dataset"
         allowed = "datasets of numbers with one row per sample, such as t (n,) and q (n, joints)"
         raise LogError(Finding(file=str(path), found=shown, allowed=allowed))
-    return make_array_table(path, contents.choice, contents.columns, contents.scalars, "/", options, not_read)
+    return make_array_table(path, choice, contents.columns, contents.scalars, "/", options, not_read)
 
 
 def _unpacked_size(path: Path) -> int:
@@ -95,9 +95,8 @@ def _unpacked_size(path: Path) -> int:
 def _make_variable_table(path: Path, variables: Mapping[str, Any], options: LogMap) -> MemoryTable:
     arrays = dict(_iter_arrays({name: _read_signals(name, value) for name, value in variables.items()}))
     shapes = {name: values.shape for name, values in arrays.items()}
-    choice = choose_arrays(shapes, options.episode, options.topic, separator=".", by_rows=False)
-    if isinstance(choice, Question):
-        ask_for_arrays(path, choice)
+    read = choose_arrays(shapes, options.episode, options.topic, separator=".", by_rows=False)
+    choice = settle_choice(path, read)
     objects = {name: (kind, _csv_command(name, kind)) for name, kind in _iter_objects(variables)}
     if choice.rows < 2:
         shown = (f"{name} ({objects[name][0]})" if name in objects else name for name in [*variables][:8])

@@ -91,8 +91,8 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
     if not files:
         raise OptionError("found no log file, allowed: one, or several if the program writes one per plot")
     if options.source is not None and options.source not in source_names():
-        found, allowed = format_value(options.source), ", ".join(source_names())
-        raise OptionError(Finding(parameter="source", found=found, allowed=allowed))
+        source, allowed = format_value(options.source), ", ".join(source_names())
+        raise OptionError(Finding(parameter="source", found=source, allowed=allowed))
     is_number.cache_clear()  # cells of other logs, which may be long
     contents = map_collecting_errors(lambda file: _open_file(file, options), files)
     texts = [content for content in contents if isinstance(content, Segment)]
@@ -116,7 +116,7 @@ def open_tables(files: Sequence[Path | MemoryTable], options: LogMap, sniff_plai
         oriented = map_collecting_errors(
             lambda table: orient_table(table, options.layout, is_only=is_only), tables
         )
-        tables = [table.without_sampled_ends() for table in choose_rows(oriented, options)]
+        tables = choose_rows(oriented, options)
     in_memory = [content for content in contents if isinstance(content, MemoryTable)]
     stated = next((memory.source for memory in in_memory if memory.source), "")
     forms = (table.form for table in tables if isinstance(table, TextTable) and table.form)
@@ -190,9 +190,12 @@ def _check_no_conflict(segment: Segment) -> None:
         return
     markers = [(line, text.strip(' ,;"')) for line, text in segment.lines() if _MARKER.match(text)]
     if any(text[0] in "<>" for _, text in markers):
-        file, allowed = str(segment.path), "one version, without git's markers"
-        found = [(line, f"{format_value(text)}, a marker of a merge conflict") for line, text in markers]
-        findings = [Finding(file=file, line=line, found=text, allowed=allowed) for line, text in found]
+        file, what = str(segment.path), "a marker of a merge conflict"
+        allowed = "one version, without git's markers"
+        findings = [
+            Finding(file=file, line=line, found=f"{format_value(text)}, {what}", allowed=allowed)
+            for line, text in markers
+        ]
         raise LogError(*capped(findings, file))
 
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.logs.formats.files import choice_error, question
+from urmpipe_pipeline.logs.formats.files import choose_part
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, is_list
 from urmpipe_pipeline.logs.formats.text import check_unpacked_size
 from urmpipe_pipeline.logs.formats.urmpipe_tables import (
@@ -44,7 +44,6 @@ EPISODE = "episode_index"
 CLOCK = "clock [ns]"  # the exact clock of urmpipe's files; their times in s, ms and us are doubles
 FOLDERS_ABOVE = 3  # meta/ is next to the file, or next to data/chunk-000/
 MAX_INFO = 16 << 20  # bytes of meta/info.json, which describes columns
-MAX_LISTED = 9  # episodes that an error names
 
 # Tables in Python
 
@@ -224,16 +223,9 @@ def episode_file(folder: Path, episode: str | None) -> Path:
         raise LogError(Finding(f"found a data set that cannot be read ({reason})", str(folder))) from None
     if not files:
         raise LogError(Finding(file=str(folder), found="a data set without episodes", allowed="one or more"))
-    shown = ", ".join(map(str, [*files][:MAX_LISTED])) + ", ..." * (len(files) > MAX_LISTED)
-    if episode is not None:
-        number = episode.removeprefix(f"{EPISODE}=")
-        if not number.isdecimal() or int(number) not in files:
-            raise choice_error(folder, "episode", episode, f"the number of an episode: {shown}")
-        return files[int(number)]
-    if len(files) > 1:
-        choices = ((str(k), f"episode {k}") for k in files)
-        raise question(folder, f"{len(files)} episodes: {shown}", "episode", choices)
-    return next(iter(files.values()))
+    requested = None if episode is None else episode.removeprefix(f"{EPISODE}=")
+    choices = {str(number): f"episode {number}" for number in files}
+    return files[int(choose_part(folder, "episode", requested, choices, "episodes"))]
 
 
 def _iter_episodes(folder: Path) -> Iterator[tuple[int, Path]]:

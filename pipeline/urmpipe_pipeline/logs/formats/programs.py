@@ -356,10 +356,10 @@ def _read_arrays(program: Program) -> MemoryTable:
     columns = _columns(program, arrays)
     rows = len(next(iter(columns.values())))
     count = f"{format_count(len(arrays), 'array')} of {rows} values"
-    times, inferences = find_even_times(program.path, periods, columns, rows, program.options)
+    times, reasons = find_even_times(program.path, periods, columns, rows, program.options)
     table = pa.table({name: arrow_column(values) for name, values in (times | columns).items()})
-    inferences = (Inference("program", "structured text", count), *inferences)
-    return MemoryTable(program.path.stem, table, path=program.path, inferences=inferences)
+    inference = Inference("program", "structured text", count)
+    return MemoryTable(program.path.stem, table, path=program.path, inferences=(inference, *reasons))
 
 
 def _number(text: str) -> float | None:

@@ -95,7 +95,7 @@ def _check_rows(table: LogTable) -> LogTable:
         return table
     if not names or len(set(names)) < len(names):
         raise _rows_error(table, *values.shape)
-    why = f"{len(rows)} rows begin with a name, and their {values.shape[1]} numbers go on smoothly"
+    why = f"{len(rows)} rows begin with a name, and their {values.shape[1]} numbers continue smoothly"
     return _transpose(table, rows, why, _TABLE)
 
 
@@ -108,26 +108,22 @@ def _check_single(table: LogTable, line: LogTable) -> LogTable:
     ways = flat_ways(x)[:MAX_OFFERED]
     if ways:
         order, count = ways[0]
-        place = f"{count}th behind it" if order == "flat" else f"next, but for {count - 1} jumps"
-        found = f"found {len(x)} numbers one by one that go on smoothly from one to the {place}"
+        place = f"{count}th after it" if order == "flat" else f"next, except {count - 1} jumps"
+        fault = f"found {len(x)} numbers one by one that continue smoothly from one to the {place}"
         effects = {"flat": "numbers a sample", "flat-by-joint": "joints one by one"}
         hints = [Hint("layout", f"{order}:{n}", f"takes {n} {effects[order]}") for order, n in ways]
         hints.append(Hint("layout", AS_TABLE, f"takes {'them' if line.across else 'each'} as a sample"))
-        raise LogError(Finding(f"{found}, which may be a flat array", table.file, hints=tuple(hints)))
+        raise LogError(Finding(f"{fault}, which may be a flat array", table.file, hints=tuple(hints)))
     if len(table.names) > 1 and goes_along_rows(x[np.newaxis]):
         raise _rows_error(table, 1, len(x))
     return table
 
 
 def _rows_error(table: LogTable, rows: int, columns: int) -> LogError:
-    if rows == 1:
-        found = (
-            f"found 1 row of {columns} numbers that goes on smoothly along it, which may be a joint as a row"
-        )
-    else:
-        smooth = f"{columns} numbers that go on smoothly along the rows"
-        found = f"found {rows} rows of {smooth}, which may be joints as rows"
-    return LogError(Finding(found, table.file, hints=(Hint("layout", TRANSPOSED, "applies this"), _TABLE)))
+    count = format_count(rows, "row")
+    fault = f"found {count} of {columns} numbers that continue smoothly along the rows"
+    fault += ", which may be joints as rows"
+    return LogError(Finding(fault, table.file, hints=(Hint("layout", TRANSPOSED, "applies this"), _TABLE)))
 
 
 def goes_along_rows(values: FloatArray) -> bool:
@@ -189,8 +185,8 @@ def _transpose(table: LogTable, rows: _Rows, why: str, *otherwise: Hint) -> LogT
     width = max(map(len, rows))
     short = next((k for k, row in enumerate(rows) if len(row) != width), None)
     if short is not None:
-        found = f"found a row of {len(rows[short])} cells, allowed: {width}, as others have"
-        raise LogError(Finding(found, table.file, row=short + 1))
+        fault = f"found a row of {len(rows[short])} cells, allowed: {width}, as others have"
+        raise LogError(Finding(fault, table.file, row=short + 1))
     names, cells = _split_names(rows, table.decimal)
     texts = (
         [plain(c, table.decimal) if is_number(c, table.decimal) else c or None for c in row] for row in cells
@@ -207,8 +203,8 @@ def _unflatten(table: LogTable, layout: str) -> LogTable:
         raise LogError(*capped(numbers.findings, table.file))
     x = numbers.values.ravel()
     if not len(x) or len(x) % count:
-        found = f"found {len(x)} numbers, allowed with {layout}: a multiple of {count}"
-        raise LogError(Finding(found, table.file))
+        fault = f"found {len(x)} numbers, allowed with {layout}: a multiple of {count}"
+        raise LogError(Finding(fault, table.file))
     columns = x.reshape(-1, count).T if order == "flat" else x.reshape(count, -1)
     return _in_memory(table, [pa.array(column) for column in columns], (), Inference("layout", layout, GIVEN))
 
@@ -285,10 +281,10 @@ def _check_episodes(table: LogTable) -> None:
             for name, rows in list(episodes.items())[:MAX_LISTED]
         ]
         hints.append(Hint("rows", "1:-1", "reads all rows as one log"))
-        found = f"{len(episodes)} episodes: {_list_names(episodes)}"
+        fault = f"{len(episodes)} episodes: {_list_names(episodes)}"
         column_name = table.names[column]
         raise LogError(
-            Finding("", table.file, column=column_name, found=found, allowed="one", hints=tuple(hints))
+            Finding("", table.file, column=column_name, found=fault, allowed="one", hints=tuple(hints))
         )
 
 
@@ -315,8 +311,8 @@ def _choose_episode(table: LogTable, episode: str) -> LogTable | None:
 
 
 def _unknown_episode(table: LogTable, episode: str, allowed: str) -> OptionError:
-    found = format_value(episode)
-    return OptionError(Finding("", table.file, parameter="episode", found=found, allowed=allowed))
+    fault = format_value(episode)
+    return OptionError(Finding("", table.file, parameter="episode", found=fault, allowed=allowed))
 
 
 def _episode_columns(table: LogTable) -> list[int]:

@@ -16,16 +16,16 @@ from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 from urmpipe_models.display import format_count
-from urmpipe_models.errors import Finding, Hint, LogError, format_value
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.file_contents import Cell, Row, Sheet, clock_text
 from urmpipe_pipeline.joint_log import Basis, Inference
 from urmpipe_pipeline.logs.formats.cells import is_number
 from urmpipe_pipeline.logs.formats.files import (
     choice_error,
+    choose_part,
     first_bytes,
     import_optional,
     password_error,
-    question,
     read_separately,
 )
 from urmpipe_pipeline.logs.formats.text import Segment, check_unpacked_size, text_segment
@@ -86,19 +86,20 @@ def _choose_sheet(path: Path, sheets: Sequence[Sheet], requested: str | None) ->
     """Return a sheet, and why it is chosen."""
     names = [sheet.name for sheet in sheets]
     if requested is not None:
-        number = int(requested) if requested.isdecimal() and requested.isascii() else 0
-        if requested not in names and not 1 <= number <= len(names):
-            raise choice_error(path, "sheet", requested, ", ".join(map(format_value, names)))
-        return sheets[names.index(requested) if requested in names else number - 1], "given as an option"
+        by_number = {str(number): name for number, name in enumerate(names, start=1)}
+        requested = requested if requested in names else by_number.get(requested, requested)
+        chosen = choose_part(path, "sheet", requested, dict.fromkeys(names, ""), "sheets")
+        return sheets[names.index(chosen)], "given as an option"
     shown = [sheet for sheet in sheets if sheet.is_shown] or sheets
     tables = [sheet for sheet in shown if _numeric_rows(sheet, 2) > 1]
     tables = tables or [sheet for sheet in shown if _numeric_rows(sheet, 1) > 1]
     if len(tables) == 1:
         return tables[0], "the only sheet" if len(names) == 1 else "the only sheet with a table"
     if tables:
-        counts = ((sheet.name, format_count(_numeric_rows(sheet, 1), "row")) for sheet in tables)
-        choices = ((name, f"its {count} of numbers") for name, count in counts)
-        raise question(path, f"{len(tables)} sheets with a table", "sheet", choices)
+        counts = {
+            sheet.name: f"its {format_count(_numeric_rows(sheet, 1), 'row')} of numbers" for sheet in tables
+        }
+        raise choice_error(path, "sheet", None, counts, "sheets with a table")
     fault = f"no rows of numbers in {format_count(len(shown), 'sheet')} ({', '.join(names)})"
     allowed = "a table with one row per sample"
     values = Hint(
