@@ -12,7 +12,7 @@ import math
 import re
 import struct
 import zlib
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
 from tokenize import TokenError
@@ -94,15 +94,13 @@ def make_array_table(
     if "topic" not in choice.applied:
         groups = zip(*(name[:-1] for name, _, _ in columns), strict=False)
         shared = sum(1 for _ in takewhile(lambda same: len(set(same)) == 1, groups))
-    clocks = {k: values for k, (name, _, values) in enumerate(columns) if has_clock(name[-1:])}
-    first = next(iter(clocks.values()), None)
-    same = [k for k, values in clocks.items() if first is not None and np.array_equal(values, first)]
-    is_unique = len(same) == len(clocks)
+    clocks = [k for k, (name, _, _) in enumerate(columns) if has_clock(name[-1:])]
+    is_unique = all(np.array_equal(columns[k][2], columns[clocks[0]][2]) for k in clocks)
     named: dict[str, tuple[str, Array]] = {}
     for k, (name, unit, values) in enumerate(columns):
-        if is_unique and k in same[1:]:
+        if is_unique and k in clocks[1:]:
             continue
-        label = name[-1] if is_unique and k in same else separator.join(name[shared:])
+        label = name[-1] if is_unique and k in clocks else separator.join(name[shared:])
         named[label if label not in named else separator.join(name)] = unit, values
     numbers = {} if is_named is False else scalars
     times, reasons = find_even_times(path, numbers, named, choice.rows, options)
@@ -383,34 +381,32 @@ def _times(t: Any) -> Array:
 
 def _joints(q: Any) -> FloatArray:
     """Return joint values as an array of shape (n, joints)."""
-    array = _numbers("q", q, JOINTS)
-    if array.ndim != 2 or not array.size:
-        raise _shape_error("q", q, JOINTS)
-    return array
+    return _numbers("q", q, JOINTS, lambda array: array.ndim == 2)
 
 
 def _poses(poses: Any) -> FloatArray:
     """Return positions, and quaternions where there are orientations, of shape (n, 3) or (n, 7)."""
-    array = _numbers("recorded_tcp", poses, POSES)
-    if array.ndim == 2 and len(array) and array.shape[1] in (3, 7):
+    shapes = (3,), (7,), (4, 4)
+    array = _numbers("recorded_tcp", poses, POSES, lambda array: array.shape[1:] in shapes)
+    if array.ndim == 2:
         return array
-    if array.ndim != 3 or not len(array) or array.shape[1:] != (4, 4):
-        raise _shape_error("recorded_tcp", poses, POSES)
     from urmpipe_models.math3d import to_quaternions
 
     quaternions = to_quaternions(array[:, :3, :3].reshape(-1, 9), "matrix")
     return np.column_stack([array[:, :3, 3], quaternions])
 
 
-def _numbers(parameter: str, value: Any, allowed: str) -> FloatArray:
-    """Return numbers as an array, NaN where they are masked."""
+def _numbers(parameter: str, value: Any, allowed: str, fits: Callable[[FloatArray], bool]) -> FloatArray:
+    """Return numbers of a shape that fits as an array, NaN where they are masked."""
     try:
         array = np.ma.asanyarray(value)
-        if is_table(value) or array.dtype.kind == "c":
-            raise _shape_error(parameter, value, allowed)
-        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan), dtype=np.float64)
+        if not is_table(value) and array.dtype.kind != "c":
+            numbers = np.asarray(np.ma.filled(array.astype(np.float64), np.nan))
+            if numbers.size and fits(numbers):
+                return numbers
     except (TypeError, ValueError):
-        raise _shape_error(parameter, value, allowed) from None
+        pass
+    raise _shape_error(parameter, value, allowed)
 
 
 def _shape_error(parameter: str, value: Any, allowed: str) -> OptionError:

@@ -4,8 +4,7 @@
 2. `Bag.read`: the messages of a topic with their log times, until the recording ends or is damaged.
 3. `make_decoder`: the function that decodes the messages of a topic.
 
-Libraries' own readers need the index at the end of a file, which a recording that was cut does not have; and
-messages are unpacked here, as pyarrow does, since a damaged size would take all memory.
+Libraries' own readers need the index at the end of a file, which a recording that was cut does not have.
 
 Sources: the MCAP specification, the ROS bag format 2.0, rosbag2_storage_sqlite3 (tables `topics`, `messages`,
 `message_definitions`), rosbag2_storage (`metadata.yaml`).
@@ -17,11 +16,9 @@ import json
 import re
 import sqlite3
 import struct
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
-from dataclasses import replace
 from io import BytesIO
 from os.path import isdir  # Path raises for a name that no file can have
 from pathlib import Path
@@ -280,30 +277,24 @@ def _mcap_messages(file: Path) -> Iterator[Message]:
 
 def _mcap_records(file: Path) -> Iterator[Any]:
     """Yield the records of an MCAP file, those of its chunks unpacked and checked."""
-    from mcap.exceptions import McapError
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader, breakup_chunk
 
-    most = unpacked_limit(file.stat().st_size)
+    size = file.stat().st_size
     with file.open("rb") as stream:
         exact: Any = _ExactStream(stream)
-        records = StreamReader(exact, emit_chunks=True, record_size_limit=file.stat().st_size).records
-        while True:
-            try:
-                record = next(records, None)
-                inner = [record]
-                if isinstance(record, Chunk):
-                    data = record.data
-                    if record.compression:
-                        data = _unpack(data, record.compression, min(most, record.uncompressed_size))
-                    if record.uncompressed_crc and zlib.crc32(data) != record.uncompressed_crc:
-                        raise _DamageError("a checksum does not fit the messages")
-                    inner = [*breakup_chunk(replace(record, compression="", data=data))]
-            except (McapError, ValueError, struct.error, MemoryError) as error:
-                raise _DamageError(f"holds a damaged record ({_reason(error)})") from error
-            if record is None:
-                return
-            yield from inner
+        try:
+            for record in StreamReader(exact, emit_chunks=True, record_size_limit=size).records:
+                if not isinstance(record, Chunk):
+                    yield record
+                    continue
+                if record.uncompressed_size > unpacked_limit(size):
+                    raise _DamageError(f"messages unpack to {record.uncompressed_size} bytes")
+                yield from breakup_chunk(record, validate_crc=True)
+        except _DamageError:
+            raise
+        except Exception as error:  # lz4 and zstandard raise their own
+            raise _DamageError(f"holds a damaged record ({_reason(error)})") from error
 
 
 # ROS 2 in SQLite

@@ -327,26 +327,21 @@ def _build_table(
 ) -> pa.Table:
     """Return rows as a table, and add inferences and warnings about its clock and its columns."""
     large = set[str]()
-    blocks = dict[tuple[str, ...], tuple[list[int], list[list[Any]]]]()  # rows with the same numbers
-    for place, row in enumerate(rows):
-        labels, numbers = list[str](), list[Any]()
-        for more, values in _values(row.message, row.names, large):
-            labels += more
-            numbers += values
-        places, block = blocks.setdefault(tuple(labels), ([], []))
-        places.append(place)
-        block.append(numbers)
-    times, called = _choose_clock(rows, topic, clock, inferences, warnings)
     columns = dict[str, list[Any]]()
-    for names, (places, block) in blocks.items():
-        if twice := [name for name, count in Counter(names).items() if count > 1]:
-            message = f"message {places[0] + 1} of {topic} has {twice[0]} twice, allowed: each name once"
+    for place, row in enumerate(rows):
+        labels = list[str]()
+        for names, values in _values(row.message, row.names, large):
+            labels += names
+            for name, value in zip(names, values, strict=True):
+                if name not in columns:
+                    columns[name] = [None] * len(rows)
+                    check_width(len(columns), str(path))
+                columns[name][place] = value
+        if len(set(labels)) < len(labels):
+            twice = Counter(labels).most_common(1)[0][0]
+            message = f"message {place + 1} of {topic} has {twice} twice, allowed: each name once"
             raise LogError(Finding(message, str(path)))
-        check_width(len({*columns, *names}), str(path))
-        for name, values in zip(names, zip(*block, strict=True), strict=True):
-            column = columns.setdefault(name, [None] * len(rows))
-            for place, value in zip(places, values, strict=True):
-                column[place] = value
+    times, called = _choose_clock(rows, topic, clock, inferences, warnings)
     arrays = [_array(times)]
     fields = [pa.field(called, arrays[0].type, metadata={UNIT: b"ns"})]
     joints = {name for names in {row.names for row in rows} for name in names}

@@ -13,20 +13,21 @@ Numbers are read from their text, so that they have the same values as in a CSV 
 from __future__ import annotations
 
 import json
-import os.path
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 from typing import Any
 
-import pyarrow as pa
+import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.files import log_stem
 from urmpipe_pipeline.array_choice import Name, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.logs.formats.arrays import settle_choice
+from urmpipe_pipeline.logs.formats.arrays import Array, make_array_table, settle_choice
 from urmpipe_pipeline.logs.formats.cells import is_number, printable
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
@@ -119,19 +120,19 @@ def read_json(segment: Segment, options: LogMap) -> MemoryTable | None:
     read = choose_arrays(shapes, options.episode, options.topic, separator="/", by_rows=True)
     choice = settle_choice(segment.path, read)
     columns = {name: cells for path in choice.names or arrays for name, cells in arrays[path].items()}
-    shared = os.path.commonprefix([*columns]).rpartition("/")[0]  # noqa: RUF071 (names, not paths)
-    columns = {name.removeprefix(f"{shared}/"): cells for name, cells in columns.items()}
     named = not all(re.fullmatch(r"\[\d+\]", name) for name in columns)
     if not named and not any(is_number(cells[0], ".") for cells in columns.values()):
         columns = {cells[0]: cells[1:] for cells in columns.values()}  # names in the first row
         named = True
-    table = pa.table({name: _column(cells) for name, cells in columns.items()})
-    inferences = [Inference("JSON", "a document", "its beginning")]
-    if choice.names and choice.left_out:
-        names = ", ".join(name for path in choice.left_out for name in arrays[path])
-        inferences.append(Inference("arrays left out", names, "they have other lengths"))
-    stem = log_stem(segment.path)
-    return MemoryTable(stem, table, named, segment.path, tuple(inferences), choice.applied)
+    values = ((tuple(name.split("/")), "", _column(cells)) for name, cells in columns.items())
+    entries = document.items() if isinstance(document, dict) else ()
+    scalars = {
+        key: float(value) for key, value in entries if isinstance(value, str) and is_number(value, ".")
+    }
+    unused = [name for path in choice.left_out for name in arrays[path]] if choice.names else []
+    table = make_array_table(segment.path, choice, values, scalars, "/", options, unused, is_named=named)
+    inferences = (Inference("JSON", "a document", "its beginning"), *table.inferences)
+    return replace(table, name=log_stem(segment.path), inferences=inferences)
 
 
 def _is_json_lines(segment: Segment) -> bool:
@@ -196,16 +197,12 @@ def _columns(name: str, array: Sequence[Any], file: str) -> dict[str, list[str]]
     return {key: [record.get(key, "") for record in records] for key in names}
 
 
-def _column(cells: Sequence[str]) -> pa.Array:
+def _column(cells: Sequence[str]) -> Array:
     """Return cells as numbers; as texts if they are not numbers, or have more digits than a double."""
-    texts = pa.array([cell or None for cell in cells], pa.string())
-    if any(
-        len(cell) > MAX_DIGITS and sum(map(str.isdigit, cell.lstrip("-0."))) > MAX_DIGITS for cell in cells
-    ):
-        return texts
-    for kind in (pa.int64(), pa.float64()):
-        try:
-            return texts.cast(kind)
-        except pa.ArrowInvalid:
-            continue
-    return texts
+    digits = (sum(map(str.isdigit, cell.lstrip("-0."))) for cell in cells if len(cell) > MAX_DIGITS)
+    if not any(count > MAX_DIGITS for count in digits):
+        filled = np.array([cell or "nan" for cell in cells])
+        for kind in (np.int64, np.float64):
+            with suppress(ValueError, OverflowError):
+                return filled.astype(kind)
+    return np.array([cell or None for cell in cells], dtype=object)

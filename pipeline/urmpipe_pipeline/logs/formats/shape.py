@@ -322,9 +322,10 @@ def _episode_columns(table: LogTable) -> list[int]:
 
 def _find_episodes(table: LogTable, column: int) -> _Episodes:
     """Return the rows of each value of a column, in the order in which the values appear."""
-    rows: dict[str, list[int]] = {}
-    for row, text in enumerate(table.texts(column)):
-        rows.setdefault(_without_decimals(text), []).append(row)
+    texts, rows = table.texts(column), dict[str, list[int]]()
+    names = {text: _without_decimals(text) for text in set(texts)}
+    for row, text in enumerate(texts):
+        rows.setdefault(names[text], []).append(row)
     return {name: np.array(of_name, dtype=np.int64) for name, of_name in rows.items()}
 
 
