@@ -320,25 +320,20 @@ def _decide_by_arm(
     best, first = fit.choice, fit.stated if unit_given or form_given else stated[0]
     if best in stated:
         return _Decision(best, fit.evidence, "proved")
-    is_same_form = any((choice.form, choice.by_columns) == (best.form, best.by_columns) for choice in stated)
-    was, now = str(first), str(best)
-    if best.by_columns:
-        was, now = "matrix by rows", "matrix by columns"
-    elif is_same_form:
-        was, now = first.units[0].name, best.units[0].name
+    is_same_form = best.form in {choice.form for choice in stated} and not best.by_columns
+    by_user = unit_given if is_same_form else form_given
+    other = best if by_user else first
+    hints = unit_hints(columns, other.units[0].name)
+    hints = hints if is_same_form else (Hint("rotation", other.form, "overrides this"),)
     names = ", ".join(column.name for column in columns)
-    message = f"{names}: {was} contradicts the kinematics: taken as"
-    if unit_given if is_same_form else form_given:
-        message = f"{message} {was}, though as {now} it would fit: {fit.evidence}"
-        hints = unit_hints(columns, now) if is_same_form else (Hint("rotation", best.form, "overrides this"),)
-        taken = f"the orientation is {'in ' if is_same_form else ''}{was}"
+    message = f"{names}: {first} contradicts the kinematics: taken as"
+    if by_user:
+        message, taken = f"{message} {first}, though as {best} it would fit", f"the orientation is {first}"
+        message += f": {fit.evidence}"
         warning = LogWarning(UNIT_CONTRADICTION, message, hints=hints, assumption=taken, role="rotation")
         finder.warn(columns, warning, by_user=True)
         return _Decision(first, GIVEN, "given")
-    hints = unit_hints(columns, was) if is_same_form else (Hint("rotation", first.form, "overrides this"),)
-    if best.by_columns:
-        hints = (Hint("rotation", "matrix", "reads it by rows"),)
-    message = f"{message} {now}: {fit.evidence}"
+    message = f"{message} {best}: {fit.evidence}"
     finder.warnings.append(LogWarning(UNIT_CONTRADICTION, message, hints=hints))
     return _Decision(best, fit.evidence, "proved")
 
