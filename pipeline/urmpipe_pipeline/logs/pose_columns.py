@@ -197,38 +197,31 @@ def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
         LogError: If there is no such column.
         OptionError: If there are too few or too many for a position or for the form of the orientation.
     """
-    widths = str(column_count(options.rotation)) if options.rotation else "3, 4 or 9"
-    if options.measured:
-        named = chosen_columns(columns, options.measured, parameter="measured")
-        position, rotation = named[:3], named[3:]
-        forms = _forms_of(rotation, options)
-        if len(position) != 3 or (rotation and not forms):
-            allowed = f"x, y, z, and {widths} of the orientation behind them, or none"
-            count = format_count(len(named), "column")
-            raise OptionError(Finding(parameter="measured", found=count, allowed=allowed))
-        return Pose(position, rotation, forms, "given as an option", measured=True)
-    if not options.position:
+    if not (options.position or options.measured):
         if options.orientation:
             hint = Hint("position", None, "names x, y, z")
             message = "found without a position, allowed: beside x, y, z"
             raise OptionError(Finding(message, parameter="orientation", hints=(hint,)))
         return None
-    position = chosen_columns(columns, options.position, about="position")
-    rotation = chosen_columns(columns, options.orientation, about="orientation")
-    if len(position) not in (2, 3):
-        allowed = "x, y, z, or x, y of a planar arm"
-        raise OptionError(f"position: found {format_count(len(position), 'column')}, allowed: {allowed}")
-    forms = _forms_of(rotation, options)
+    if is_outside := bool(options.measured):
+        named = chosen_columns(columns, options.measured, parameter="measured")
+        position, rotation = named[:3], named[3:]
+    else:
+        position = chosen_columns(columns, options.position, parameter="position")
+        rotation = chosen_columns(columns, options.orientation, parameter="orientation")
+    if len(position) != 3 and (is_outside or len(position) != 2):
+        parameter = "measured" if is_outside else "position"
+        allowed = "x, y, z, and an orientation or none" if is_outside else "x, y, z, or x, y of a planar arm"
+        count = format_count(len(position), "column")
+        raise OptionError(Finding(parameter=parameter, found=count, allowed=allowed))
+    forms = [form for form in FORMS if column_count(form) == len(rotation)] if rotation else []
+    forms = [form for form in forms if options.rotation in (None, form)]
     if rotation and not forms:
-        allowed = f"{widths}, as {options.rotation} has" if options.rotation else widths
-        raise OptionError(f"orientation: found {format_count(len(rotation), 'column')}, allowed: {allowed}")
-    return Pose(position, rotation, forms, "given as an option")
-
-
-def _forms_of(rotation: Sequence[Column], options: LogMap) -> tuple[RotationForm, ...]:
-    """Return the forms that so many columns of an orientation may have; none of none."""
-    forms = [form for form in FORMS if rotation and column_count(form) == len(rotation)]
-    return tuple(form for form in forms if options.rotation in (None, form))
+        of_form = f"{column_count(options.rotation)}, as {options.rotation} has" if options.rotation else ""
+        parameter = "measured" if is_outside else "orientation"
+        count = format_count(len(rotation), "column") + " behind x, y, z" * is_outside
+        raise OptionError(Finding(parameter=parameter, found=count, allowed=of_form or "3, 4 or 9"))
+    return Pose(position, rotation, tuple(forms), "given as an option", measured=is_outside)
 
 
 def with_form(pose: Pose, form: RotationForm | None) -> Pose:
