@@ -2,7 +2,7 @@
 
 1. `coverage_warnings`: columns that are named like the joints, or have their unit where names share no word.
 2. `passed_over_warnings`: groups of the same names, passed over for those measured.
-3. `beside_path_warnings`, `orientation_warnings`, `tcp_warnings`: what may be joints, an orientation or a
+3. `path_warnings`, `orientation_warnings`, `tcp_warnings`: what may be joints, an orientation or a
    tool centre point under names that are not known.
 """
 
@@ -22,12 +22,12 @@ from urmpipe_pipeline.logs.vocabulary import vocabulary
 
 COLUMNS_NOT_READ = "columns-not-read"
 TCP_NOT_READ = "tcp-not-read"
-MIN_JOINTS_BESIDE_PATH = 3  # fewer columns are a radius, a speed, a flag
+MIN_JOINTS = 3  # fewer columns are a radius, a speed, a flag
 
 _TOOL = frozenset({"tcp", "tool", "pose", "cartesian"})  # words of the tool itself
-_BESIDE_TOOL = frozenset(["analog", "digital", "input", "output", "in", "out", "bits", "offset", "payload"])
+_TOOL_VALUES = frozenset(["analog", "digital", "input", "output", "in", "out", "bits", "offset", "payload"])
 _NEAR_TOOL = re.compile(r"(tcp|tpc|ctp|tool|tip|eef|endeff|werkzeug)|(?:^|_)ee(?:_|$)")  # also misspelled
-_TORQUES = re.compile(r"[tp]_?[xyz]")  # names of a position that forces beside them make torques
+_TORQUES = re.compile(r"[tp]_?[xyz]")  # names of a position that forces next to them make torques
 _DERIVATIVE = re.compile(r"d{1,2}_?[a-z]|q2d|q?dd?_")  # ddq1, d_q1, q2d_1
 _MARKERS = frozenset({"limit", "limits", "index", "min", "max"})  # of other values of a joint
 _SLIDES = re.compile(r"[dsl]_?(?P<n>\d+)")  # what a prismatic joint is called next to q1, q2
@@ -54,21 +54,21 @@ def coverage_warnings(
     names = [_words(column) for column in joints]
     shared = frozenset.intersection(*map(frozenset, names))
     units = {column.unit for column in joints} - {None}
-    others = words.other | words.joint_words["rate"] | words.joint_words["acceleration"] | _MARKERS
+    excluded = words.other | words.joint_words["rate"] | words.joint_words["acceleration"] | _MARKERS
 
     def is_named_as_joints(column: Column) -> bool:
         name = _words(column)
         slides = _SLIDES.fullmatch(column.key)
         if slides and numbers and int(slides["n"]) == max(numbers) + 1:
             return True
-        if column.kind == Kind.COMMANDED or column.words & others or column.moves_nothing:
+        if column.kind == Kind.COMMANDED or column.words & excluded or column.moves_nothing:
             return False
         if _DERIVATIVE.match(column.bare) or (column.unit and column.unit.order):
             return False
         if shared and shared <= {*name} and len(name) <= max(map(len, names)) + 1:
             return True
-        is_alike = column.unit in units if not shared else "joint" in shared and "joint" in name
-        return is_alike and not is_given
+        has_same_use = column.unit in units if not shared else "joint" in shared and "joint" in name
+        return has_same_use and not is_given
 
     named = [column for column in unused if not column.text and column.header and is_named_as_joints(column)]
     if not named:
@@ -90,9 +90,9 @@ def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -
     They begin as the names of the position, or are angles if these begin with x, y, z.
     """
     words = vocabulary()
-    others = words.joint_words["rate"] | words.joint_words["acceleration"] | (words.other - _TOOL)
+    excluded = words.joint_words["rate"] | words.joint_words["acceleration"] | (words.other - _TOOL)
     stem = OF_POSITION.sub("", os.path.commonprefix([c.key for c in position]))  # noqa: RUF071 (names)
-    free = [c for c in unused if not c.words & others and (c.unit is None or c.unit.quantity == "angle")]
+    free = [c for c in unused if not c.words & excluded and (c.unit is None or c.unit.quantity == "angle")]
     near = [c for c in free if c.key.startswith(stem) if stem or (c.unit and not c.unit.order)]
     if len(near) not in (3, 4):
         return []
@@ -101,7 +101,7 @@ def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
 
 
-def beside_path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
+def path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
     """Return the warning that several columns next to a path are not read.
 
     They are called joints; else angles, if there are any; else all, where they are as few as an arm's.
@@ -109,7 +109,7 @@ def beside_path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
     joints = [column for column in unused if "joint" in column.words]
     angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"]
     columns = joints or angles or list(unused)
-    if len(columns) < MIN_JOINTS_BESIDE_PATH or len(columns) > MAX_JOINTS > len(joints):
+    if len(columns) < MIN_JOINTS or len(columns) > MAX_JOINTS > len(joints):
         return []
     message = f"x, y, z are read as a path, and {listed(columns, most=8)} are not read"
     hint = take(columns, "takes them as the joints") if len(columns) <= MAX_JOINTS else NAME_JOINTS
@@ -118,12 +118,12 @@ def beside_path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
 
 def tcp_warnings(rest: Sequence[Column]) -> list[LogWarning]:
     """Return a warning if two columns or more look like a tool centre point."""
-    alike = [column for column in rest if _is_like_tcp(column)]
-    if len(alike) < 2:
+    like_tcp = [column for column in rest if _is_like_tcp(column)]
+    if len(like_tcp) < 2:
         return []
-    message = f"{listed(alike)} look like a recorded TCP and are not read as one"
+    message = f"{listed(like_tcp)} look like a recorded TCP and are not read as one"
     of_rotation = [pattern for rotation in vocabulary().tcp_rotations for pattern in rotation.patterns]
-    position = [column for column in alike if not any(p.search(column.plain) for p in of_rotation)]
+    position = [column for column in like_tcp if not any(p.search(column.plain) for p in of_rotation)]
     names = take(position, "takes them", parameter="position")
     names = names if len(position) == 3 else Hint("position", None, "names them")
     hints = (Hint("", effect="name its columns tcp_x, tcp_y, tcp_z"), names)
@@ -133,8 +133,8 @@ def tcp_warnings(rest: Sequence[Column]) -> list[LogWarning]:
 def _is_like_tcp(column: Column) -> bool:
     """Return whether the name of a column is that of a position, or near to one."""
     words = vocabulary()
-    others = words.other - _TOOL | words.joint_words["rate"] | words.joint_words["acceleration"]
-    if column.words & (others | _BESIDE_TOOL) or (column.unit and column.unit.quantity != "length"):
+    excluded = words.other - _TOOL | words.joint_words["rate"] | words.joint_words["acceleration"]
+    if column.words & (excluded | _TOOL_VALUES) or (column.unit and column.unit.quantity != "length"):
         return False
     if any(pattern.search(column.plain) for pattern in words.tcp_position):
         return not _TORQUES.fullmatch(column.plain)
@@ -146,7 +146,7 @@ def passed_over_warnings(
     joints: tuple[Column, ...],
     position: tuple[Column, ...],
 ) -> list[LogWarning]:
-    """Return the warning with all columns that were not read because others were, or nothing.
+    """Return the warning with all columns that were not read because excluded were, or nothing.
 
     Args:
         passed: Groups that are read, each with the columns passed over for it.
@@ -158,7 +158,7 @@ def passed_over_warnings(
     message = "; ".join(f"{_ends(other)} passed over for {_ends(group)}" for group, other in passed)
     hints = [take(other) for group, other in passed if group == joints]
     hints += [take(other, parameter="position") for group, other in passed if group == position]
-    hints += [Hint("side", None, "takes others")]
+    hints += [Hint("side", None, "takes excluded")]
     return [LogWarning(PASSED_OVER, message, hints=(hints[0],))]
 
 

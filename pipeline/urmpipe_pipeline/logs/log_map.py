@@ -126,7 +126,7 @@ class LogMap:
         orientation: Names or numbers of the columns of the recorded orientation, in the order of its form.
         rotation: Form of the recorded orientation, as `RotationForm` lists them.
         unit: Unit of a column by its name or number; by "" that of every angle (joints that turn, recorded
-            orientation) of which neither its own name nor the kinematics tell one; turn/N of N counts.
+            orientation) of which neither its name nor the kinematics state one; turn/N of N counts.
         period: Time between rows in [s], of a log without a time column.
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
         interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
@@ -238,16 +238,16 @@ def read_options(values: Mapping[str, Any], otherwise: LogMap | None = None) -> 
     Args:
         values: Options by name, others among them.
         otherwise: What holds where nothing is given, such as that of a map. Units of single columns and
-            intervals of single joints add up; joints given anew leave behind what belonged to the others:
+            intervals of single joints add up; other joints drop what belonged to the former ones:
             names, signs, offsets and intervals.
     """
     base = otherwise or LogMap()
-    given = {name: value for name, value in values.items() if name in READING and value is not None}
-    given |= {name: _for_all(given[name]) for name in ("unit", "interval") if name in given}
-    if isinstance(given.get("unit", {}), Mapping):
-        given["unit"] = {**base.unit, **given.get("unit", {})}
-    if "joints" in given:
-        given = {"names": (), "signs": (), "offsets": (), "interval": {}, **given}
-    elif isinstance(given.get("interval"), Mapping) and "" not in given["interval"]:
-        given["interval"] = {**base.interval, **given["interval"]}
-    return replace(base, **given)
+    stated = {name: value for name, value in values.items() if name in READING and value is not None}
+    stated |= {name: _for_all(stated[name]) for name in ("unit", "interval") if name in stated}
+    if isinstance(stated.get("unit", {}), Mapping):
+        stated["unit"] = {**base.unit, **stated.get("unit", {})}
+    if "joints" in stated:
+        stated = {"names": (), "signs": (), "offsets": (), "interval": {}, **stated}
+    elif isinstance(stated.get("interval"), Mapping) and "" not in stated["interval"]:
+        stated["interval"] = {**base.interval, **stated["interval"]}
+    return replace(base, **stated)

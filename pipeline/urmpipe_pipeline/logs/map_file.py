@@ -145,7 +145,7 @@ def file_entries(inferences: Sequence[Inference]) -> dict[str, Any]:
 
 
 def _clock_entries(log: JointLog, by_kind: Mapping[str, Inference], options: LogMap) -> dict[str, Any]:
-    """Return time, period and poses; a stamp in halves and a file of times are found anew.
+    """Return time, period and poses; a stamp in halves and a file of times are found again.
 
     A file whose column was given as the time is entered with its whole path.
     """
@@ -219,7 +219,7 @@ def _name(log: JointLog, column: LogColumn) -> str:
 
 
 def format_map(log_map: LogMap) -> str:
-    """Return a map as TOML: each entry with its evidence behind it, what is only assumed as a comment."""
+    """Return a map as TOML: each entry with its evidence after it, what is only assumed as a comment."""
     lines = [MAP_HEADER, *(f"# {note}" for note in log_map.notes), ""]
     for key in KEYS:
         value = getattr(log_map, key)

@@ -48,7 +48,7 @@ class Pose:
         rotation: The columns of its orientation, in the order of the form, or none.
         forms: What these may be; one if it is known.
         evidence: Why.
-        measured: Whether it was measured from outside, in a frame of its own.
+        measured: Whether it was measured from outside, in another frame.
         alternatives: Groups of columns that would have been the position without these.
     """
 
@@ -79,7 +79,7 @@ def find_pose(
         path: Whether a pose is needed. Then numbers prove an orientation in any row, as the others are wrong,
             a target is a position, and of several positions the first is returned, with its alternatives.
             Else most rows have to prove it, target_x is not where the tool was unless the log has actual_x,
-            too, and several positions are none.
+            too, and several positions give no pose.
     """
     words = vocabulary()
     families = [f for f in find_families(numeric, words.tcp_pose_vector, 0) if _numbers(f) == range(6)]

@@ -35,11 +35,11 @@ from urmpipe_pipeline.logs.columns import (
     which_joints,
 )
 from urmpipe_pipeline.logs.coverage import (
-    beside_path_warnings,
     compare_sides,
     coverage_warnings,
     orientation_warnings,
     passed_over_warnings,
+    path_warnings,
     tcp_warnings,
 )
 from urmpipe_pipeline.logs.formats.cells import grouped_number
@@ -339,7 +339,7 @@ def _path(
         inferences = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
         roles = _with_warnings(roles, inferences, numeric, tables, robot, (), pose.alternatives)
-        return replace(roles, warnings=(*roles.warnings, *beside_path_warnings(rest)))
+        return replace(roles, warnings=(*roles.warnings, *path_warnings(rest)))
     _check_thousands(tables)
     if path:
         hints = (Hint("", effect="name them so in the header"), Hint("position", None, "names them"))

@@ -1,6 +1,6 @@
 """The recorded orientation of the tool: its form and unit, and rows that hold no orientation of the motion.
 
-1. Rows without an orientation become NaN: quaternions of another length than 1, matrices that are none, and
+1. Rows without an orientation become NaN: quaternions of another length than 1, matrices without R R^T = I;
    rows between the ends of a jump (`find_interpolated_rows`). One orientation has several spellings: a
    rotation vector u a is u (a - 2 pi) as well, an Euler angle continues from +pi at -pi, and q is -q. Where
    a log goes from one to the other, its numbers x jump by the length T, 2 pi (360 in deg) of a vector or
@@ -373,7 +373,7 @@ def _decide_by_values(
     reason = f"values of {size:.6g} {'are more than a turn as rad' if is_large else 'may be rad as well'}"
     is_excluded = bool(wrapped) or size > TWO_TURNS
     reason = wrapped[1] if wrapped else reason
-    finder.doubt(columns, by, unit, reason, "rotation", is_excluded=is_excluded)
+    finder.warn_uncertain(columns, by, unit, reason, "rotation", is_excluded=is_excluded)
     return _Decision(choice, why, "given" if by[0].by == "user" else "named")
 
 

@@ -321,7 +321,7 @@ class UnitFinder:
             allowed = "a unit that fits the data"
             raise LogError(Finding(f"{message}, allowed: {allowed}", self.sources.file, hints=hints))
         if objection.columns or (is_open and not all(item.is_confirmed for item in by)):
-            self.doubt(columns, by, unit.name, objection.why, "joint", are_all=are_all)
+            self.warn_uncertain(columns, by, unit.name, objection.why, "joint", are_all=are_all)
 
     def settle_rates(self, columns: Sequence[Column], joints: Sequence[Unit], order: int) -> list[Unit]:
         """Return the units of recorded rates (order 1) or accelerations (2): the joints' own by default."""
@@ -355,7 +355,7 @@ class UnitFinder:
             is_far = reach > MAX_REACH
             why = "reach further than any arm" if is_far else "are closer to the origin than any arm works"
             why = f"values of {size:.6g} {why}"
-            self.doubt(columns, by, units[0].name, why, "position")
+            self.warn_uncertain(columns, by, units[0].name, why, "position")
         return units
 
     def _overrule(
@@ -418,7 +418,7 @@ class UnitFinder:
     def _assume_length(
         self, columns: Sequence[Column], size: float, subject: str, role: Role, *, has_joints: bool
     ) -> Unit:
-        """Return m, or beyond any arm mm beside joints; without joints it stays open."""
+        """Return m, or beyond any arm mm next to joints; without joints it stays open."""
         is_far = size > MAX_METRES
         unit = vocabulary().units["mm" if is_far and has_joints else "m"]
         why = f", though values of {size:.6g} reach further than any arm"
@@ -517,7 +517,7 @@ class UnitFinder:
     def _note(self, columns: Sequence[Column], unit: Unit, basis: Basis, why: str) -> None:
         self._notes.setdefault((unit.name, why, basis), []).extend(columns)
 
-    def doubt(
+    def warn_uncertain(
         self,
         columns: Sequence[Column],
         stated: Collection[StatedUnit],

@@ -1,9 +1,9 @@
 """The columns of tables without a header, by their numbers and places, and of plots with one result a file.
 
 1. Poses: a table of seven numbers, the last four of length 1, or of a homogeneous transform (12 or 16
-   numbers), alone or behind a time, is a path, as TUM and KITTI write it: joints keep no such law.
+   numbers), alone or after a time, is a path, as TUM and KITTI write it: joints keep no such law.
 2. Joints: as many columns as the robot has; columns whose rates stand beside them (`rates`); without a robot
-   a few columns that move alike, with a warning. A pose may stand behind the joints.
+   a few columns that move alike, with a warning. A pose may follow the joints.
 3. Otherwise a question whose choices are blocks of columns.
 4. Plots: one column of numbers a file, joined by the numbers in the names of columns or files.
 """
@@ -56,10 +56,10 @@ from urmpipe_pipeline.logs.roles import (
 from urmpipe_pipeline.logs.vocabulary import split_unit
 
 ASSUMED_JOINTS = "assumed-joints"  # warning: all columns of a table without names are the joints
-NO_HEADER = "no header tells what they are"
+NO_HEADER = "no header states what they are"
 TWO_TURNS = 720.0, 2.0 * math.tau  # [deg], [rad]: no joint goes further, as clocks, wheels and counts do
 MAX_SELDOM = 0.2  # a column that moves in a smaller share of the rows than others may be a gripper's
-MAX_UNASKED = 7  # columns that are joints where no robot tells how many there are; more may be blocks
+MAX_UNASKED = 7  # columns that are joints where no robot states how many there are; more may be blocks
 USUAL_COUNTS = (6, 7, 5, 4)  # joints of arms, the usual first
 
 
@@ -78,7 +78,7 @@ def without_header(
         tables: All tables; the columns are of one.
         options: What the user says: joint columns, position, orientation.
         robot: The arm, or None.
-        path: The user says that it is a path: the columns are x, y, z, and an orientation behind them.
+        path: The user says that it is a path: the columns are x, y, z, and an orientation after them.
 
     Raises:
         LogError: If there are too few columns, or with the question which are the joints.
@@ -166,7 +166,7 @@ def clock_before_pose(columns: Sequence[Column], table: LogTable) -> tuple[tuple
     times = table.values([before[0].index])[:, 0]
     if before[0].text or (np.diff(times) <= 0).any() or np.isnan(times).any():
         return None
-    return tuple(before), f"it increases, and a pose stands behind it: {pose.evidence}"
+    return tuple(before), f"it increases, and a pose follows it: {pose.evidence}"
 
 
 def columns_before(pose: Pose, columns: Sequence[Column]) -> Sequence[Column]:
@@ -175,11 +175,11 @@ def columns_before(pose: Pose, columns: Sequence[Column]) -> Sequence[Column]:
 
 
 def _path_of_poses(pose: Pose, columns: Sequence[Column], table: LogTable, options: LogMap) -> Roles:
-    """Return the roles of a pose alone, or behind one column; w of TUM is assumed to be the last."""
+    """Return the roles of a pose alone, or after one column; w of TUM is assumed to be the last."""
     warnings: tuple[LogWarning, ...] = ()
     is_tum = len(table.names) == 8 and table.delimiter == " "
     if options.rotation is None and len(pose.forms) > 1 and is_tum:
-        order = f"no header tells the order of {listed(pose.rotation)}, a quaternion"
+        order = f"no header states the order of {listed(pose.rotation)}, a quaternion"
         hints = (
             Hint("rotation", "quat_wxyz", "overrides this"),
             Hint("rotation", "quat_xyzw", "confirms it"),
@@ -192,7 +192,7 @@ def _path_of_poses(pose: Pose, columns: Sequence[Column], table: LogTable, optio
 
 
 def _path_by_place(columns: Sequence[Column], table: LogTable, options: LogMap, pose: Pose | None) -> Roles:
-    """Return x, y, z and the orientation behind them: of the given form, or by what its numbers are."""
+    """Return x, y, z and the orientation after them: of the given form, or by what its numbers are."""
     form = options.rotation
     if pose is None and len(columns) < 3:
         message = f"found {format_count(len(columns), 'column')}, allowed: x, y, z"
@@ -296,7 +296,7 @@ def one_plot_a_file(columns: Sequence[Column], tables: Tables, robot: Chain | No
 
     Their order is that of the numbers in the columns' names, if these differ only by a number; else that of
     the numbers in the files' names; else the order of the files as given. Where both have numbers and the
-    orders differ, a warning tells it. Columns of one name are called as their files.
+    orders differ, a warning states both. Columns of one name are called as their files.
 
     Raises:
         LogError: If a number is missing among those of the plots, and there is no robot.
