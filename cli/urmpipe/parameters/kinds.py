@@ -535,10 +535,10 @@ OFFSETS = Kind(
     "OFFSET,...", "numbers in the units of the columns, such as 0,90", _reader("offsets", _split_numbers)
 )
 LAYOUT = Kind(
-    "table|transposed|flat:N|flat-by-joint:N",
-    "table, transposed, flat:N or flat-by-joint:N, with N numbers a sample",
+    "table|transposed|long|flat:N|flat-by-joint:N",
+    "table, transposed, long, flat:N or flat-by-joint:N, with N numbers a sample",
     _reader("layout"),
-    words("table", "transposed", "flat:", "flat-by-joint:"),
+    words("table", "transposed", "long", "flat:", "flat-by-joint:"),
 )
 SHEET = Kind("SHEET", "a sheet by name or number", _reader("sheet"))
 TOPIC = Kind("TOPIC", "a non-empty text", _reader("topic"))

@@ -120,8 +120,8 @@ class LogReading(TextTable, total=False):
         str | None,
         _reading(
             kinds.LAYOUT,
-            "table: one sample per row; transposed: one joint per row; flat: a single list of numbers, N"
-            " per sample [default: table].",
+            "table: one sample per row; transposed: one joint per row; long: one joint per row in each"
+            " sample; flat: a single list of numbers, N per sample [default: table].",
         ),
     ]
     sheet: Annotated[str | int | None, _reading(kinds.SHEET, "Sheet of a workbook: name, or number from 1.")]

@@ -22,7 +22,7 @@ COLUMNS = "columns by name or number, such as q1,q2 or 2,3"
 UNITS = "a unit of every angle, such as deg, or units by column, such as q1=deg"
 SIDE = "a word in the names of columns, such as actual, or several, such as arm2_solved"
 EPISODES = "an episode by number or name, or COLUMN=VALUE"
-LAYOUTS = "table, transposed, flat:N or flat-by-joint:N, with N numbers a sample"
+LAYOUTS = "table, transposed, long, flat:N or flat-by-joint:N, with N numbers a sample"
 ROWS = "rows from 1, both ends included, such as 2:-1 or 1:99,101:-1; -1 is the last"
 INTERVALS = "two ends for all revolute joints, or ends by joint, such as q1=-180:180"
 
@@ -87,7 +87,7 @@ def _entry(fits: Callable[[Any], bool], allowed: str, default: Any = None) -> An
 
 
 _ROWS = r"(-?[1-9]\d*)?:(-?[1-9]\d*)?(,(-?[1-9]\d*)?:(-?[1-9]\d*)?)*"
-_LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
+_LAYOUTS = r"table|transposed|long|flat(-by-joint)?:[1-9]\d*"
 _SIDES = r"(?s).*[^\W_].*"
 _TEXT = (_is_word, "a non-empty text")
 _NAME = "a column by name or number, or FILE:COLUMN"
@@ -109,8 +109,9 @@ class LogMap:
         source: Name of the source, as `source_names` lists them.
         delimiter: Sign between cells, or comma, semicolon, tab, spaces, bar.
         decimal: Decimal sign, or point, comma.
-        layout: What a row of the table is: "table" a sample, "transposed" a joint; of a flat array, sample by
-            sample or joint by joint, "flat:N" or "flat-by-joint:N" with N numbers a sample.
+        layout: What a row of the table is: "table" a sample, "transposed" a joint, "long" a joint in a
+            sample; of a flat array, sample by sample or joint by joint, "flat:N" or "flat-by-joint:N" with N
+            numbers a sample.
         sheet: Name or number (from 1) of the sheet of a workbook.
         topic: Name of the topic of a bag, or what the names of its columns begin with in a table of several.
         episode: The episode of a file of several: its number or name, or "COLUMN=VALUE".

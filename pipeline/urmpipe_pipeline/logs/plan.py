@@ -158,7 +158,7 @@ def make_plan(
         clocks = tuple(settle_unit_by_speed(clock, tables, roles.joints, units) for clock in clocks)
     for index in {column.table for column in roles.joints}:
         of_table = [column for column in rest if column.table == index]
-        check_not_long_form(roles.joints, of_table, clocks[index].columns, tables.tables[index])
+        check_not_long_form(roles.joints, of_table, tables.tables[index])
     warnings = [
         LogWarning(f"{name}-not-used", "no effect: not in this log", parameter=name)
         for name in ("topic", "episode")

@@ -5,7 +5,7 @@
 2. Without joints, x, y, z are a path; else a question whose choices are the columns that may be joints.
 3. `written_roles`: the columns of what urmpipe writes itself, by their metadata or all names together.
 4. `signal_roles`: the signals of a simulation: its only array of joints, else a question.
-5. `check_not_long_form`: a table with a row per joint, with the command that makes it a row per sample.
+5. `check_not_long_form`: the question whether a table has a row per joint.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.errors import Finding, Hint, LogError, python_command
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.math3d import COLUMN_NAMES, FORMS, RotationForm, column_count
 from urmpipe_pipeline.joint_log import ROLES, Basis, Inference, LogWarning
 from urmpipe_pipeline.logs.columns import (
@@ -44,6 +44,8 @@ from urmpipe_pipeline.logs.coverage import (
 )
 from urmpipe_pipeline.logs.formats.cells import grouped_number
 from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.long_form import LONG, MAX_NAMES
+from urmpipe_pipeline.logs.formats.shape import AS_TABLE
 from urmpipe_pipeline.logs.formats.urmpipe_tables import GIVEN as GIVEN_KEY
 from urmpipe_pipeline.logs.formats.urmpipe_tables import (
     RECORDED,
@@ -79,7 +81,6 @@ from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 
 GIVEN = "given as an option"  # evidence of columns that the user named
-MAX_NAMES = 40  # more names that come again and again are hardly those of joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -537,7 +538,9 @@ def signal_roles(columns: Sequence[Column], table: LogTable, robot: Chain | None
         LogError: With the question which they are, if several may be, or they are not as many as the robot's.
     """
     signals = [(c, _SIGNAL.fullmatch(c.header)) for c in columns if c.header not in _SIGNAL_CLOCKS]
-    if table.names[:1] != _SIGNAL_CLOCKS[:1] or not signals or not all(match for _, match in signals):
+    if table.names[:1] != _SIGNAL_CLOCKS[:1] or any(known.value == LONG for known in table.inferences):
+        return None
+    if not signals or not all(match for _, match in signals):
         return None
     arrays: dict[tuple[str, str], list[Column]] = {}
     scalars: dict[tuple[str, str], list[Column]] = {}
@@ -578,40 +581,33 @@ def signal_roles(columns: Sequence[Column], table: LogTable, robot: Chain | None
 # 5. Long form
 
 
-def check_not_long_form(
-    joints: Sequence[Column], columns: Sequence[Column], clock: Sequence[Column], table: LogTable
-) -> None:
-    """Raise if a table has a row per joint: a column beside its only joint repeats the same names in order.
+def check_not_long_form(joints: Sequence[Column], columns: Sequence[Column], table: LogTable) -> None:
+    """Raise if a table may have a row per joint: beside its only joint names repeat in order, or joints.
 
     Args:
         joints: The joints that were found.
         columns: The columns beside the clock.
-        clock: Those of the clock.
         table: The table.
 
     Raises:
-        LogError: With the command that makes a row a sample of it.
+        LogError: With the question what a row is.
     """
-    if len(joints) != 1 or table.header is None:
+    if len(joints) != 1 or table.header is None or any(known.what == "layout" for known in table.inferences):
         return
     for column in columns:
         cells = table.cells(column.index)
-        count = len(set(cells))
-        if column in joints or not 2 <= count <= MAX_NAMES or len(cells) < 3 * count:
+        count, is_joint = len(set(cells)), "joint" in column.key.split("_")
+        if column in joints or not 2 <= count <= MAX_NAMES or (len(cells) < 3 * count and not is_joint):
             continue
         is_name = all(not cell or not cell[0].isdigit() or cell.isdigit() for cell in cells[:count])
-        if not is_name or any(cell != cells[k % count] for k, cell in enumerate(cells)):
+        if not is_name or (not is_joint and any(cell != cells[k % count] for k, cell in enumerate(cells))):
             continue
-        found = f"one row per joint: {column.header} goes round {count} names"
-        hints = (Hint("", effect=_pivot(joints[0], column, clock[0], table)),) if len(clock) == 1 else ()
-        raise LogError(Finding(file=table.file, found=found, allowed="one row per sample", hints=hints))
-
-
-def _pivot(joint: Column, name: Column, time: Column, table: LogTable) -> str:
-    """Return the command that writes such a table with a column per joint."""
-    kind = "csv" if table.arrow is None else "parquet"
-    sign = "" if table.arrow is not None or table.delimiter == "," else f", sep={table.delimiter!r}"
-    comma = ", decimal=','" if table.decimal == "," else ""
-    arguments = f"index={time.header!r}, columns={name.header!r}, values={joint.header!r}"
-    read = f"pandas.read_{kind}({table.path.name!r}{sign}{comma})"
-    return python_command(f"import pandas; {read}.pivot({arguments}).to_csv('table.csv')")
+        effects = {LONG: "takes each row as a joint in a sample", AS_TABLE: "takes each row as a sample"}
+        raise LogError(
+            Finding(
+                file=table.file,
+                found=f"{column.header} with {count} names",
+                allowed="one row per sample, or one per joint in each sample",
+                hints=tuple(Hint("layout", layout, effect) for layout, effect in effects.items()),
+            )
+        )

@@ -110,6 +110,7 @@ class Vocabulary:
         roles = ("position", "rate", "acceleration")
         self.joint = {role: _compiled(joint[role]) for role in roles}
         self.joint_words = {role: frozenset[str](joint[f"{role}_words"]) for role in roles}
+        self.joint_of_row = _compiled(joint["of_row"])
         self.marks = frozenset[str](joint["marks"])
         self.orders = tuple(tuple[str, ...](order) for order in joint["orders"])
         self.other = frozenset[str]((*joint["other"], *joint["grippers"]))

@@ -8,7 +8,7 @@
 
    falls to a part of what it is as they stand. A table of few rows that is smooth along them is asked about,
    and numbers one by one of which another shape is smoother. Rows that begin with a name are joints. Read so,
-   a table is one in memory.
+   a table is one in memory. A row per joint of each sample: `long_form`.
 2. `choose_rows`: the rows of the option `rows`, and of these one episode. A table of some rows is like any
    other: clock, joints and units are decided on these rows alone. Errors count the rows of the file.
 """
@@ -28,6 +28,7 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_v
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_number, is_text, plain, to_float
 from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.long_form import LONG, find_long_form, pivot, require_long_form
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
 from urmpipe_pipeline.logs.formats.numbers import capped, steps
 from urmpipe_pipeline.logs.formats.sniff import GIVEN, across
@@ -58,7 +59,7 @@ def orient_table(table: LogTable, layout: str | None, *, is_only: bool = True) -
 
     Args:
         table: The table.
-        layout: The option: "table", "transposed", "flat:N", "flat-by-joint:N".
+        layout: The option: "table", "transposed", "long", "flat:N", "flat-by-joint:N".
         is_only: Whether it is all of a log: one of several files may be a single column or row.
 
     Raises:
@@ -68,6 +69,8 @@ def orient_table(table: LogTable, layout: str | None, *, is_only: bool = True) -
         return _apply(table, layout)
     if not is_only or (isinstance(table, TextTable) and table.form is not None):
         return table
+    if (form := find_long_form(table)) is not None:
+        return pivot(table, form, form.describe(table), _TABLE)
     line = across(table)
     if len(line.names) == 1 or (table.arrow is not None and table.arrow.num_rows == 1):
         return _check_single(table, line)
@@ -78,6 +81,8 @@ def orient_table(table: LogTable, layout: str | None, *, is_only: bool = True) -
 def _apply(table: LogTable, layout: str) -> LogTable:
     if layout == TRANSPOSED:
         return _transpose(table, list(table.iter_cells()), GIVEN)
+    if layout == LONG:
+        return pivot(table, require_long_form(table), GIVEN)
     if layout != AS_TABLE:
         return _unflatten(table, layout)
     return replace(table, inferences=(*table.inferences, Inference("layout", AS_TABLE, GIVEN)))
