@@ -157,11 +157,7 @@ def propose_units(reading: Reading, robot: Chain | None, t_ns: IntArray) -> Prop
     rates = finder.settle_rates(roles.rates, units, 1)
     accelerations = finder.settle_rates(roles.accelerations, units, 2)
     q = _in_si(q, units)
-    lengths = (
-        finder.settle_positions(roles.position, position, has_joints=bool(roles.joints))
-        if roles.position
-        else []
-    )
+    lengths = finder.settle_positions(roles.position, position) if roles.position else []
     position = _in_si(position, lengths)
     if len(roles.position) == 2:
         position = np.column_stack((position, np.zeros(len(position))))

@@ -11,6 +11,7 @@ cells of the others are empty. The rows with the joints, or of a path with its p
 from __future__ import annotations
 
 import os.path
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -38,6 +39,7 @@ from urmpipe_pipeline.logs.columns import (
     columns_of_topic,
     given_units,
     listed,
+    take,
     without_other_side,
 )
 from urmpipe_pipeline.logs.formats.cells import is_missing
@@ -61,6 +63,7 @@ MAX_LISTED = 6  # files that are listed where they are several logs
 MAX_SHARE = 0.5  # a column with values in at most this share of the rows of the joints is of another topic
 MIN_ROWS = 4  # fewer are at equal distances by chance
 OTHER_ROWS = "other-rows"  # the warning about groups of columns that are recorded in other rows
+_POSITION = re.compile(r"(position|pos)_?\d")  # of a joint, or x, y, z
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,6 +235,8 @@ def _roles_by_names(
     is_path = options.source == PATH or written == ()
     joints = () if is_path else written or ()
     roles = assign(columns, tables.tables, options, robot, path=is_path, written=joints)
+    if robot is None and not options.joints:
+        _check_no_position(roles, tables)
     if not options.joints:
         check_unique_names(
             roles.joints, columns, tables.tables, Hint("joints", None, "selects them: give their numbers")
@@ -239,6 +244,16 @@ def _roles_by_names(
     pose, hint = (*roles.position, *roles.rotation), Hint("", effect="rename or remove the others")
     check_unique_names(pose, columns, tables.tables, hint)
     return roles
+
+
+def _check_no_position(roles: Roles, tables: Tables) -> None:
+    """Raise a `LogError` with the question whether position_0 to position_2 are joints or x, y, z."""
+    joints = roles.joints
+    are_positions = len(joints) == 3 and all(_POSITION.fullmatch(c.key) and c.unit is None for c in joints)
+    if are_positions and not (roles.rates or roles.position):
+        hints = (take(joints), take(joints, "takes them as x, y, z", parameter="position"))
+        names = f"{listed(joints)}, which may be three joints or the position of a tool"
+        raise LogError(Finding(file=tables.tables[joints[0].table].file, found=names, hints=hints))
 
 
 def _check_one_log(columns: Sequence[Column], tables: Tables, options: LogMap) -> None:

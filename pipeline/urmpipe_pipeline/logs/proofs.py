@@ -72,6 +72,7 @@ ONE_TURN = math.tau * 1.01  # [rad], of joints that turn once either way, as UR'
 TWO_TURNS = 2 * math.tau  # [rad]; joints of arms turn no further either way
 MAX_WRAP_DEVIATION = 20.0 / 360.0  # share of a turn by which a step may differ from it
 MAX_JOINT_SPEED = 30.0  # [rad/s]; no joint of an arm is faster for a tenth of the time
+TEN_TURNS = 10 * math.tau  # [rad]; not even joints without limits are moved so far
 MAX_DEGREES = 720.0  # [deg], two turns; larger values are ticks or per cent
 MAX_SIZE_ROWS = 10_000  # that show the usual size of values
 SPEED_WINDOW = 20  # rows over which a clock may hurry, as a recorder that stores late rows at once
@@ -490,6 +491,19 @@ def too_fast_as_radians(values: FloatArray, t_ns: IntArray | None) -> str | None
     if np.radians(speed) <= MAX_JOINT_SPEED < speed:
         return f"as rad it would turn at {speed:.3g} rad/s for a tenth of the time"
     return None
+
+
+def too_far_as_radians(values: FloatArray) -> str | None:
+    """Return why values are unlikely in rad and likely in deg: two joints go beyond ten turns; or None.
+
+    Whole numbers beyond a turn in deg are counts. In the file's own units, shape (n, columns).
+    """
+    sizes = sorted(usual_peak(column[:, np.newaxis]) for column in values.T)
+    known = values[np.isfinite(values)]
+    are_counts = sizes[-1] > 360 and bool((known % 1 == 0).all())
+    if len(sizes) < 2 or sizes[-2] <= TEN_TURNS or sizes[-1] > MAX_DEGREES or are_counts:
+        return None
+    return f"as rad values of {sizes[-1]:.6g} and {sizes[-2]:.6g} are more than ten turns"
 
 
 def peak(values: FloatArray) -> float:

@@ -8,8 +8,8 @@
 4. Joints without a unit have that of the other joints, or that of their wraps. A column that does not
    wrap itself may be a joint that slides, unless an arm or another unit says that none does: it is assumed
    to be in deg, or in rad up to two turns; a larger one is asked about.
-5. Else rad is assumed up to two turns, deg if joints would be too fast in rad, m, and mm from `MAX_METRES`
-   for a joint that slides or a position together with joints. Larger joint values are asked about.
+5. Else rad is assumed up to two turns, deg if joints would be too fast or far in rad, m, and mm from
+   `MAX_METRES` for a joint that slides or a position. Other joint values beyond two turns are asked about.
 
 The inference of a unit states its basis (given, named, proved or assumed) and why. What the user gives is
 used; values or kinematics that contradict it are a warning with the assumption.
@@ -44,6 +44,7 @@ from urmpipe_pipeline.logs.proofs import (
     KinematicUnits,
     count_wraps,
     peak,
+    too_far_as_radians,
     too_fast_as_radians,
     usual_peak,
     wraps_as_degrees,
@@ -211,6 +212,10 @@ def find_objection(
     return Objection(f"values of {size:.6g} are more than {limit} as {unit.name}")
 
 
+def _are_unnamed(columns: Sequence[Column]) -> bool:
+    return all(column.header.isdigit() for column in columns)
+
+
 def _list_names(columns: Sequence[Column]) -> str:
     return ", ".join(column.name for column in columns)
 
@@ -332,9 +337,7 @@ class UnitFinder:
             units.append(unit if unit.order else unit.per_second(order))
         return units
 
-    def settle_positions(
-        self, columns: Sequence[Column], values: FloatArray, *, has_joints: bool = False
-    ) -> list[Unit]:
+    def settle_positions(self, columns: Sequence[Column], values: FloatArray) -> list[Unit]:
         """Return the units of recorded x, y, z, whose values are in the file's own units, shape (n, 3)."""
         stated = self.sources.of_lengths(columns)
         if self.kinematic is not None:
@@ -346,8 +349,7 @@ class UnitFinder:
         if unstated and default is not None:
             self._note(unstated, default, "named", "as the other position columns")
         elif unstated:
-            subject = _ALL_OF["position"]
-            default = self._assume_length(unstated, size, subject, "position", has_joints=has_joints)
+            default = self._assume_length(unstated, size, _ALL_OF["position"], "position")
         units = [unit or default or vocabulary().units["m"] for unit in known]
         by = {item for item in stated if item and item.by != "urmpipe" and not item.is_confirmed}
         reach = size * units[0].factor if units else 0.0
@@ -404,7 +406,7 @@ class UnitFinder:
         if slides:
             sliding, subject = joints.select(slides), "the prismatic joints are"
             size = usual_peak(sliding.values)
-            unit = self._assume_length(sliding.columns, size, subject, "joint", has_joints=True)
+            unit = self._assume_length(sliding.columns, size, subject, "joint")
             units |= dict.fromkeys(slides, unit)
         if turns:
             turning, angle = joints.select(turns), _find_common(list(units.values()), "angle")
@@ -415,19 +417,14 @@ class UnitFinder:
             units |= dict.fromkeys(turns, angle)
         return [units[j] for j in range(len(joints.columns))]
 
-    def _assume_length(
-        self, columns: Sequence[Column], size: float, subject: str, role: Role, *, has_joints: bool
-    ) -> Unit:
-        """Return m, or beyond any arm mm next to joints; without joints it stays open."""
+    def _assume_length(self, columns: Sequence[Column], size: float, subject: str, role: Role) -> Unit:
+        """Return m, or mm beyond any arm."""
         is_far = size > MAX_METRES
-        unit = vocabulary().units["mm" if is_far and has_joints else "m"]
-        why = f", though values of {size:.6g} reach further than any arm"
-        why = f", as values of {size:.6g} are beyond any arm in m" if has_joints else why
+        unit = vocabulary().units["mm" if is_far else "m"]
         hints = unit_hints(columns if role == "joint" else columns[:1], OTHER_UNIT[unit.name])
         hints = which_unit(columns, "m", every=False) if is_far else hints
-        self._assume(
-            columns, unit, subject, role, hints, why if is_far else "", is_open=is_far and not has_joints
-        )
+        why = f", as values of {size:.6g} are beyond any arm in m" if is_far else ""
+        self._assume(columns, unit, subject, role, hints, why)
         return unit
 
     def _settle_angles(self, joints: _Joints, *, may_slide: bool) -> Unit:
@@ -457,11 +454,13 @@ class UnitFinder:
         if may_slide and len(columns) > 2 and len(large) == 1 and largest > 2 * TWO_TURNS:
             raise LogError(self._ask_angle(large, values, large))
         fast = too_fast_as_radians(values, joints.t_ns) if largest <= MAX_DEGREES else None
-        if not fast and usual_peak(values) > TWO_TURNS:
+        may_be_path = _are_unnamed(columns) and len(columns) in PATH_WIDTHS
+        far = None if may_be_path else too_far_as_radians(values)
+        if not (fast or far) and usual_peak(values) > TWO_TURNS:
             all_slide = may_slide and len(columns) == MAX_SLIDES
             sliding = columns if all_slide else () if may_slide else None
             raise LogError(self._ask_angle(columns, values, sliding))
-        unit, why = (deg, f": {fast}") if fast else (rad, "")
+        unit, why = (deg, f": {fast or far}") if fast or far else (rad, "")
         hints = (Hint("unit", {"": OTHER_UNIT[unit.name]}, "overrides this"),)
         self._assume(columns, unit, _ALL_OF["joint"], "joint", hints, why)
         return unit
@@ -477,7 +476,7 @@ class UnitFinder:
         choices = [{"": "rad"}, {"": "deg"}, *({"": f"turn/{n}"} for n in counts)]
         choices += [{"": "rad"} | {column.called: "mm" for column in sliding}] if sliding else []
         hints = [Hint("unit", choice, "specifies it") for choice in choices]
-        if all(column.header.isdigit() for column in columns):
+        if _are_unnamed(columns):
             if sliding is not None and len(columns) in PATH_WIDTHS:
                 hints.append(Hint("source", "path", "reads x, y, z, and an orientation after them"))
             hints.append(NAME_JOINTS)
@@ -558,12 +557,10 @@ class UnitFinder:
         role: Role,
         hints: Sequence[Hint],
         why: str = "",
-        *,
-        is_open: bool = False,
     ) -> None:
         """Warn that columns are taken to be in a unit that nothing states or proves."""
         self._note(columns, unit, "assumed", "assumed")
         names = "" if subject.startswith(_list_names(columns)) else f" for {_list_names(columns)}"
         message = f"no unit is given{names}: {subject} taken as {unit.name}{why}"
-        warning = LogWarning(ASSUMED_UNIT, message, hints=tuple(hints), role=role, blocks_verdict=is_open)
+        warning = LogWarning(ASSUMED_UNIT, message, hints=tuple(hints), role=role)
         self.warn(columns, replace(warning, assumption=f"{subject} in {unit.name}"))

@@ -34,7 +34,7 @@ from urmpipe_pipeline.logs.columns import (
     take,
     which_joints,
 )
-from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.log_table import USUAL_COUNTS, LogTable
 from urmpipe_pipeline.logs.formats.opening import Tables
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import (
@@ -60,7 +60,6 @@ NO_HEADER = "no header states what they are"
 TWO_TURNS = 720.0, 2.0 * math.tau  # [deg], [rad]: no joint goes further, as clocks, wheels and counts do
 MAX_SELDOM = 0.2  # a column that moves in a smaller share of the rows than others may be a gripper's
 MAX_UNASKED = 7  # columns that are joints where no robot states how many there are; more may be blocks
-USUAL_COUNTS = (6, 7, 5, 4)  # joints of arms, the usual first
 
 
 def without_header(
@@ -232,14 +231,15 @@ def _joints_among(
         evidence = f"half of the steps agree within {100 * blocks[0].variation:.2g} %"
         return joints, rates, f"columns {listed(rates)} are their rates: {evidence}"
     odd = find_odd_columns(values)
-    if not blocks and count is None and len(free) <= MAX_UNASKED and not odd.any():
+    may_be_path = len(free) == 3
+    if not blocks and count is None and len(free) <= MAX_UNASKED and not odd.any() and not may_be_path:
         return tuple(free), (), "no header: joints in order"
     groups = [[free[k] for k in block.joints] for block in blocks] + _groups(free, odd, count)
     doubtful = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
     message = f"{len(free)} columns that no header names"
     message += f", of which {listed(doubtful)} may not be joints" if doubtful else ""
     message += f", and robot {robot.name} has {count} joints" if robot else ""
-    as_path = (Hint("source", "path", "reads them as x, y, z"),) if len(free) == 3 else ()
+    as_path = (Hint("source", "path", "reads them as x, y, z"),) if may_be_path else ()
     raise which_joints(table.file, message, groups, UNKNOWN, *as_path)
 
 
@@ -282,7 +282,7 @@ def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[S
         return [*near[:1], free]
     tiles = [
         free[k : k + size]
-        for size in USUAL_COUNTS
+        for size in ((3, *USUAL_COUNTS) if len(free) == 9 else USUAL_COUNTS)
         for k in (range(0, len(free), size) if len(free) % size == 0 else (0,))
     ]
     return [*tiles, *near[:1], free]

@@ -175,6 +175,15 @@ class Vocabulary:
             return base
         return base.per_second(2 if rate["power"] else 1)
 
+    def is_column(self, name: str) -> bool:
+        """Return whether the `key` of a name is that of a column: of a time, a joint, the tool, an arm."""
+        patterns = (*self.time, *self.durations, *self.index, *self.tcp_position)
+        patterns += tuple(pattern for of_role in self.joint.values() for pattern in of_role)
+        patterns += tuple(pattern for words in self.tcp_rotations for pattern in words.patterns)
+        words = self.other.union(*self.joint_words.values(), *self.orders)
+        words |= self.measured_markers | self.commanded
+        return name in words or bool(self.arms.fullmatch(name)) or any(p.search(name) for p in patterns)
+
     def spelled(self, quantity: Quantity) -> list[str]:
         """Return the names of the units of a quantity."""
         names = dict.fromkeys(unit.name for unit in self.units.values() if unit.quantity == quantity)

@@ -201,7 +201,7 @@ def test_two_levels_of_names_are_group_and_name() -> None:
 
 
 def test_columns_that_are_only_counted_have_no_names() -> None:
-    q = np.sin(9 * T[:, np.newaxis] + np.arange(3.0))  # no joint increases throughout, as the clock does
+    q = np.sin(9 * T[:, np.newaxis] + np.arange(4.0))  # no joint increases throughout, as the clock does
     log = log_of(pd.DataFrame(np.column_stack([T, q])), unit="rad")
     assert (log.q == q).all()
     assert log.t_ns.tolist() == [5_000_000 * k for k in range(300)]

@@ -26,6 +26,7 @@ from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing, is_nu
 from urmpipe_pipeline.logs.formats.clock_forms import UNPADDED_NS
 from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers, end_rows
 
+USUAL_COUNTS = (6, 7, 5, 4)  # joints of arms, the usual first
 MAX_SAMPLED_ROWS = 250  # rows whose cells decide how a table is written
 
 

@@ -1,10 +1,10 @@
 """The tables of a log: what its files are, which source wrote them, how each table is written.
 
-1. Each file is opened: typed columns, a program or JSON become a table in memory, all else is text.
+1. Each file is opened: typed columns, a program, JSON or YAML become a table in memory, all else is text.
 2. A text is refused if it holds a merge conflict: the rows of two versions may form one motion.
    CoppeliaSim's export (File > Export > selected graphs as CSV) is several tables in one file. Each graph has
    its path, its header `Time (s),<stream> (<unit>),...` and its rows.
-3. Each table is sniffed: JSON lines, labels in rows, arrays in cells, or plain cells.
+3. Each table is sniffed: JSON lines, YAML, labels in rows, arrays in cells, or plain cells.
 4. Its rows are chosen: a row per sample (`shape`), then the rows and the episode that options name.
 5. The source: given as an option, stated by a schema, or known by the names of columns.
 """
@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -23,7 +24,7 @@ from urmpipe_pipeline.joint_log import URMPIPE_SOURCE, Inference, LogWarning
 from urmpipe_pipeline.logs.formats.bag import MAGIC, is_bag_folder, is_packed
 from urmpipe_pipeline.logs.formats.cells import is_number, printable
 from urmpipe_pipeline.logs.formats.files import first_bytes, import_optional
-from urmpipe_pipeline.logs.formats.json import read_json, sniff_json_lines
+from urmpipe_pipeline.logs.formats.json import read_document, sniff_records
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
 from urmpipe_pipeline.logs.formats.numbers import capped
@@ -39,6 +40,8 @@ from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import KnownSource, vocabulary
 
 COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
+
+_NUMBERS = re.compile(r"\d+(-\d+)?")  # of columns
 
 Sniff: TypeAlias = Callable[[Segment, str | None, str | None], TextTable]
 # finds out how a plain table is written, with delimiter and decimal sign as options give them
@@ -147,7 +150,7 @@ def _open_file(file: Path | MemoryTable, options: LogMap) -> Segment | MemoryTab
     if (content := _read_typed(file, options) or read_workbook(file, options)) is not None:
         return content
     text = open_text(file, any_suffix=options.source is not None)
-    table = read_program(text, options) or read_json(text, options)
+    table = read_program(text, options) or read_document(text, options)
     if table is None:
         check_line_lengths(text)
     return table or text
@@ -225,9 +228,13 @@ def _sniff(content: Segment | MemoryTable, options: LogMap, sniff_plain: Sniff) 
     if isinstance(content, MemoryTable):
         return to_log_table(content)
     signs = content.delimiter or options.delimiter, options.decimal
-    table = None if content.delimiter else sniff_json_lines(content)
+    table = None if content.delimiter else sniff_records(content)
     table = table or (None if signs[0] else sniff_labels(content))
-    return table or sniff_arrays(content, *signs) or name_echoed_columns(sniff_plain(content, *signs))
+    by_number = bool(options.joints) and all(map(_NUMBERS.fullmatch, options.joints))
+    if sniff_plain is sniff:
+        sniff_plain = partial(sniff, by_number=by_number)
+    table = table or sniff_arrays(content, *signs, by_number=by_number)
+    return table or name_echoed_columns(sniff_plain(content, *signs))
 
 
 def _describe_text(texts: Sequence[Segment]) -> Iterator[Inference]:

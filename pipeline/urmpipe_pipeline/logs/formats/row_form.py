@@ -22,10 +22,10 @@ from urmpipe_pipeline.logs.vocabulary import split_unit
 
 Value = str | list[str]  # a plain cell, or the numbers of an array
 
-CLOSING = {"[": "]", "(": ")"}
+CLOSING = {"[": "]", "(": ")", "{": "}"}
 MAX_SHOWN = 40  # characters of a row in a message
 _WRAPPED = re.compile(r"\b(?:\w+\.)?(?:float|int)\d+\(([^()]*)\)")  # np.float64(0.1)
-_NUMBERS = re.compile(r"[^\s,;\[\]()\"]+")
+_NUMBERS = re.compile(r"[^\s,;\[\](){}\"]+")
 _ARRAY_SIGN = "\x01"  # no text has it
 
 
@@ -86,7 +86,7 @@ class RowForm:
 
     def count_labels(self, line: str) -> int:
         """Return how many of the labels a line has, none of them as the end of a longer word."""
-        return sum(bool(_label_pattern(label).search(line)) for label in self.labels)
+        return sum(bool(_label_pattern(label).search(line)) for label in self.labels if label)
 
     def values(self, text: str) -> list[Value]:
         """Return the values of a row.
@@ -205,7 +205,7 @@ class RowForm:
         plain = rf'("(?:[^"\n]|"")*+"|[^"\r\n{delimiter.strip("[]")}{opening}]*+)'
         values = []
         for k, length in enumerate(self.lengths):
-            array = r"[ \t,;]++".join([r'([^\s,;\[\]()"]++)'] * length)
+            array = r"[ \t,;]++".join([r'([^\s,;\[\](){}"]++)'] * length)
             array = rf'"?{opening}[ \t]*+{array}[ \t,;]*+{closing}"?'
             if not self.labels:
                 values.append(array if length else plain)

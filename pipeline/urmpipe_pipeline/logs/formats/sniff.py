@@ -29,9 +29,10 @@ from urmpipe_pipeline.logs.formats.cells import (
     is_text,
     printable,
     split_line,
+    to_float,
 )
 from urmpipe_pipeline.logs.formats.clock_forms import is_clock_text
-from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, USUAL_COUNTS, LogTable
 from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.text import MIN_LINES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
@@ -69,6 +70,8 @@ def sniff(
     delimiter: str | None = None,
     decimal: str | None = None,
     lines: Sequence[HeadLine] | None = None,
+    *,
+    by_number: bool = False,
 ) -> TextTable:
     """Return a table by how it is written.
 
@@ -77,6 +80,7 @@ def sniff(
         delimiter: The sign between cells, or its name, if the file need not show it.
         decimal: The decimal sign, or its name, if the file need not show it.
         lines: The lines of its head with a plain cell for each array, if it holds arrays.
+        by_number: Whether a header that does not fit the rows is left out: the user numbers the columns.
 
     Raises:
         LogError: If it holds no numbers, no rows, or a header that does not fit its rows.
@@ -102,9 +106,10 @@ def sniff(
         raise LogError(Finding(message, file=str(segment.path), line=body[first].number))
     above = [line for line in lines if line.number < body[first].number]
     header, units = _find_header(above, style.delimiter, width)
-    names, inference = _name_cells(segment, header, body[first:], rows[first:], width)
+    names, inference = _name_cells(segment, header, body[first:], rows[first:], width, by_number=by_number)
     if header and only_count(names):
-        inference = Inference("header", f"line {header[0]}", "its names only count: columns by number")
+        if len(header[1]) == len(names):
+            inference = Inference("header", f"line {header[0]}", "its names only count: columns by number")
         if all(name.isdigit() for name in names if name):
             names = tuple(str(k + 1) if name else "" for k, name in enumerate(names))  # users count from 1
         header = None
@@ -360,8 +365,10 @@ def _name_cells(
     lines: Sequence[HeadLine],
     rows: Sequence[Row],
     width: int,
+    *,
+    by_number: bool,
 ) -> tuple[tuple[str, ...], Inference]:
-    """Return a name for every cell of a row."""
+    """Return a name for every cell of a row; numbers if the header does not fit and the user numbers them."""
     filled = [k for k, row in enumerate(rows) if len(row) == width and row[-1]]
     has_trailing = not filled
     if header is None:
@@ -389,12 +396,26 @@ def _name_cells(
                 wrong = [(lines[k].number, format_value(rows[k][column])) for k in few]
                 findings = [Finding(file=file, line=n, found=cell, allowed=allowed) for n, cell in wrong]
                 raise LogError(*capped(findings, file))
+    if by_number:
+        inference = Inference("header", f"line {line}", "it does not fit the rows: columns by number")
+        return tuple(str(k + 1) for k in range(width)), inference
     number = abs(len(cells) - width)
     remedy = f"{'add' if len(cells) < width else 'remove'} {format_count(number, 'name')}"
     wrong_count = f"found {len(cells)} names over rows of {format_count(width, 'cell')}"
-    remedy += f", or delete line {line}: without names the columns are taken as joints in order"
     message = f"{wrong_count}, allowed: one name per column; {remedy}"
-    raise LogError(Finding(message, file=str(segment.path), line=line))
+    hints = _blocks_by_number(rows, width) if width != 2 * len(cells) else []  # 0,5 is two cells
+    raise LogError(Finding(message, file=str(segment.path), line=line, hints=tuple(hints)))
+
+
+def _blocks_by_number(rows: Sequence[Row], width: int) -> list[Hint]:
+    """Return the hints that take columns as the joints by number, after a first one that increases."""
+    first = [to_float(row[0], ".") for row in rows if len(row) == width]
+    rises = [a is not None and b is not None and a < b for a, b in pairwise(first)]
+    start = 2 if rises and all(rises) else 1
+    count = width + 1 - start
+    counts = [n for n in USUAL_COUNTS if count % n == 0][:2] or [min(count, max(USUAL_COUNTS))]
+    effect = "takes these without the names"
+    return [Hint("joints", [f"{start}-{start + n - 1}"], effect) for n in counts if 1 < n <= count]
 
 
 def _uncounted_rows(rows: Sequence[Row], width: int) -> list[int]:

@@ -1,7 +1,8 @@
 """Rows that are no plain cells: values after labels, arrays in cells, rows that name their joints.
 
 1. `sniff_labels`: `Time: 0.015  q values: [0.1, 0.2]  mode=3`, as KUKA's FRI examples and consoles write. The
-   labels are learnt from the first rows: all of them have the same ones, in the same order.
+   labels are learnt from the first rows: all of them have the same ones, in the same order. An array
+   may precede the first label.
 2. `sniff_arrays`: cells that are str of a NumPy array or a list, also over several lines. A number replaces
    each array while the other cells are understood.
 3. `name_echoed_columns`: `ros2 topic echo --csv /joint_states`, a table without header.
@@ -25,9 +26,10 @@ from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 
-MIN_LABELS = 2  # a line with one label may be anything
+MIN_LABELS = 2  # a line with one label may be anything, unless an array follows it
+UNLABELLED = "array"  # the name of an array before the first label
 
-_ARRAY = r"\[[^\[\]]*\]|\([^()]*\)"
+_ARRAY = r"\[[^\[\]]*\]|\([^()]*\)|\{[^{}:]*\}"
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][-+]?\d+)?(?![\w.:]|\s*[:=])"
 _WORD = r"\"[^\"]*\"|[^\s,;|\[\](){}\"]+"
 _PAIR = re.compile(
@@ -38,6 +40,7 @@ _PAIR = re.compile(
       | (?P<glued>[-+]?\d+\.\d+(?![\w.:]|\s*[:=])) )""",
     re.VERBOSE,
 )
+_FIRST = re.compile(rf"\s*+({_ARRAY})(?=\s*+[,;|])")
 _TAIL = re.compile(r"[\s,;}]*\Z")
 _AROUND_NAME = re.compile(r"""[\s{},;|"':=]+|\b(?i:values?)\b""")
 
@@ -54,7 +57,7 @@ def sniff_labels(segment: Segment) -> TextTable | None:
     if not rows or 2 * labelled < len(lines) or 2 * len(rows) < labelled:
         return None
     opening = next((sign for sign in CLOSING if all(sign in row.text for row in rows)), "")
-    names = tuple(_AROUND_NAME.sub(" ", label).strip() for label in labels)
+    names = tuple(_AROUND_NAME.sub(" ", label).strip() or UNLABELLED for label in labels)
     form = RowForm(names, (0,) * len(names), ";", opening=opening, labels=labels, tail=tail)
     values = form.read_values(row.text for row in rows)
     lengths = tuple(usual_length(row[k] for row in values) for k in range(len(names)))
@@ -64,7 +67,8 @@ def sniff_labels(segment: Segment) -> TextTable | None:
     sample = form.read_cells(form.read_values(row.text for row in rows))
     if not sample or not any(is_number(cell, decimal) for cell in sample[0]):
         return None
-    torn = (line for line in lines if not line.is_comment and form.count_labels(line.text) >= MIN_LABELS)
+    some = min(MIN_LABELS, len(labels))
+    torn = (line for line in lines if not line.is_comment and form.count_labels(line.text) >= some)
     first = next(torn, rows[0])  # a torn row may be the first, with some of the labels
     shown = " ".join(label.strip(",;{ ") for label in labels)
     return TextTable(
@@ -83,14 +87,16 @@ def sniff_labels(segment: Segment) -> TextTable | None:
 
 def _split_labels(text: str) -> tuple[tuple[str, ...], str] | None:
     """Return the label before each value of a line, and the text after the last; None without labels."""
-    labels, place = [], 0
+    first = _FIRST.match(text)
+    labels, place = ([""], first.end()) if first else (list[str](), 0)
     while match := _PAIR.match(text, place):
         start = next(match.start(group) for group in ("signed", "array", "number", "glued") if match[group])
         labels.append(text[place:start].strip())
         place = match.end()
     tail = _TAIL.match(text, place)
     has_sign = any(label.endswith((":", "=")) for label in labels)
-    if tail is None or not has_sign or len(labels) < MIN_LABELS:
+    is_array = len(labels) == 1 and text[place - 1] in CLOSING.values()
+    if tail is None or not has_sign or (len(labels) < MIN_LABELS and not is_array):
         return None
     return tuple(labels), tail[0].strip()
 
@@ -105,7 +111,7 @@ _OTHER_SEPARATORS = re.compile(r"\d(?:\s+|\s*;\s*)[-+.\d]")
 
 
 def sniff_arrays(
-    segment: Segment, delimiter: str | None = None, decimal: str | None = None
+    segment: Segment, delimiter: str | None = None, decimal: str | None = None, *, by_number: bool = False
 ) -> TextTable | None:
     """Return a table with arrays in its cells as one of plain cells; None if it has none.
 
@@ -139,7 +145,7 @@ def sniff_arrays(
         return _STAND_IN if is_numeric or "'" in array else array
 
     plain = [replace(row, text=form.replace_arrays(row.text, stand_in)) for row in rows]
-    outer = sniff(segment, delimiter, decimal, plain)
+    outer = sniff(segment, delimiter, decimal, plain, by_number=by_number)
     form = replace(form, delimiter=outer.delimiter, decimal=outer.decimal, names=outer.names)
     body = [row for row in rows if row.number >= outer.first_line and not row.is_comment]
     values = form.read_values(row.text for row in body)
@@ -167,7 +173,7 @@ def _begin_cells(lines: Sequence[HeadLine], opening: str) -> bool:
 def _spread_columns(outer: TextTable, form: RowForm, values: Sequence[list[str | list[str]]]) -> TextTable:
     names = tuple(spread_names(outer.names, form.lengths))
     if outer.header is None:
-        names = tuple(str(k + 1) for k in range(len(names)))
+        names = tuple(str(k + 1) if name else "" for k, name in enumerate(names))
     units = [*outer.units, *("" for _ in range(len(outer.names) - len(outer.units)))] if outer.units else []
     pairs = zip(outer.names, form.lengths, strict=True)
     arrays = ", ".join(f"{name or k + 1} ({n})" for k, (name, n) in enumerate(pairs) if n)
