@@ -220,11 +220,6 @@ def _list_names(columns: Sequence[Column]) -> str:
     return ", ".join(column.name for column in columns)
 
 
-def _subject(columns: Sequence[Column], role: Role, *, are_all: bool) -> str:
-    """Return the beginning of a sentence about columns: the joints are, or q1 is."""
-    return _ALL_OF[role] if are_all else f"{_list_names(columns)} {'are' if len(columns) > 1 else 'is'}"
-
-
 def _find_common(units: Sequence[Unit | None], quantity: Quantity) -> Unit | None:
     """Return the unit that all columns of a quantity have; None if they have several, or none."""
     common = {unit for unit in units if unit is not None and unit.quantity == quantity}
@@ -267,6 +262,7 @@ class UnitFinder:
     uncertainties: dict[int, str] = field(default_factory=dict)
     uses_source: bool = False
     _notes: dict[tuple[str, str, Basis], list[Column]] = field(default_factory=dict)
+    _counts: dict[Role, int] = field(default_factory=dict)
 
     @property
     def inferences(self) -> list[Inference]:
@@ -293,7 +289,7 @@ class UnitFinder:
             OptionError: If one that the user gave does not fit the robot.
         """
         stated, proved = self.sources.of_joints(columns, robot), (False,) * len(columns)
-        joints = _Joints(columns, stated, values, t_ns)
+        joints, self._counts["joint"] = _Joints(columns, stated, values, t_ns), len(columns)
         if self.kinematic is not None:
             units, proved = self._overrule(columns, stated, "angle"), self.kinematic.proved
         else:
@@ -305,12 +301,11 @@ class UnitFinder:
         for (by_user, unit), group in groups.items():
             if unproved := [j for j in group if not proved[j]]:
                 is_open = len(unproved) == len(group) and (by_user or 0 not in self.sources.options)
-                are_all = len(unproved) == len(columns)
-                self._compare_stated(joints.select(unproved), unit, is_open=is_open, are_all=are_all)
+                self._compare_stated(joints.select(unproved), unit, is_open=is_open)
         self.warn_not_reached(columns, stated, units, "joint")
         return units
 
-    def _compare_stated(self, joints: _Joints, unit: Unit, *, is_open: bool, are_all: bool) -> None:
+    def _compare_stated(self, joints: _Joints, unit: Unit, *, is_open: bool) -> None:
         """Compare a stated unit with the values: ask if they contradict it, warn if they are unlikely."""
         columns, by = joints.columns, [item for item in joints.stated if item]
         by_user = all(item.by == "user" for item in by)
@@ -326,7 +321,7 @@ class UnitFinder:
             allowed = "a unit that fits the data"
             raise LogError(Finding(f"{message}, allowed: {allowed}", self.sources.file, hints=hints))
         if objection.columns or (is_open and not all(item.is_confirmed for item in by)):
-            self.warn_uncertain(columns, by, unit.name, objection.why, "joint", are_all=are_all)
+            self.warn_uncertain(columns, by, unit.name, objection.why, "joint")
 
     def settle_rates(self, columns: Sequence[Column], joints: Sequence[Unit], order: int) -> list[Unit]:
         """Return the units of recorded rates (order 1) or accelerations (2): the joints' own by default."""
@@ -339,7 +334,7 @@ class UnitFinder:
 
     def settle_positions(self, columns: Sequence[Column], values: FloatArray) -> list[Unit]:
         """Return the units of recorded x, y, z, whose values are in the file's own units, shape (n, 3)."""
-        stated = self.sources.of_lengths(columns)
+        stated, self._counts["position"] = self.sources.of_lengths(columns), len(columns)
         if self.kinematic is not None:
             return self._overrule(columns, stated, "length")
         self._note_stated(columns, stated)
@@ -349,7 +344,7 @@ class UnitFinder:
         if unstated and default is not None:
             self._note(unstated, default, "named", "as the other position columns")
         elif unstated:
-            default = self._assume_length(unstated, size, _ALL_OF["position"], "position")
+            default = self._assume_length(unstated, size, "position")
         units = [unit or default or vocabulary().units["m"] for unit in known]
         by = {item for item in stated if item and item.by != "urmpipe" and not item.is_confirmed}
         reach = size * units[0].factor if units else 0.0
@@ -387,8 +382,7 @@ class UnitFinder:
                 warning = LogWarning(
                     UNIT_CONTRADICTION, message, hints=unit_hints(some, better.name), role=role
                 )
-                subject = _subject(some, role, are_all=len(some) == len(columns))
-                warning = replace(warning, assumption=f"{subject} in {unit.name}")
+                warning = replace(warning, assumption=f"{self._subject(some, role)} in {unit.name}")
             else:
                 self._note(some, better, "proved", evidence)
                 message, hints = f"{message} {better.name}: {evidence}", unit_hints(some, unit.name)
@@ -404,9 +398,9 @@ class UnitFinder:
         slides = [j for j in unknown if robot and robot.moving[j].kind == "prismatic"]
         turns = [j for j in unknown if j not in slides]
         if slides:
-            sliding, subject = joints.select(slides), "the prismatic joints are"
+            sliding = joints.select(slides)
             size = usual_peak(sliding.values)
-            unit = self._assume_length(sliding.columns, size, subject, "joint")
+            unit = self._assume_length(sliding.columns, size, "joint")
             units |= dict.fromkeys(slides, unit)
         if turns:
             turning, angle = joints.select(turns), _find_common(list(units.values()), "angle")
@@ -417,14 +411,14 @@ class UnitFinder:
             units |= dict.fromkeys(turns, angle)
         return [units[j] for j in range(len(joints.columns))]
 
-    def _assume_length(self, columns: Sequence[Column], size: float, subject: str, role: Role) -> Unit:
+    def _assume_length(self, columns: Sequence[Column], size: float, role: Role) -> Unit:
         """Return m, or mm beyond any arm."""
         is_far = size > MAX_METRES
         unit = vocabulary().units["mm" if is_far else "m"]
         hints = unit_hints(columns if role == "joint" else columns[:1], OTHER_UNIT[unit.name])
         hints = which_unit(columns, "m", every=False) if is_far else hints
         why = f", as values of {size:.6g} are beyond any arm in m" if is_far else ""
-        self._assume(columns, unit, subject, role, hints, why)
+        self._assume(columns, unit, role, hints, why)
         return unit
 
     def _settle_angles(self, joints: _Joints, *, may_slide: bool) -> Unit:
@@ -447,8 +441,7 @@ class UnitFinder:
             self._note([column for column in columns if column not in still], unit, "proved", proof)
             if still:
                 hints = (Hint("unit", {"": "deg"}, "confirms it"), *unit_hints(still, "mm", "if they slide"))
-                subject = _subject(still, "joint", are_all=False)
-                self._assume(still, deg, subject, "joint", hints, f", as the others have {proof}")
+                self._assume(still, deg, "joint", hints, f", as the others have {proof}")
             return unit
         large = [column for column, x in each if peak(x) > ONE_TURN]
         if may_slide and len(columns) > 2 and len(large) == 1 and largest > 2 * TWO_TURNS:
@@ -462,7 +455,7 @@ class UnitFinder:
             raise LogError(self._ask_angle(columns, values, sliding))
         unit, why = (deg, f": {fast or far}") if fast or far else (rad, "")
         hints = (Hint("unit", {"": OTHER_UNIT[unit.name]}, "overrides this"),)
-        self._assume(columns, unit, _ALL_OF["joint"], "joint", hints, why)
+        self._assume(columns, unit, "joint", hints, why)
         return unit
 
     def _ask_angle(
@@ -502,7 +495,7 @@ class UnitFinder:
             assert every is not None
             message = f"{_list_names(some)}: {every.name} does not reach them: their names say {name}"
             hints = unit_hints(some, every.name, "does")
-            assumption = f"{_subject(some, role, are_all=len(some) == len(columns))} in {name}"
+            assumption = f"{self._subject(some, role)} in {name}"
             warning = LogWarning(UNIT_NOT_REACHED, message, hints=hints, assumption=assumption, role=role)
             self.warn(some, warning)
 
@@ -524,7 +517,6 @@ class UnitFinder:
         why: str,
         role: Role,
         *,
-        are_all: bool = True,
         is_excluded: bool = False,
     ) -> None:
         """Warn why columns of a role, or all of them, may not be in their unit, which is used.
@@ -536,7 +528,7 @@ class UnitFinder:
         every = role == "joint" and all(item.by == "source" for item in stated)
         hints = which_unit(columns, unit, every=every)[: -1 if by_user else None]
         message += f" is used, though {why}" if by_user else f" is doubted: {why}"
-        assumption = f"{_subject(columns, role, are_all=are_all)} in {unit}"
+        assumption = f"{self._subject(columns, role)} in {unit}"
         blocks = is_excluded and not by_user
         warning = LogWarning(
             DOUBTED_UNIT, message, hints=hints, assumption=assumption, role=role, blocks_verdict=blocks
@@ -553,14 +545,20 @@ class UnitFinder:
         self,
         columns: Sequence[Column],
         unit: Unit,
-        subject: str,
         role: Role,
         hints: Sequence[Hint],
         why: str = "",
     ) -> None:
         """Warn that columns are taken to be in a unit that nothing states or proves."""
         self._note(columns, unit, "assumed", "assumed")
-        names = "" if subject.startswith(_list_names(columns)) else f" for {_list_names(columns)}"
+        subject = self._subject(columns, role)
+        names = f" for {_list_names(columns)}" if subject == _ALL_OF[role] else ""
         message = f"no unit is given{names}: {subject} taken as {unit.name}{why}"
         warning = LogWarning(ASSUMED_UNIT, message, hints=tuple(hints), role=role)
         self.warn(columns, replace(warning, assumption=f"{subject} in {unit.name}"))
+
+    def _subject(self, columns: Sequence[Column], role: Role) -> str:
+        """Return the beginning of a sentence about columns: the joints are, or q1 is."""
+        if len(columns) == self._counts.get(role, len(columns)):
+            return _ALL_OF[role]
+        return f"{_list_names(columns)} {'are' if len(columns) > 1 else 'is'}"
