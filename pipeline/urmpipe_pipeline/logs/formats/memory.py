@@ -44,6 +44,8 @@ UNIT, ROLE = b"unit", b"role"  # keys of the unit of a column, and of its role a
 JOINT = b"joint"  # the role of a column that is a joint, but in no known place
 USUAL_SHARE = 0.9  # of the lists of a column that have one length, where the others are damaged
 
+_DIGITS = 38  # of a decimal of 128 bits, half of them after the point
+_SMALL = 0.01  # doubles of this size or more have no more decimals than that: 17 digits are theirs
 _ULPS = 4  # units in the last place that a product of two doubles may be off that of their digits
 _PLAIN: Mapping[str, np.dtype[Any]] = {
     "b": np.dtype(np.uint8),
@@ -118,7 +120,7 @@ def plain_table(table: pa.Table, place: str) -> pa.Table:
     return pa.Table.from_arrays([column for _, column in columns], schema=schema)
 
 
-def is_number(kind: pa.DataType) -> bool:
+def is_numeric(kind: pa.DataType) -> bool:
     """Return whether a type is that of numbers."""
     return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind))
 
@@ -182,7 +184,7 @@ def _to_numbers_or_texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     kind, types = column.type, pa.types
     if types.is_null(kind) or types.is_float16(kind):
         return column.cast(pa.float32())
-    if is_number(kind):
+    if is_numeric(kind):
         return column
     if types.is_string(kind) or types.is_large_string(kind) or types.is_string_view(kind):
         return pc.utf8_trim_whitespace(_without_view(column))
@@ -303,7 +305,7 @@ def _sample_cells(table: pa.Table) -> tuple[tuple[str, ...], ...]:
 
 def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Return a column as a CSV file has it: of numbers the shortest digits, of floats with a point."""
-    texts = column.cast(pa.string()) if is_number(column.type) else column
+    texts = column.cast(pa.string()) if is_numeric(column.type) else column
     if not pa.types.is_floating(column.type):
         return texts
     return pc.replace_substring_regex(texts, r"^(-?\d+)$", r"\1.0")
@@ -323,7 +325,7 @@ def _text_cells(column: pa.ChunkedArray) -> TextCells:
 
 def numbers_of(column: pa.ChunkedArray) -> tuple[FloatArray, dict[int, str]]:
     """Return a column in its own unit, shape (n,), NaN where a text is no number, and these texts by row."""
-    if is_number(column.type):
+    if is_numeric(column.type):
         double = pa.types.is_float64(column.type)
         numbers, missing = _values(column if double else column.cast(pa.float64(), safe=False), np.float64)
         numbers[missing] = np.nan
@@ -373,8 +375,16 @@ def _nanoseconds(column: pa.ChunkedArray, exponent: int) -> IntArray:
     times = np.where(np.isnan(values), NO_TIME, UNREADABLE)
     times[list(wrong)] = UNREADABLE
     times[is_sure] = near[is_sure].astype(np.int64)
-    rows = np.flatnonzero(~is_sure & (np.abs(product) < MAX_NS))
+    rest = np.flatnonzero(~is_sure & (np.abs(product) < MAX_NS))
+    is_long = is_numeric(column.type) & (np.abs(values[rest]) >= _SMALL)
+    rows = rest[is_long]
+    exact = column.take(arrow_column(rows)).cast(pa.string()).cast(pa.decimal128(_DIGITS, _DIGITS // 2))
+    rounded = pc.round(exact, ndigits=exponent, round_mode="half_to_even")
+    fixed = rounded.cast(pa.decimal128(_DIGITS, exponent)).combine_chunks()
+    words = np.frombuffer(fixed.buffers()[1], dtype="<i8").reshape(-1, 2)[fixed.offset :]
+    times[rows] = words[: len(rows), 0]  # the low word of two: they fit
+    rows = rest[~is_long]
     texts = column.take(arrow_column(rows)).cast(pa.string()).to_pylist()
-    exact = (to_nanoseconds(text, ".", exponent) for text in texts)
-    times[rows] = [UNREADABLE if time is None else time for time in exact]
+    short = (to_nanoseconds(text, ".", exponent) for text in texts)
+    times[rows] = [UNREADABLE if time is None else time for time in short]
     return times

@@ -191,7 +191,9 @@ def without_padding(numbers: Numbers, read_all: Callable[[], Numbers]) -> tuple[
         numbers = numbers.at(slice(int(count)))
     if starts > 1:
         message = f"the first {starts} rows hold {used[0, 0]:g} in every column, and then the values jump"
-        warnings.append(LogWarning(START, f"{message}: had the controller not started?", numbers.file_row(1)))
+        warnings.append(
+            LogWarning(START, f"{message}: the controller may not have started", numbers.file_row(1))
+        )
     return numbers, warnings
 
 
