@@ -53,8 +53,7 @@ from urmpipe_pipeline.logs.formats.clock_forms import (
     find_forms,
     read_cells,
 )
-from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import ClockColumn
+from urmpipe_pipeline.logs.formats.log_table import ClockColumn, LogTable
 from urmpipe_pipeline.logs.formats.opening import Tables, open_tables
 from urmpipe_pipeline.logs.formats.sniff import across
 from urmpipe_pipeline.logs.log_map import LogMap

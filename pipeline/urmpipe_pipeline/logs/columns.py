@@ -18,8 +18,7 @@ from itertools import combinations
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Basis, Inference
 from urmpipe_pipeline.logs.formats.cells import count_numbers, is_missing
-from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import capped
+from urmpipe_pipeline.logs.formats.log_table import LogTable, capped
 from urmpipe_pipeline.logs.formats.text import check_width
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import (

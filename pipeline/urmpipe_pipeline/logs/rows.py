@@ -23,8 +23,7 @@ from urmpipe_pipeline.logs.clock_columns import OTHER_CLOCK, OTHER_TIME
 from urmpipe_pipeline.logs.columns import Column, unit_hints
 from urmpipe_pipeline.logs.formats.cells import MAX_CELL_LENGTH
 from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS, NO_TIME, UNREADABLE
-from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import MAX_FINDINGS, Numbers, without_padding
+from urmpipe_pipeline.logs.formats.log_table import MAX_FINDINGS, LogTable, Numbers, without_padding
 from urmpipe_pipeline.logs.formats.shape import ROWS_READ
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.plan import Plan

@@ -32,8 +32,7 @@ from urmpipe_pipeline.logs.columns import Column, columns_of, listed, unit_hints
 from urmpipe_pipeline.logs.formats.cells import DECIMALS, DELIMITERS, is_number, split_line
 from urmpipe_pipeline.logs.formats.clock_forms import UNREADABLE
 from urmpipe_pipeline.logs.formats.files import unchanged
-from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
-from urmpipe_pipeline.logs.formats.numbers import Numbers, RowFault
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, Numbers, RowFault
 from urmpipe_pipeline.logs.formats.opening import PATH, open_tables
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import COMMENTS, HeadLine, Segment, head_lines

@@ -45,8 +45,7 @@ from urmpipe_pipeline.logs.formats.clock_forms import (
     expand_exponent,
     read_cells,
 )
-from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers
+from urmpipe_pipeline.logs.formats.log_table import ClockColumn, LogTable, Numbers
 from urmpipe_pipeline.logs.plan import Plan
 from urmpipe_pipeline.logs.rates import period_of
 

@@ -13,7 +13,7 @@ from urmpipe_models.planning.path import PROPER, PathRows
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.logs.clock_columns import find_time_columns
 from urmpipe_pipeline.logs.columns import Column, listed
-from urmpipe_pipeline.logs.formats.numbers import capped
+from urmpipe_pipeline.logs.formats.log_table import capped
 from urmpipe_pipeline.logs.formats.text import fingerprint
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.targets import ExtraColumn, PoseTable, read_pose_table

@@ -13,7 +13,7 @@ from urmpipe_models.errors import Finding, OptionError, PathError
 from urmpipe_models.ik.solutions import Targets, validate_targets
 from urmpipe_models.planning.from_rows import validate_ends, validate_rows
 from urmpipe_models.planning.path import VARIANTS, PathRows
-from urmpipe_pipeline.logs.formats.numbers import capped
+from urmpipe_pipeline.logs.formats.log_table import capped
 
 FARTHEST = 1e9
 """The largest coordinate of a row in [m]."""

@@ -7,6 +7,6 @@
 - Typed columns: `parquet`, `matlab` (MAT, HDF5), `arrays` (NumPy, Python), `bag` and `bag_table` (MCAP, ROS),
   as tables in `memory`.
 - Other files: `json` (and YAML), `workbook`, `programs` (robots, PLCs), `urmpipe_tables`.
-- Any table: `shape` (joints as rows, flat arrays, rows, episodes), `long_form`; `log_table` with `numbers`,
-  and times in the forms of `clock_forms`. `files` has access to files and optional libraries.
+- Any table: `shape` (joints as rows, flat arrays, rows, episodes), `long_form`; `log_table`, its numbers, and
+  times in the forms of `clock_forms`. `files` has access to files and optional libraries.
 """

@@ -10,14 +10,11 @@ from __future__ import annotations
 
 import math
 import re
-import struct
-import zlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
-from tokenize import TokenError
 from typing import IO, Any, TypeAlias
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import numpy as np
 import pyarrow as pa
@@ -45,7 +42,7 @@ from urmpipe_pipeline.logs.formats.urmpipe_tables import FORM, GIVEN
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
 
-MAX_LISTED = 9  # choices, or arrays that are not read, in a message
+MAX_LISTED = 9  # arrays that are not read, in a message
 MAX_JOINT_ROWS = 16  # rows of an array without others that may have its joints as rows, if it is wider
 
 Array: TypeAlias = NDArray[Any]
@@ -54,10 +51,6 @@ ArrayColumn: TypeAlias = tuple[Name, str, Array]  # groups and name, unit or "",
 _NUMBERED = re.compile(r"\[\d+\]$")
 _IN_ORDER = re.compile(r"(arr_\d+)?")  # the names of numpy.savez(file, t, q)
 _NPY = b"\x93NUMPY"
-_DAMAGED = (  # what NumPy and zipfile raise for damaged files
-    *(OSError, ValueError, TypeError, EOFError, BadZipFile, NotImplementedError, RuntimeError, zlib.error),
-    *(SyntaxError, TokenError, OverflowError, struct.error),
-)
 
 # Arrays of a file
 
@@ -209,7 +202,9 @@ def read_numpy(path: Path, options: LogMap) -> MemoryTable:
     """
     try:
         stored = dict(_iter_stored(path))
-    except _DAMAGED as error:
+    except LogError:
+        raise
+    except Exception as error:  # of damaged bytes NumPy and zipfile raise anything
         reason = (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
         raise LogError(Finding(f"cannot be read: {reason}", file=str(path))) from None
     arrays = dict[Name, Array]()

@@ -21,9 +21,8 @@ from urmpipe_models.elementwise import IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_missing, is_number, plain
-from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.log_table import MAX_FINDINGS, LogTable, capped
 from urmpipe_pipeline.logs.formats.memory import JOINT, ROLE, UNIT, MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.numbers import MAX_FINDINGS, capped
 from urmpipe_pipeline.logs.vocabulary import key, split_unit, vocabulary
 
 LONG = "long"

@@ -32,8 +32,7 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_nanoseconds,
 )
 from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, UNREADABLE
-from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
-from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers, RowFault
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, ClockColumn, LogTable, Numbers, RowFault
 from urmpipe_pipeline.logs.formats.row_form import spread_names
 from urmpipe_pipeline.logs.formats.sniff import only_count
 from urmpipe_pipeline.logs.formats.text import MAX_TABLE_COLUMNS, check_width

@@ -25,9 +25,8 @@ from urmpipe_pipeline.logs.formats.bag import MAGIC, is_bag_folder, is_packed
 from urmpipe_pipeline.logs.formats.cells import is_number, printable
 from urmpipe_pipeline.logs.formats.files import first_bytes, import_optional
 from urmpipe_pipeline.logs.formats.json import read_document, sniff_records
-from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.log_table import LogTable, capped
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.numbers import capped
 from urmpipe_pipeline.logs.formats.programs import read_program
 from urmpipe_pipeline.logs.formats.shape import choose_rows, orient_table
 from urmpipe_pipeline.logs.formats.sniff import GIVEN, across, sniff

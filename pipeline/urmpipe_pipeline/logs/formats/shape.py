@@ -27,10 +27,9 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_number, is_text, plain, to_float
-from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.log_table import LogTable, capped, steps
 from urmpipe_pipeline.logs.formats.long_form import LONG, find_long_form, pivot, require_long_form
 from urmpipe_pipeline.logs.formats.memory import MemoryTable, to_log_table
-from urmpipe_pipeline.logs.formats.numbers import capped, steps
 from urmpipe_pipeline.logs.formats.sniff import GIVEN, across
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap

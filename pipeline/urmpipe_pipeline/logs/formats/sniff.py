@@ -32,8 +32,7 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_float,
 )
 from urmpipe_pipeline.logs.formats.clock_forms import is_clock_text
-from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, USUAL_COUNTS, LogTable
-from urmpipe_pipeline.logs.formats.numbers import capped
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, USUAL_COUNTS, LogTable, capped
 from urmpipe_pipeline.logs.formats.text import MIN_LINES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.vocabulary import vocabulary

@@ -41,8 +41,7 @@ from urmpipe_pipeline.logs.formats.cells import (
     to_nanoseconds,
 )
 from urmpipe_pipeline.logs.formats.clock_forms import NO_TIME, REPORTED
-from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, LogTable
-from urmpipe_pipeline.logs.formats.numbers import ClockColumn, Numbers, RowFault
+from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS, ClockColumn, LogTable, Numbers, RowFault
 from urmpipe_pipeline.logs.formats.row_form import RowError, RowForm, Value
 from urmpipe_pipeline.logs.formats.text import COMMENTS, MAX_HEAD_BYTES, Segment
 from urmpipe_pipeline.logs.vocabulary import split_unit, vocabulary
