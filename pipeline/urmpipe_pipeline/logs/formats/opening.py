@@ -212,12 +212,14 @@ def _overlapping_blocks(segment: Segment, size: int = 1 << 20) -> Iterator[bytes
 
 def _split_graphs(segment: Segment) -> list[tuple[str, Segment]]:
     """Return the path of each graph of an export of CoppeliaSim, and where it stands."""
-    content, graphs, line = segment.data or segment.path.read_bytes(), [], segment.first_line
-    starts = [match.start() for match in _GRAPH.finditer(content, segment.start)]
-    line += content.count(b"\n", segment.start, starts[0] if starts else None)
-    for start, end in zip(starts, [*starts[1:], segment.end], strict=False):
+    first, line = segment.start, segment.first_line
+    content = (segment.data or segment.path.read_bytes())[first : segment.end]
+    starts = [match.start() for match in _GRAPH.finditer(content)]
+    graphs = list[tuple[str, Segment]]()
+    line += content.count(b"\n", 0, starts[0] if starts else None)
+    for start, end in zip(starts, [*starts[1:], len(content)], strict=False):
         title = content[start : content.find(b"\n", start)].decode(segment.encoding, "replace")
-        graphs.append((printable(title.strip()), segment.cut(start, end, line)))
+        graphs.append((printable(title.strip()), segment.cut(first + start, first + end, line)))
         line += content.count(b"\n", start, end)
     return graphs
 
