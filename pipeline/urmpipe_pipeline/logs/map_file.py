@@ -136,9 +136,9 @@ def map_of(
 def file_entries(inferences: Sequence[Inference]) -> dict[str, Any]:
     """Return delimiter, decimal sign and layout of the files, and the notes, of what was inferred."""
     by_kind = {inference.kind: inference for inference in inferences}
-    kinds = {"delimiter": "delimiter", "decimal": "decimal sign", "layout": "layout"}
+    kinds = {field: ENTRIES[field] for field in ("delimiter", "decimal", "layout")}
     entries: dict[str, Any] = {
-        key: by_kind[kind].value if kind in by_kind else None for key, kind in kinds.items()
+        field: by_kind[kind].value if kind in by_kind else None for field, kind in kinds.items()
     }
     notes = (by_kind[kind] for kind in NOTES if kind in by_kind)
     return entries | {"notes": tuple(f"{note.what}: {note.value} ({note.evidence})" for note in notes)}

@@ -430,7 +430,7 @@ def wraps_as_degrees(values: FloatArray) -> str | None:
 
     Values within one turn may be in rad. They are in the file's own units, shape (n, columns).
     """
-    return _format_wraps(values, "deg", "360") if peak(values) > math.tau else None
+    return format_wraps(values, "deg") if peak(values) > math.tau else None
 
 
 def wraps_as_radians(values: FloatArray) -> str | None:
@@ -441,12 +441,14 @@ def wraps_as_radians(values: FloatArray) -> str | None:
     """
     if peak(values) > ONE_TURN:
         values = values[:, [j for j, column in enumerate(values.T) if peak(column) <= ONE_TURN]]
-    return _format_wraps(values, "rad", "6.28")
+    return format_wraps(values, "rad")
 
 
-def _format_wraps(values: FloatArray, unit: str, turn: str) -> str | None:
+def format_wraps(values: FloatArray, unit: str) -> str | None:
+    """Return how often values, shape (n, columns), step by a turn in rad or deg; None if they do not."""
     count = int(count_wraps(values, unit).sum())
-    return f"{format_count(count, 'step')} of about {turn} from one row to the next" if count else None
+    step = f"{format_count(count, 'step')} of about {TURN[unit]:.3g}"
+    return f"{step} from one row to the next" if count else None
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge numbers: their steps are infinite

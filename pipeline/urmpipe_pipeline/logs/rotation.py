@@ -40,7 +40,7 @@ from urmpipe_pipeline.logs.proofs import (
     MARGIN,
     ONE_TURN,
     TWO_TURNS,
-    count_wraps,
+    format_wraps,
     peak,
     rotation_distances,
     spread,
@@ -383,7 +383,6 @@ def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | 
     if form == "vector":
         lengths = np.linalg.norm(np.diff(known, axis=0), axis=1)
         known = np.concatenate(([0.0], np.cumsum(lengths)))[:, np.newaxis]
-    likely, turn = ("deg", "360") if peak(values) > ONE_TURN else ("rad", "6.28")
-    count = int(count_wraps(known, likely).sum())
-    why = f"{format_count(count, 'step')} of about {turn} from one row to the next"
-    return (likely, why) if count else None
+    likely = "deg" if peak(values) > ONE_TURN else "rad"
+    why = format_wraps(known, likely)
+    return (likely, why) if why else None
