@@ -206,7 +206,7 @@ def _increases(numbers: Sequence[float]) -> bool:
 
 
 def runs_evenly(numbers: Sequence[float] | FloatArray) -> bool:
-    """Return whether three numbers or more increase in steps that differ by less than 1 %."""
+    """Return whether three numbers or more, of any unit, shape (n,), increase in steps equal to 1 %."""
     steps = np.diff(numbers)
     return len(steps) >= 2 and bool(steps.min() > 0 and np.ptp(steps) <= EVENLY * steps.max())
 

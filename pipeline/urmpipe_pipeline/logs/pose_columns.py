@@ -37,6 +37,7 @@ OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)
 _LIKE_JOINT = re.compile(r"q_?\d")  # names that quaternions and joints have
 _PLACES = np.arange(16).reshape(4, 4)  # of the entries of a homogeneous transform among its columns
 _ORDERS = (("row by row", _PLACES), ("column by column", _PLACES.T))
+_ROTATION_FIRST = ("rotation and position", np.column_stack([np.arange(9).reshape(3, 3), [9, 10, 11]]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,10 +248,12 @@ def trailing_pose(columns: Sequence[Column], table: LogTable, *, path: bool = Fa
 
     They hold one in all rows but a few; where a path is given, in any, as the others are wrong.
     16 or 12 are a homogeneous transform: row by row, or of 16 also column by column, as the entries
-    0, 0, 0, 1 show. Seven are x, y, z and a quaternion of unknown order; one that rests has no wrong rows.
+    0, 0, 0, 1 show; of 12 also a rotation matrix and a position, of 13 with a gripper last. Seven are x, y, z
+    and a quaternion of unknown order; one that rests has no wrong rows.
     """
-    for count in (16, 12, 7):
-        last = columns[-count:]
+    blocks = [(count, columns[-count:]) for count in (16, 12, 7)]
+    blocks += [(12, columns[:12])] if len(columns) == 13 else []
+    for count, last in blocks:
         values = table.values([column.index for column in last])
         values = values[np.isfinite(values).all(axis=1)]
         if len(last) < count or not len(values):
@@ -297,7 +300,7 @@ def holds_orientation(values: FloatArray) -> BoolArray:
 
 def _iter_transforms(columns: Sequence[Column], values: FloatArray) -> Iterator[tuple[Pose, BoolArray]]:
     """Yield the poses that 16 or 12 columns may be as a transform, and in which rows they are; shape (n,)."""
-    for order, entries in {16: _ORDERS, 12: _ORDERS[:1]}.get(len(columns), ()):
+    for order, entries in {16: _ORDERS, 12: (_ORDERS[0], _ROTATION_FIRST)}.get(len(columns), ()):
         holds = holds_orientation(values[:, entries[:3, :3].ravel()])
         if len(columns) == 16:
             holds &= (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)

@@ -498,12 +498,13 @@ def too_fast_as_radians(values: FloatArray, t_ns: IntArray | None) -> str | None
 def too_far_as_radians(values: FloatArray) -> str | None:
     """Return why values are unlikely in rad and likely in deg: two joints go beyond ten turns; or None.
 
-    Whole numbers beyond a turn in deg are counts. In the file's own units, shape (n, columns).
+    Values up to 100 may be per cent, whole numbers beyond a turn in deg are counts. In the file's own units,
+    shape (n, columns).
     """
     sizes = sorted(usual_peak(column[:, np.newaxis]) for column in values.T)
     known = values[np.isfinite(values)]
     are_counts = sizes[-1] > 360 and bool((known % 1 == 0).all())
-    if len(sizes) < 2 or sizes[-2] <= TEN_TURNS or sizes[-1] > MAX_DEGREES or are_counts:
+    if len(sizes) < 2 or sizes[-2] <= TEN_TURNS or not 100 < sizes[-1] <= MAX_DEGREES or are_counts:
         return None
     return f"as rad values of {sizes[-1]:.6g} and {sizes[-2]:.6g} are more than ten turns"
 

@@ -307,8 +307,9 @@ def _iter_arrays(
 
 
 def _is_table(value: Any) -> bool:
-    """Return whether a value is an array of arrays or objects."""
-    return isinstance(value, list) and bool(value) and all(isinstance(row, list | dict) for row in value)
+    """Return whether a value is an array of arrays or objects, of which some may be missing."""
+    rows = [row for row in value if row is not None] if isinstance(value, list) else []
+    return bool(rows) and all(isinstance(row, list | dict) for row in rows)
 
 
 def _are_samples(fields: Mapping[str, Any]) -> bool:

@@ -284,6 +284,9 @@ def _find_header(above: Sequence[HeadLine], delimiter: str, width: int) -> tuple
         line, cells = above[k], split[k]
         if abs(len(cells) - width) > 1 and (line.is_comment or len(cells) == 1):
             continue  # a comment or a title
+        names = [cell for cell in cells if cell]
+        if line.is_comment and 2 * count_numbers(names, ".") >= len(names) and not count_up(names):
+            continue  # a row that is left out
         if not units and k > 0 and _are_units(cells, split[:k]):
             units = cells
             continue
