@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import asking
 from make_specimens import paths
 from specimen import SPECIMENS, Truth
 from urmpipe_models.arm.chain import Chain
@@ -363,6 +364,26 @@ def test_three_columns_without_names_may_be_a_path_and_the_option_is_named() -> 
 def test_the_robot_is_inferred_where_the_recorded_tool_singles_it_out(name: str, robot: str | None) -> None:
     run = ingest_log(paths(SPECIMENS[name]))
     assert (run.robot.name if run.robot else None) == robot
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", GOOD, ids=_name)
+def test_without_options_a_specimen_is_read_or_a_printed_choice_leads_to_it(case: Good) -> None:
+    truth = truth_of(case)
+    t = truth.t if case.options.get("period") is None else None
+    position = None if truth.q.shape[1] else truth.position
+    known = asking.Truth(truth.q, t, float(np.max(truth.q_within)), truth.t_within, position=position)
+    robot = load_robot(case.robot) if case.robot else None
+    verdict = asking.judge(paths(SPECIMENS[case.name]), known, LogMap(), robot)
+    assert verdict.good, verdict
+
+
+@pytest.mark.parametrize("case", WRONG, ids=_name)
+def test_each_printed_choice_for_a_wrong_specimen_is_accepted(case: Wrong) -> None:
+    files, robot = paths(SPECIMENS[case.name]), load_robot(case.robot) if case.robot else None
+    first = asking.outcome(files, LogMap(), robot)
+    for reading in asking.readings(files, first, depth=1):
+        assert reading.log is not None or str(reading.came) != str(first.came), reading.answers
 
 
 # The runs of these specimens must go on where their files wrap; the first row tells no turns.
