@@ -227,8 +227,8 @@ def _find_text_forms(column: Column, table: LogTable, units: Mapping[int, Unit])
 
 
 def _wrong_unit(column: Column, unit: Unit, allowed: str) -> OptionError:
-    found = f"{unit.name} for the time {format_value(column.name)}"
-    return OptionError(Finding(parameter="unit", found=found, allowed=allowed, hints=OTHER_TIME))
+    message = f"{unit.name} for the time {format_value(column.name)}"
+    return OptionError(Finding(parameter="unit", found=message, allowed=allowed, hints=OTHER_TIME))
 
 
 class UnitChoice(NamedTuple):
@@ -294,9 +294,9 @@ def find_unit(
             raise _ask_unit(time, table, f"times of our years in steps of {step:g}", [since_1970, *usual])
         return UnitChoice(since_1970, "it counts from 1970, so as Unix time it is of our years")
     if 0 < step < MIN_PERIOD_OF_S:
-        found = f"found steps of {step:.3g}, as of days or hours"
+        message = f"found steps of {step:.3g}, as of days or hours"
         hints = (*unit_hints([time], "s", "keeps them unchanged"), *OTHER_CLOCK)
-        raise table.error(f"{found}, allowed: times in {_ALLOWED}; convert them", time.header, *hints)
+        raise table.error(f"{message}, allowed: times in {_ALLOWED}; convert them", time.header, *hints)
     if step <= MIN_PERIOD:
         choice = UnitChoice("s", "the usual unit")
     elif ("s" in usual and len(usual) > 1) or (usual == ["ms"] and any(number % 1 for number in numbers)):
@@ -341,9 +341,9 @@ def _assumed(time: Column, step: float, unit: str, why: str = "") -> tuple[LogWa
     return (LogWarning("assumed-unit", message, hints=hints, assumption=assumption, role="time"),)
 
 
-def _ask_unit(time: Column, table: LogTable, found: str, units: Sequence[str]) -> LogError:
+def _ask_unit(time: Column, table: LogTable, what: str, units: Sequence[str]) -> LogError:
     hints = (*(Hint("unit", {time.called: unit}, "specifies it") for unit in units), *OTHER_TIME)
-    return table.error(f"found {found}, which may be {' or '.join(units)}", time.header, *hints)
+    return table.error(f"found {what}, which may be {' or '.join(units)}", time.header, *hints)
 
 
 def settle_unit_by_speed(
@@ -374,8 +374,7 @@ def settle_unit_by_speed(
         else:
             unit = "ms" if are_integers and is_usual and step >= MIN_STEP_MS else ""
     if not unit:
-        found = f"{'whole ' * are_integers}steps of {step:g} ({why})"
-        raise _ask_unit(time, table, found, ["s", "ms"])
+        raise _ask_unit(time, table, f"{'whole ' * are_integers}steps of {step:g} ({why})", ["s", "ms"])
     passed_over = tuple(warning for warning in clock.warnings if warning.kind == PASSED_OVER)
     warnings = (*passed_over, *_assumed(time, step, unit, f", since {why}"))
     return _with_unit(clock, UnitChoice(unit, f"its steps of {step:g}, and {why}", warnings=warnings))

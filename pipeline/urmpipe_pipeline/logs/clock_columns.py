@@ -298,14 +298,14 @@ def _find_rest(seconds: Column, columns: Sequence[Column], table: LogTable) -> T
         is_next = may_continue and abs(column.index - seconds.index) == 1
         if column.text or column is seconds or not (is_named or is_next):
             continue
-        whole, rest = table.values([seconds.index, column.index]).T
+        seconds_part, rest = table.values([seconds.index, column.index]).T
         if is_named and unit is not None:
-            if not ((whole % 1 > 0) | (rest < 0) | (rest * 10 ** EXPONENTS[unit] >= SECOND_NS)).any():
+            if not ((seconds_part % 1 > 0) | (rest < 0) | (rest * 10 ** EXPONENTS[unit] >= SECOND_NS)).any():
                 name = "decimals of them" if unit == "s" else unit
                 evidence = f"their names: seconds and {name} apart"
                 return TimeColumns((seconds, column), evidence, EXPONENTS[unit])
-        elif np.isfinite(whole + rest).all():
-            exponent = _fit_rest(whole, rest, may_be_short=table.header is None or unit is not None)
+        elif np.isfinite(seconds_part + rest).all():
+            exponent = _fit_rest(seconds_part, rest, may_be_short=table.header is None or unit is not None)
             if exponent is not None:
                 evidence = "whole seconds, and the rest of them in the next column"
                 return TimeColumns((seconds, column), evidence, exponent)
@@ -411,7 +411,7 @@ def _find_rising(
     candidates = [*clocks, *(c for c in near if c.index == 0 or c not in values)]
     if candidates and not joints_given:
         candidates.sort(key=lambda column: column.number)
-        raise _ask_time(candidates, [*values], table, is_path=is_path)
+        raise _ask_time(candidates, table, is_path=is_path)
     return None
 
 
@@ -430,29 +430,19 @@ def _others_move(first: Column, table: LogTable) -> bool:
 
 def _is_nearly_rising(column: Column, table: LogTable) -> bool:
     """Return whether a column increases or rests in almost all rows: a damaged clock, or a coarse one."""
-    for numbers in (np.array(table.numbers(column.index)), table.values([column.index])[:, 0]):
-        steps = np.diff(numbers)
-        changes = np.flatnonzero(steps > 0)
-        rests = np.diff(changes, prepend=-1, append=len(steps))
-        is_damaged = np.count_nonzero(steps < 0) > max(2, MAX_FAULTS * len(steps))
-        if is_damaged or len(changes) < MIN_CHANGES or rests.max() * MIN_CHANGES > len(steps):
-            return False
-    return True
+    steps = np.diff(table.values([column.index])[:, 0])
+    changes = np.flatnonzero(steps > 0)
+    rests = np.diff(changes, prepend=-1, append=len(steps))
+    is_damaged = np.count_nonzero(steps < 0) > max(2, MAX_FAULTS * len(steps))
+    return not is_damaged and len(changes) >= MIN_CHANGES and rests.max() * MIN_CHANGES <= len(steps)
 
 
-def _ask_time(
-    columns: Sequence[Column], increasing: Sequence[Column], table: LogTable, *, is_path: bool
-) -> LogError:
+def _ask_time(columns: Sequence[Column], table: LogTable, *, is_path: bool) -> LogError:
+    listed = ", ".join(str(column.number) for column in columns[:MAX_LISTED])
+    listed += f" and {len(columns) - MAX_LISTED} more" if len(columns) > MAX_LISTED else ""
+    which = f"columns {listed}, which increase" if len(columns) > 1 else f"column {listed}, which increases"
     what = "the time or a counter" if is_path else "the time, a counter or a joint"
-    if len(columns) > 1:
-        numbers = ", ".join(str(column.number) for column in columns[:MAX_LISTED])
-        more = f" and {len(columns) - MAX_LISTED} more" if len(columns) > MAX_LISTED else ""
-        message = f"found columns {numbers}{more}, which increase from row to row: each may be {what}"
-    else:
-        how = "increases from row to row" if columns[0] in increasing else "increases or rests in most rows"
-        name = "a first column that" if columns[0].index == 0 else f"column {columns[0].number}, which"
-        joint = ", which may be" if columns[0].index == 0 else " and may be"
-        message = f"found {name} {how}{joint} {what}"
+    message = f"found {which} from row to row and may be {what}"
     choices = [*(str(column.number) for column in columns[:MAX_LISTED]), "none"]
     hints = [Hint("time", choice, "specifies it") for choice in choices]
     hints += [] if is_path else [Hint("joints", None, "names the joint columns")]

@@ -20,7 +20,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray
 
 MAX_PERIOD_DEVIATION = 0.15  # of the periods that single joints show, as a share of their median
-MIN_SURE_JOINTS = 4  # fewer may go on as others say by chance, where no robot tells how many there are
+MIN_SURE_JOINTS = 4  # fewer may change as others say by chance, where no robot gives their number
 MAX_JOINTS = 8  # of an arm, where their number is unknown
 MIN_ROWS = 20  # fewer prove nothing
 MAX_ROWS = 10_000  # pairs of rows, spread evenly, that decide
@@ -89,18 +89,16 @@ class Block(NamedTuple):
 
 
 def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
-    """Return the blocks of joints whose rates stand beside them, by their numbers; the largest.
+    """Return the blocks of joints with rates next to them, by their numbers; the largest.
 
     Blocks of one size fill the table, as [q, qd] and [tau, q, qd], or q1, qd1, q2, qd2. A block that is the
     rates of another one is none of joints: [q, qd, qdd].
 
     Args:
         values: The columns in the file's own units, shape (n, columns); NaN where a sample is missing.
-        count: How many joints the arm has; None if unknown: then rates stand right behind or before joints.
+        count: How many joints the arm has; None if unknown: then rates are right after or before joints.
     """
-    columns = values.shape[1]
-
-    known = values[:: 1 + len(values) // MAX_ROWS]
+    columns, known = values.shape[1], values[:: 1 + len(values) // MAX_ROWS]
     known = known[np.isfinite(known).all(axis=1)]
     if len(known) < MIN_ROWS:
         return []

@@ -277,8 +277,8 @@ def _iter_clock_errors(numbers: Numbers, clock: Clock) -> Iterator[Finding]:
 
     def error(k: int, more: str, hints: tuple[Hint, ...]) -> Finding:
         now, before = (clock.format(int(times[known[i]])) for i in (k + 1, k))
-        found = f"{now} {'again' if steps[k] == 0 else f'after {before}'}{more}"
-        message = f"found {found}, allowed: {_INCREASING}"
+        where = "again" if steps[k] == 0 else f"after {before}"
+        message = f"found {now} {where}{more}, allowed: {_INCREASING}"
         return Finding(message, row=int(known[k + 1]) + 1, column=name, hints=hints)
 
     if are_many(len(backwards), len(times)):
@@ -306,7 +306,7 @@ def unknown_times(numbers: Numbers, clock: Clock) -> Iterator[Finding]:
 
 
 def _iter_times_of_day(times: IntArray, clock: Clock) -> Iterator[Finding]:
-    """Yield where numbers go on as times of day written hhmmss do: 101159 is followed by 101200."""
+    """Yield where numbers continue as times of day written hhmmss: 101159 is followed by 101200."""
     if clock.stated_by or clock.are_durations or clock.unit not in EXPONENTS:
         return
     unit = 10 ** EXPONENTS[clock.unit]
@@ -319,21 +319,21 @@ def _iter_times_of_day(times: IntArray, clock: Clock) -> Iterator[Finding]:
         return
     k = int(np.flatnonzero(jumps)[0])
     after, before = (f"{times[i] / unit:.15g}" for i in (k + 1, k))
-    message = f"found {after} after {before}, as a time of day hhmmss goes on, allowed: a clock of one unit"
+    message = f"found {after} after {before}, as times of day hhmmss continue, allowed: a clock of one unit"
     in_unit = unit_hints(clock.columns[:1], clock.unit, "takes it as no time of day")
     hints = (Hint("", effect="write it as hh:mm:ss"), *in_unit, *OTHER_TIME)
     yield Finding(message, row=k + 2, column=clock.columns[0].header, hints=hints)
 
 
 def _find_new_starts(times: IntArray, steps: IntArray) -> IntArray:
-    """Return the steps back to about the first time, after which the times go on: several logs."""
+    """Return the steps back to about the first time, after which the times continue: several logs."""
     if len(steps) < 3:
         return np.empty(0, dtype=np.int64)
     period = np.median(np.abs(steps))
     is_far_back = steps < -MIN_RETURN * period
     is_near_first = np.abs(times[1:] - times[0]) <= GAP * period
-    goes_on = np.append((steps[1:] > 0) & (steps[1:] <= GAP * period), False)
-    return np.flatnonzero(is_far_back & is_near_first & goes_on)
+    continues = np.append((steps[1:] > 0) & (steps[1:] <= GAP * period), False)
+    return np.flatnonzero(is_far_back & is_near_first & continues)
 
 
 def _several_logs(starts: IntArray, numbers: Numbers, name: str) -> Finding:
@@ -389,14 +389,14 @@ def missing_warnings(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list
 
     The columns come in groups with their names: values in any unit, shape (n, columns).
     """
-    alike: dict[bytes, tuple[BoolArray, list[str]]] = {}
+    by_rows: dict[bytes, tuple[BoolArray, list[str]]] = {}
     for values, names in groups:
         for j in _find_not_finite(values):
             is_missing = np.isnan(values[:, j])
             if is_missing.any():
-                alike.setdefault(is_missing.tobytes(), (is_missing, []))[1].append(names[j])
+                by_rows.setdefault(is_missing.tobytes(), (is_missing, []))[1].append(names[j])
     warnings = []
-    for is_missing, columns in alike.values():
+    for is_missing, columns in by_rows.values():
         count = f"{np.count_nonzero(is_missing)} of {len(is_missing)} rows"
         verb = "has" if len(columns) == 1 else "have"
         message = f"{', '.join(columns)} {verb} no value in {count}, first in this one"

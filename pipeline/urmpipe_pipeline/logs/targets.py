@@ -188,7 +188,7 @@ def _check_columns(plan: Plan, naming: str, *, named: bool, timed: bool) -> None
         raise LogError(Finding(f"{fault}, allowed: one table", table.file))
     cells = len(table.names) - (not table.names[-1])
     if table.header is None and cells > len(used) and not (plan.roles.rotation or named):
-        time = " beside the time" if plan.clock.columns else ""
+        time = " next to the time" if plan.clock.columns else ""
         count = cells - len(plan.clock.columns)
         hints = [Hint("", effect=naming)]
         hints += [Hint("rotation", form, "specifies it") for form in FORMS if 3 + column_count(form) == count]
@@ -473,7 +473,7 @@ def _rotation_form(
     columns, forms = plan.roles.rotation, plan.roles.forms
     if not columns and requested:
         fault = f"{requested} given for {listed(plan.roles.position)} and no orientation"
-        allowed = "its columns beside them"
+        allowed = "its columns next to them"
         raise LogError(Finding(file=file, parameter="rotation", found=fault, allowed=allowed, hints=(NAMED,)))
     if not columns:
         patterns = (  # KUKA's A, B, C may be anything

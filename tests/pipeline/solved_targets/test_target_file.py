@@ -216,7 +216,7 @@ def test_columns_that_may_be_an_orientation_are_not_left_out_in_silence(read: Re
 def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
     assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", rotation="rpy") == [
         "targets.csv: rotation (--rotation): found rpy given for x, y, z and no orientation, allowed: its"
-        " columns beside"
+        " columns next to"
         f" them; {NAMED}"
     ]
     assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", orientation=("u", "v", "w")) == [
@@ -285,6 +285,6 @@ def test_of_columns_without_names_the_form_tells_the_time_by_their_number(read: 
     assert targets.t_ns.tolist() == [0, 10**8, 4 * 10**8]
     assert_turned(targets, [np.eye(3)] * 3)
     assert wrong("".join(row[:15] + "\n" for row in rows)) == [
-        "targets.csv:1: found a first column that increases from row to row, which may be the time or"
+        "targets.csv:1: found column 1, which increases from row to row and may be the time or"
         " a counter; --time 1 or --time none specifies it"
     ]

@@ -242,7 +242,7 @@ def _iter_forms() -> Iterator[ClockForm]:
         unpadded = f"{name}, {_UNPADDED_NAME}"
         yield ClockForm(unpadded, DATE, date + between + _UNPADDED, True, keys, "us", is_fallback=True)
         for unit, what in _COUNTS.items():
-            counted = f"{name}, {what} behind the last colon"
+            counted = f"{name}, {what} after the last colon"
             yield ClockForm(counted, DATE, date + between + _COUNTED, True, (*keys, unit), unit)
     dense = rf"(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DECIMALS}"
     yield ClockForm("date and time, without signs", DATE, _DENSE_DATE + between + dense + _ZONE)
@@ -251,7 +251,7 @@ def _iter_forms() -> Iterator[ClockForm]:
     yield ClockForm(unpadded, TIME_OF_DAY, _UNPADDED, tail="us", is_fallback=True)
     for unit, what in _COUNTS.items():
         yield ClockForm(
-            f"time of day, {what} behind the last colon", TIME_OF_DAY, _COUNTED, True, (unit,), unit
+            f"time of day, {what} after the last colon", TIME_OF_DAY, _COUNTED, True, (unit,), unit
         )
     days = rf"(?P<days_sign>[+-]?)(?P<days>\d{{1,6}}) days?(?: \+?{_CLOCK})?"
     yield ClockForm("days, hours, minutes and seconds", DURATION, days)
@@ -278,7 +278,7 @@ DENSE_DATE = ClockForm(  # may be written with an exponent
     rf"{_THIS_CENTURY}(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DENSE_END}",
 )
 UNPADDED_NS = ClockForm(  # 7.5000000 is 7 s and 5 ms
-    "seconds, and nanoseconds not zero-padded behind the point",
+    "seconds, and nanoseconds not zero-padded after the point",
     DURATION,
     r"(?P<integer>\d{1,10})[.,](?P<count>0|[1-9]\d{0,8})",
     tail="ns",
