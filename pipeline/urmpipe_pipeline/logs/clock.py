@@ -82,8 +82,7 @@ class Clock(NamedTuple):
     Attributes:
         columns: One column, or the two of a split time; none if the table has no time.
         parts: The same for the reader; none if the times are not read, as of static poses.
-        unit: Its unit: s, ms, us, ns, or of text "date" or "time of day".
-        stated_by: What states that unit: "option", "name", "source" (the program that wrote the log), or "".
+        stated_by: What states its unit: "option", "name", "source" (the program that wrote the log), or "".
         are_durations: Whether each row has a duration, and the times are their sum.
         inferences: How columns and unit were found.
         warnings: About the columns and the unit.
@@ -91,7 +90,6 @@ class Clock(NamedTuple):
 
     columns: tuple[Column, ...] = ()
     parts: tuple[ClockColumn, ...] = ()
-    unit: str = "s"
     stated_by: str = ""
     are_durations: bool = False
     inferences: tuple[Inference, ...] = ()
@@ -103,9 +101,9 @@ class Clock(NamedTuple):
         return Clock(self.columns, inferences=self.inferences[:1])
 
     @property
-    def units(self) -> dict[str, str]:
-        """The unit of each of its columns by name."""
-        return {column.name: _part_unit(part) for column, part in zip(self.columns, self.parts, strict=True)}
+    def unit(self) -> str:
+        """Its unit: s, ms, us, ns, or of text "date" or "time of day"."""
+        return self.parts[0].unit if self.parts else "s"
 
     def format(self, nanoseconds: int) -> str:
         """Return a time as the file writes it."""
@@ -118,12 +116,6 @@ class Clock(NamedTuple):
         else:
             return f"{Decimal(nanoseconds).scaleb(-EXPONENTS[self.unit]).normalize():f} {self.unit}"
         return f"{text}.{rest:09d}".rstrip("0").rstrip(".")
-
-
-def _part_unit(part: ClockColumn) -> str:
-    if part.forms:
-        return part.forms[0].unit
-    return next(unit for unit, exponent in EXPONENTS.items() if exponent == part.exponent)
 
 
 def find_clocks(
@@ -181,16 +173,17 @@ def make_clock(
     if is_label:
         return Clock(columns, inferences=(inference,))
     if forms := _find_form_of_numbers(first, table, source, units):
-        parts: tuple[ClockColumn, ...] = (ClockColumn(first.index, forms=forms),)
+        parts: tuple[ClockColumn, ...] = (ClockColumn(first.index, forms[0].unit, forms),)
     elif first.text:
-        parts = tuple(ClockColumn(c.index, forms=_find_text_forms(c, table, units)) for c in columns)
-    elif time.rest_exponent is not None:
-        parts = (ClockColumn(first.index, 9), ClockColumn(columns[1].index, time.rest_exponent))
+        of_columns = [(column, _find_text_forms(column, table, units)) for column in columns]
+        parts = tuple(ClockColumn(column.index, forms[0].unit, forms) for column, forms in of_columns)
+    elif time.rest_unit:
+        parts = (ClockColumn(first.index, "s"), ClockColumn(columns[1].index, time.rest_unit))
     else:
         choice = find_unit(first, table, source, units, are_durations=time.are_durations)
         clock = Clock(columns, are_durations=time.are_durations, inferences=(inference,))
         return _with_unit(clock, choice)
-    return Clock(columns, parts, _part_unit(parts[0]), inferences=(inference,))
+    return Clock(columns, parts, inferences=(inference,))
 
 
 def _find_form_of_numbers(
@@ -248,8 +241,7 @@ def _with_unit(clock: Clock, choice: UnitChoice) -> Clock:
     basis: Basis = "assumed" if is_assumed else "named" if is_named else "proved"
     inference = Inference("unit of the time", unit, choice.evidence, "", (time.name,), other, basis)
     return clock._replace(
-        parts=(ClockColumn(time.index, EXPONENTS[unit]),),
-        unit=unit,
+        parts=(ClockColumn(time.index, unit),),
         stated_by=choice.stated_by,
         inferences=(clock.inferences[0], inference),
         warnings=choice.warnings,
@@ -495,10 +487,7 @@ def append_time_file(tables: Tables, options: LogMap) -> tuple[Tables, int | Non
     if len(tables.tables) > 1:
         found = f"{format_value(options.time or '')} for {len(tables.tables)} tables"
         raise OptionError(Finding(parameter="time", found=found, allowed="FILE:COLUMN for one table"))
-    try:
-        times = open_tables([file_column[0]], LogMap(delimiter=options.delimiter, decimal=options.decimal))
-    except LogError:
-        times = open_tables([file_column[0]], LogMap())  # it may be written in another way than the log
+    times = open_tables([file_column[0]], LogMap())  # it may be written in another way than the log
     table, rows = across(times.tables[0]), tables.tables[0].rows
     if rows is not None and rows[-1] < table.count_rows():
         table = table.take(rows)
@@ -543,11 +532,8 @@ def find_clocks_with_file(
         for column in in_log:
             if is_named_time(column.key):
                 hints = (Hint("time", None, "selects the column"), Hint("time", "none", "leaves both out"))
-                message, place = (
-                    f"found a time here and in {title}, allowed: one clock",
-                    log_table.header_line,
-                )
-                raise LogError(Finding(message, log_table.file, place, column=column.header, hints=hints))
+                message, line = f"found a time here and in {title}, allowed: one clock", log_table.header_line
+                raise LogError(Finding(message, log_table.file, line, column=column.header, hints=hints))
         form = "one row" if table.across else "one column"
         time, value = TimeColumns(in_file, f"{title} holds nothing but {form} of times"), ""
     else:

@@ -71,14 +71,14 @@ class TimeColumns(NamedTuple):
     Attributes:
         columns: One column, or two that are added; empty without a time.
         evidence: Why they are the time.
-        rest_exponent: Power of ten to [ns] of the rest of a split time.
+        rest_unit: The unit of the rest of a split time; empty without one.
         are_durations: Whether each row has a duration, and the times are their sum.
         passed_over: Times of the side that is not read.
     """
 
     columns: tuple[Column, ...]
     evidence: str
-    rest_exponent: int | None = None
+    rest_unit: str = ""
     are_durations: bool = False
     passed_over: tuple[Column, ...] = ()
 
@@ -303,31 +303,32 @@ def _find_rest(seconds: Column, columns: Sequence[Column], table: LogTable) -> T
             if not ((seconds_part % 1 > 0) | (rest < 0) | (rest * 10 ** EXPONENTS[unit] >= SECOND_NS)).any():
                 name = "decimals of them" if unit == "s" else unit
                 evidence = f"their names: seconds and {name} apart"
-                return TimeColumns((seconds, column), evidence, EXPONENTS[unit])
+                return TimeColumns((seconds, column), evidence, unit)
         elif np.isfinite(seconds_part + rest).all():
-            exponent = _fit_rest(seconds_part, rest, may_be_short=table.header is None or unit is not None)
-            if exponent is not None:
+            fitting = _fit_rest(seconds_part, rest, may_be_short=table.header is None or unit is not None)
+            if fitting is not None:
                 evidence = "whole seconds, and the rest of them in the next column"
-                return TimeColumns((seconds, column), evidence, exponent)
+                return TimeColumns((seconds, column), evidence, fitting)
     return None
 
 
-def _fit_rest(seconds: FloatArray, rest: FloatArray, *, may_be_short: bool) -> int | None:
-    """Return the only power of ten to [ns] with which the rest continues seconds, both of shape (n,)."""
+def _fit_rest(seconds: FloatArray, rest: FloatArray, *, may_be_short: bool) -> str | None:
+    """Return the only unit in which the rest continues seconds, both of shape (n,)."""
     ticks, are_decimals, fitting = np.diff(seconds), bool((rest % 1 != 0).any()), []
     if (seconds % 1 != 0).any() or (rest < 0).any():
         return None
-    for exponent in (9,) if are_decimals else (0, 3, 6):
-        steps = ticks * SECOND_NS + np.diff(rest) * 10.0**exponent
+    for unit in ("s",) if are_decimals else ("ms", "us", "ns"):
+        scale = 10.0 ** EXPONENTS[unit]
+        steps = ticks * SECOND_NS + np.diff(rest) * scale
         inside, across = steps[ticks == 0], steps[ticks == 1]
-        if rest.max() * 10.0**exponent >= SECOND_NS or (steps < 0).any() or not inside.any():
+        if rest.max() * scale >= SECOND_NS or (steps < 0).any() or not inside.any():
             continue
         if len(across):
             continues = np.mean(across <= MAX_SEAM * inside[inside > 0].mean()) > 0.5
         else:
             continues = may_be_short and not are_decimals and EPOCH[0] <= seconds[0] <= EPOCH[1]
         if continues and MIN_PERIOD * SECOND_NS < inside.mean() <= MAX_PERIOD * SECOND_NS:
-            fitting.append(exponent)
+            fitting.append(unit)
     return fitting[0] if len(fitting) == 1 else None
 
 

@@ -318,9 +318,10 @@ def _unused_options(reading: Reading, *, uses_source: bool) -> Iterator[LogWarni
 
 
 def _time_columns(plan: Plan) -> Iterator[LogColumn]:
-    for i, (column, unit) in enumerate(zip(plan.clock.columns, plan.clock.units.values(), strict=True)):
+    for i, (column, part) in enumerate(zip(plan.clock.columns, plan.clock.parts, strict=True)):
+        unit, number = part.unit, column.number
         factor = 10.0 ** (EXPONENTS.get(unit, 9) - 9)  # of a date: 1
-        yield LogColumn(column.name, _header(plan, column), "time", i, unit, factor, number=column.number)
+        yield LogColumn(column.name, _header(plan, column), "time", i, unit, factor, number=number)
 
 
 def _log_columns(reading: Reading, proposal: Proposal) -> Iterator[LogColumn]:

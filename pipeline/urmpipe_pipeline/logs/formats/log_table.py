@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from urmpipe_pipeline.logs.formats.cells import (
     plain,
     to_float,
 )
-from urmpipe_pipeline.logs.formats.clock_forms import UNPADDED_NS, ClockForm
+from urmpipe_pipeline.logs.formats.clock_forms import EXPONENTS, UNPADDED_NS, ClockForm
 
 USUAL_COUNTS = (6, 7, 5, 4)  # joints of arms, the usual first
 MAX_SAMPLED_ROWS = 250  # rows whose cells decide how a table is written
@@ -63,19 +63,23 @@ def capped(findings: Sequence[Finding], file: str) -> list[Finding]:
     return [*findings[:MAX_FINDINGS], *([Finding(f"{more} more findings", file)] if more > 0 else [])]
 
 
-@dataclass(frozen=True, slots=True)
-class ClockColumn:
+class ClockColumn(NamedTuple):
     """A column of the clock.
 
     Attributes:
         column: Its place.
-        exponent: Power of ten from its unit to [ns]: 9 for s.
-        forms: The forms of its cells if they are text: then the exponent is not used.
+        unit: Its unit: s, ms, us, ns, or of text "date" or "time of day".
+        forms: The forms of its cells if they are text.
     """
 
     column: int
-    exponent: int = 0
+    unit: str
     forms: tuple[ClockForm, ...] = ()
+
+    @property
+    def exponent(self) -> int:
+        """Power of ten from the unit of numbers to [ns]: 9 for s."""
+        return EXPONENTS[self.unit]
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +285,7 @@ class LogTable(ABC):
 
     def texts(self, column: int) -> list[str]:
         """Return all cells of a column as text, without spaces and quotes around them."""
-        cells = self._read((), [ClockColumn(column, forms=(UNPADDED_NS,))], {}).texts[0]
+        cells = self._read((), [ClockColumn(column, UNPADDED_NS.unit, (UNPADDED_NS,))], {}).texts[0]
         return [cells.text(row).strip(" \"'") for row in range(len(cells))]
 
     @cached_property
