@@ -353,7 +353,7 @@ def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
         (
             "x [ft],y [ft],z [m]\n1,2,3\n",
             [
-                "targets.csv, column x [ft]: found the unit 'ft', allowed: rad, deg, m, mm, cm;"
+                "targets.csv, column x [ft]: found the unit 'ft', allowed: rad, deg, turn/N, m, mm, cm;"
                 ' convert the values; --unit x=mm keeps the values unchanged'
             ],
         ),
