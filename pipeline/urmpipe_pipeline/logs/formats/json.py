@@ -322,9 +322,8 @@ def _are_samples(fields: Mapping[str, Any]) -> bool:
     samples = [list(_iter_shapes(value)) for value in fields.values()]
     is_short = all(0 < length <= MAX_SAMPLE for _, length in samples[0])
     is_same = samples[0] != [] and all(sample == samples[0] for sample in samples)
-    names = [
-        name for name in fields if len(name) > 1 or len(samples[0]) == 1
-    ]  # A, B of objects are no angles
+    are_arrays = len(samples[0]) == 1
+    names = [name for name in fields if len(name) > 1 or are_arrays]  # A, B of objects are no angles
     return is_same and is_short and not any(vocabulary().is_column(key(name)) for name in names)
 
 
