@@ -56,7 +56,7 @@ SAMPLES = {  # by the metavar
     "COLUMN": Sample("2", 2, 2),
     "[FILE:]COLUMN": same("clock"),
     "A,B,C": Sample("a,b,2", ["a", "b", 2], ["a", "b", 2]),
-    "table|transposed|flat:N|flat-by-joint:N": same("flat:6"),
+    "table|transposed|long|flat:N|flat-by-joint:N": same("flat:6"),
     "NAME,...": Sample("a,b", ["a", "b"], ("a", "b")),
     "1|-1,...": Sample("1,-1", [1, -1], (1, -1)),
     "OFFSET,...": Sample("0,90.5", [0, 90.5], np.array([0.0, 90.5])),

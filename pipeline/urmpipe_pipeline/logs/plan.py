@@ -46,6 +46,7 @@ from urmpipe_pipeline.logs.formats.cells import is_missing
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.opening import PATH, Tables
 from urmpipe_pipeline.logs.formats.shape import ROWS_READ
+from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.roles import (
     Roles,
@@ -55,7 +56,7 @@ from urmpipe_pipeline.logs.roles import (
     signal_roles,
     written_roles,
 )
-from urmpipe_pipeline.logs.unnamed import one_plot_a_file, without_header
+from urmpipe_pipeline.logs.unnamed import ASSUMED_JOINTS, MAX_UNASKED, one_plot_a_file, without_header
 from urmpipe_pipeline.logs.vocabulary import Patterns, Unit
 
 MAX_JOINTS = 500  # of a log: an arm has seven, a humanoid with its hands has sixty
@@ -235,8 +236,9 @@ def _roles_by_names(
     is_path = options.source == PATH or written == ()
     joints = () if is_path else written or ()
     roles = assign(columns, tables.tables, options, robot, path=is_path, written=joints)
-    if robot is None and not options.joints:
+    if robot is None and not (options.joints or written):
         _check_no_position(roles, tables)
+        roles = _warn_of_many_joints(roles)
     if not options.joints:
         check_unique_names(
             roles.joints, columns, tables.tables, Hint("joints", None, "selects them: give their numbers")
@@ -246,13 +248,30 @@ def _roles_by_names(
     return roles
 
 
+def _warn_of_many_joints(roles: Roles) -> Roles:
+    """Return roles with the warning that so many joints may be those of two arms, a hand or wheels, too."""
+    names = listed(roles.joints)
+    if len(roles.joints) <= MAX_UNASKED:
+        return roles
+    message = f"{len(roles.joints)} columns are taken as the joints, more than an arm has: {names}"
+    hints = (Hint("joints", None, "names those of the arm"),)
+    assumption = f"the joints are {names}"
+    warning = LogWarning(ASSUMED_JOINTS, message, hints=hints, assumption=assumption, role="joint")
+    return replace(roles, warnings=(*roles.warnings, warning))
+
+
 def _check_no_position(roles: Roles, tables: Tables) -> None:
-    """Raise a `LogError` with the question whether position_0 to position_2 are joints or x, y, z."""
+    """Raise a `LogError` with the question whether pos_0, pos_1, ... are joints or the pose of a tool.
+
+    In a header six or seven are joints; after a label, `pos: [0.1, ...]`, they may be either.
+    """
     joints = roles.joints
-    are_positions = len(joints) == 3 and all(_POSITION.fullmatch(c.key) and c.unit is None for c in joints)
-    if are_positions and not (roles.rates or roles.position):
-        hints = (take(joints), take(joints, "takes them as x, y, z", parameter="position"))
-        names = f"{listed(joints)}, which may be three joints or the position of a tool"
+    texts = [table for table in tables.tables if isinstance(table, TextTable)]
+    counts = (3, 6, 7) if any(text.form and text.form.labels for text in texts) else (3,)
+    are_positions = all(_POSITION.fullmatch(c.key) and c.unit is None for c in joints)
+    if len(joints) in counts and are_positions and not (roles.rates or roles.position):
+        hints = (take(joints), take(joints[:3], "takes x, y, z", parameter="position"))
+        names = f"{listed(joints)}, which may be joints or the pose of a tool"
         raise LogError(Finding(file=tables.tables[joints[0].table].file, found=names, hints=hints))
 
 

@@ -504,7 +504,7 @@ def too_far_as_radians(values: FloatArray) -> str | None:
     sizes = sorted(usual_peak(column[:, np.newaxis]) for column in values.T)
     known = values[np.isfinite(values)]
     are_counts = sizes[-1] > 360 and bool((known % 1 == 0).all())
-    if len(sizes) < 2 or sizes[-2] <= TEN_TURNS or not 100 < sizes[-1] <= MAX_DEGREES or are_counts:
+    if len(sizes) < 2 or sizes[-2] <= TEN_TURNS or not 100 < sizes[-1] <= np.degrees(ONE_TURN) or are_counts:
         return None
     return f"as rad values of {sizes[-1]:.6g} and {sizes[-2]:.6g} are more than ten turns"
 

@@ -467,6 +467,9 @@ class UnitFinder:
         counts = dict.fromkeys((*finer[:1], USUAL_COUNTS)) if finer else ()
         message = f"found values up to {largest:.6g} in {_list_names(columns)} and no unit"
         choices = [{"": "rad"}, {"": "deg"}, *({"": f"turn/{n}"} for n in counts)]
+        far = [column for column, x in zip(columns, values.T, strict=False) if peak(x) > np.degrees(ONE_TURN)]
+        if sliding is not None and not counts and 0 < len(far) < len(columns) == values.shape[1]:
+            choices.append({"": "deg"} | {column.called: "mm" for column in far})
         choices += [{"": "rad"} | {column.called: "mm" for column in sliding}] if sliding else []
         hints = [Hint("unit", choice, "specifies it") for choice in choices]
         if _are_unnamed(columns):

@@ -240,7 +240,9 @@ def _joints_among(
     message += f", of which {listed(doubtful)} may not be joints" if doubtful else ""
     message += f", and robot {robot.name} has {count} joints" if robot else ""
     as_path = (Hint("source", "path", "reads them as x, y, z"),) if may_be_path else ()
-    raise which_joints(table.file, message, groups, UNKNOWN, *as_path)
+    transposed = Hint("layout", "transposed", "takes the rows as joints")
+    as_rows = (transposed,) if len(values) <= MAX_UNASKED < len(free) else ()
+    raise which_joints(table.file, message, groups, UNKNOWN, *as_path, *as_rows)
 
 
 def find_odd_columns(values: FloatArray) -> BoolArray:

@@ -43,6 +43,8 @@ MAX_DIGITS = 17  # decimal digits of a double
 _SEPARATORS = str.maketrans('\t\r\n"', "   '")  # would end a cell or a line of text with tabs
 _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 _BEGINNING = re.compile(r'\s*(?:\[\s*(?:[\[{]|$)|\{\s*")')
+_ASSIGNED = re.compile(r"\s*\w+ *= *(?:\w+\.array\()?(?=\[\s*\[)")  # a variable of Python
+_LAST_COMMA = re.compile(r",\s*\]")
 _DOCUMENT = re.compile(r"\s*(?:\[\s*\{|[\[{]\r?\n)")  # no other text begins so
 _YAML_LINE = re.compile(r"\s*+(?:-(?: .*)?|[\w./~]++:(?: .*)?|.*---|-?[\d.][^:]*|[^:]*\],?|#.*)")
 _YAML_NEXT = re.compile(r"^( *+)(?:- )*[\w./~]++: *+\n(?:\1 +\S| *- )", re.MULTILINE)  # a key above its value
@@ -52,7 +54,7 @@ MIN_YAML = 0.9  # share of lines: a message of the program that prints may be am
 MAX_SAMPLE = 9  # numbers of an array: joints, or a position and a quaternion; more are rows of a column
 _BETWEEN = "---"  # documents of YAML
 _NOTE = re.compile(r"A message was lost")  # what `ros2 topic echo` prints between messages
-_NAMES = ("joint_names", "name")  # keys of the names of the values of other arrays
+_NAMES = ("joint_names", "names", "name")  # keys of the names of the values of other arrays
 _UNIT_LAST = re.compile(r"(.*\S)\s*[\[(]([^\[\]()\d]+)[\])]")
 
 Record = dict[str, str]
@@ -135,10 +137,13 @@ def read_document(segment: Segment, options: LogMap) -> MemoryTable | None:
         LogError: If it is damaged or holds no arrays of numbers; with a question if they have several
             lengths, or are those of several episodes.
     """
-    form = "JSON" if _BEGINNING.match(segment.head) else "YAML" if _is_yaml(segment) else ""
+    is_json = _BEGINNING.match(segment.head) or _ASSIGNED.match(segment.head)
+    form = "JSON" if is_json else "YAML" if _is_yaml(segment) else ""
     if not form or _is_json_lines(segment) or (form == "YAML" and _has_documents(segment)):
         return None
     file, text = str(segment.path), segment.text()
+    if match := _ASSIGNED.match(text):
+        text = _LAST_COMMA.sub("]", text[match.end() :].rstrip(") \r\n"))
     try:
         document = _read_yaml(segment, text) if form == "YAML" else _DECODER.decode(text)
     except (ValueError, RecursionError) as error:
@@ -315,24 +320,27 @@ def _is_table(value: Any) -> bool:
 def _are_samples(fields: Mapping[str, Any]) -> bool:
     """Return whether an object has a sample under each name: {"home": [0.1, 0.2], "pick": [0.3, 0.4]}.
 
-    They are objects or arrays of one form, the arrays short, and none is named like a column.
+    They are objects or arrays with short arrays of one length for each name, most with one name at least,
+    and none is named like a column.
     """
-    if len(fields) < 2 or not all(isinstance(value, dict | list) for value in fields.values()):
+    are_arrays = all(isinstance(value, list) for value in fields.values())
+    if len(fields) < 2 or not (are_arrays or all(isinstance(value, dict) for value in fields.values())):
         return False
-    samples = [list(_iter_shapes(value)) for value in fields.values()]
-    is_short = all(0 < length <= MAX_SAMPLE for _, length in samples[0])
-    is_same = samples[0] != [] and all(sample == samples[0] for sample in samples)
-    are_arrays = len(samples[0]) == 1
+    shapes: dict[str, list[int]] = {}
+    for value in fields.values():
+        for name, length in _iter_shapes(value):
+            shapes.setdefault(name, []).append(length)
+    is_same = all(len(set(lengths)) == 1 and 0 < lengths[0] <= MAX_SAMPLE for lengths in shapes.values())
+    is_usual = any(2 * len(lengths) > len(fields) for lengths in shapes.values())
     names = [name for name in fields if len(name) > 1 or are_arrays]  # A, B of objects are no angles
-    return is_same and is_short and not any(vocabulary().is_column(key(name)) for name in names)
+    return is_same and is_usual and not any(vocabulary().is_column(key(name)) for name in names)
 
 
 def _iter_shapes(value: Any, name: str = "") -> Iterator[tuple[str, int]]:
-    """Yield name and length of the arrays of numbers in a value, 1 of a number, 0 of another array."""
-    if isinstance(value, list):
-        is_numeric = all(isinstance(entry, str) and is_number(entry, ".") for entry in value)
-        yield name, len(value) if is_numeric else 0
-    elif value is None or (isinstance(value, str) and is_number(value, ".")):
+    """Yield name and length of the arrays in a value, 0 of one with other arrays, 1 of a number."""
+    if isinstance(value, list) and not (value and all(map(_is_name, value))):
+        yield name, len(value) if all(isinstance(entry, str) for entry in value) else 0
+    elif isinstance(value, str) and is_number(value, "."):
         yield name, 1
     elif isinstance(value, dict):
         for inner in value:
