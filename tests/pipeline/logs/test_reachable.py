@@ -11,6 +11,7 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.logs import read_log
+from urmpipe_pipeline.logs.formats import files
 from urmpipe_pipeline.logs.formats.files import unchanged
 
 LOG = b"t,q1\n" + b"".join(b"%.2f,%.4f\n" % (0.01 * k, 0.001 * k) for k in range(30))
@@ -31,6 +32,32 @@ def test_a_pipe_of_a_shell_is_read() -> None:
         assert read_log([path]).rows == 30  # its bytes are kept
     finally:
         os.close(read)
+
+
+def test_a_pipe_that_brings_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(files, "PIPE_TIMEOUTS", (0.02, 0.02))
+    read, write = os.pipe()
+    try:
+        said = refusal(LogError, read_log, [Path(f"/dev/fd/{read}")])
+    finally:
+        os.close(read)
+        os.close(write)
+    assert said == f"/dev/fd/{read}: found a pipe that brings nothing for 0.04 s, allowed: a log"
+    assert capsys.readouterr().err == f"waiting for /dev/fd/{read}, a pipe that brings nothing so far\n"
+
+
+def test_a_pipe_that_brings_too_much(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "MAX_PIPED", 100)
+    read, write = os.pipe()
+    try:
+        os.write(write, LOG)
+        said = refusal(LogError, read_log, [Path(f"/dev/fd/{read}")])
+    finally:
+        os.close(read)
+        os.close(write)
+    assert said == f"/dev/fd/{read}: found more than 0 GiB in a pipe, allowed: a file"
 
 
 def test_what_is_no_file(tmp_path: Path) -> None:

@@ -13,12 +13,13 @@ from __future__ import annotations
 import os
 import re
 import stat
+import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from shutil import copyfileobj
+from select import select
 from tempfile import TemporaryFile
 from typing import Any
 
@@ -26,7 +27,9 @@ from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_v
 from urmpipe_pipeline.file_contents import PASSWORD
 from urmpipe_pipeline.subprocess_reader import ReaderCrashError, read_in_subprocess
 
+PIPE_TIMEOUTS = (5.0, 55.0)  # [s] without a byte until a silent pipe is named, and after that until it fails
 MAX_CHOICES = 9  # of a question
+MAX_PIPED = 4 << 30  # bytes of a pipe that are kept: one that never ends would fill the disk
 
 _OWN_PIPE = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,9})|/dev/stdin")
 _KINDS = {
@@ -46,7 +49,7 @@ def unchanged(files: Collection[object]) -> Iterator[None]:
 
     Raises:
         LogError: If one changed meanwhile, whatever else is wrong with it; if one cannot be read, or is a
-            pipe with a name or a device.
+            pipe that brings nothing or too much, or a device.
     """
     paths = [file for file in files if isinstance(file, Path)]
     for path in paths:
@@ -79,12 +82,27 @@ def _keep_piped(path: Path) -> None:
         raise LogError(Finding(fault, str(path)))
     number = int(pipe[1] or 0)
     try:
-        with open(number, "rb", closefd=False) as source, TemporaryFile() as copy:
-            copyfileobj(source, copy)
+        with TemporaryFile() as copy:
+            while block := _read_pipe(path, number):
+                copy.write(block)
+                if copy.tell() > MAX_PIPED:
+                    fault = f"found more than {MAX_PIPED >> 30} GiB in a pipe, allowed: a file"
+                    raise LogError(Finding(fault, str(path)))
             copy.flush()
             os.dup2(copy.fileno(), number, inheritable=False)
     except OSError as error:
         raise LogError(Finding(f"cannot be read: {error.strerror}", str(path))) from error
+
+
+def _read_pipe(path: Path, number: int) -> bytes:
+    """Return what a pipe brings next, nothing at its end."""
+    for attempt, timeout in enumerate(PIPE_TIMEOUTS):
+        if select([number], [], [], timeout)[0]:
+            return os.read(number, 1 << 20)
+        if not attempt:
+            print(f"waiting for {path}, a pipe that brings nothing so far", file=sys.stderr, flush=True)
+    fault = f"found a pipe that brings nothing for {sum(PIPE_TIMEOUTS):g} s, allowed: a log"
+    raise LogError(Finding(fault, str(path)))
 
 
 def _file_state(path: Path) -> tuple[int, ...] | None:
