@@ -250,12 +250,14 @@ def _roles_by_names(
 
 def _warn_of_many_joints(roles: Roles) -> Roles:
     """Return roles with the warning that so many joints may be those of two arms, a hand or wheels, too."""
-    names = listed(roles.joints)
     if len(roles.joints) <= MAX_UNASKED:
         return roles
-    message = f"{len(roles.joints)} columns are taken as the joints, more than an arm has: {names}"
+    columns = f"{len(roles.joints)} columns"
+    message = (
+        f"{columns} are taken as the joints, more than an arm has: {listed(roles.joints, most=MAX_UNASKED)}"
+    )
     hints = (Hint("joints", None, "names those of the arm"),)
-    assumption = f"the joints are {names}"
+    assumption = f"{columns} are the joints"
     warning = LogWarning(ASSUMED_JOINTS, message, hints=hints, assumption=assumption, role="joint")
     return replace(roles, warnings=(*roles.warnings, warning))
 
