@@ -326,13 +326,18 @@ def _repeat(names: Row) -> bool:
 
 
 def _split_header(text: str, delimiter: str, width: int) -> Row:
-    """Split a header line, with its own delimiter if only that gives a name per column (numpy.savetxt)."""
+    """Split a header line, with its own delimiter if only that gives a name per column (numpy.savetxt).
+
+    A comment may have a word and a colon before the names, and a remark in brackets after them.
+    """
     if width == 1:
         return _split_over_one_column(text)
     text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
     for comment in ("#", "//", "% "):
         text = text.removeprefix(comment)
-    rows = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
+    match = _REMARKED.match(text)
+    texts = (text, match["names"]) if match else (text,)
+    rows = [split_line(names, sign) for names in texts for sign in (delimiter, *DELIMITERS)]
     return next((cells for cells in rows if len(cells) == width), rows[0])
 
 
@@ -348,6 +353,7 @@ def _split_over_one_column(text: str) -> Row:
     return split_line(names, "\t") if with_unit or is_comment else parts
 
 
+_REMARKED = re.compile(r"\s*[A-Za-z]+:\s+(?P<names>.*?)\s*(\([^()]*\))?\s*$")
 _UNIT = r"(?:[^\])\d]|(?<=[sm^])[23]|1(?=/))*"
 _BRACKETED = re.compile(rf"\[{_UNIT}\]|\({_UNIT}\)")  # [rad/s^2], (1/min); else an index
 

@@ -25,6 +25,7 @@ from urmpipe_pipeline.logs.formats.row_form import CLOSING, RowForm, numbers_in,
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
+from urmpipe_pipeline.logs.vocabulary import key, vocabulary
 
 MIN_LABELS = 2  # a line with one label may be anything, unless an array follows it
 UNLABELLED = "array"  # the name of an array before the first label
@@ -71,12 +72,14 @@ def sniff_labels(segment: Segment) -> TextTable | None:
     torn = (line for line in lines if not line.is_comment and form.count_labels(line.text) >= some)
     first = next(torn, rows[0])  # a torn row may be the first, with some of the labels
     shown = " ".join(label.strip(",;{ ") for label in labels)
+    spread = tuple(spread_names(names, lengths))
+    is_named = len(labels) > 1 or any(vocabulary().is_column(key(name)) for name in spread)
     return TextTable(
         segment=segment,
         delimiter=form.delimiter,
         decimal=decimal,
-        names=tuple(spread_names(names, lengths)),
-        header=first.number,
+        names=spread if is_named else tuple(str(k + 1) for k in range(len(spread))),
+        header=first.number if is_named else None,
         first_line=first.number,
         offset=first.offset,
         sample=sample,
