@@ -249,7 +249,7 @@ def _roles_by_names(
 
 
 def _warn_of_many_joints(roles: Roles) -> Roles:
-    """Return roles with the warning that so many joints may be those of two arms, a hand or wheels, too."""
+    """Return roles with a warning if there are more joints than an arm has: of two arms, a hand or wheels."""
     if len(roles.joints) <= MAX_UNASKED:
         return roles
     columns = f"{len(roles.joints)} columns"

@@ -39,7 +39,7 @@ from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.text import strip_apostrophe
 
 MIN_FIT = 0.2  # a delimiter that fits less is not believed because it makes several columns
-FEW = 0.25  # share of the rows that may be damaged where the others tell how the table is written
+FEW = 0.25  # share of the rows that may be damaged where the others show how the table is written
 STYLE_LINES = 60  # lines that decide on the delimiter
 MAX_COUNT_DIGITS = 9  # of the number of a row: no table has a billion rows
 GIVEN = "given as an option"

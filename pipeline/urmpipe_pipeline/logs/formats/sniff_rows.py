@@ -83,7 +83,7 @@ def sniff_labels(segment: Segment) -> TextTable | None:
         first_line=first.number,
         offset=first.offset,
         sample=sample,
-        inferences=(Inference("labels", shown, "they stand before the values of every row"),),
+        inferences=(Inference("labels", shown, "they come before the values of every row"),),
         form=form,
     )
 
