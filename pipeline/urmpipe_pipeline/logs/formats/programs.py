@@ -5,11 +5,12 @@
     RAPID  CONST jointtarget p10 := [[0,-30,20,0,90,0],[9E9,...]];        deg
            CONST robtarget p20 := [[600,0,800],[0,0,1,0],[0,0,0,0],[9E9,...]];    mm; quaternion w, x, y, z
            MoveAbsJ [[0,0,0,0,30,0],[9E9,...]], v100, fine, tool0;
+    LS     P[1]{ GP1: J1 = 0.0 deg, ... };  P[2]{ GP1: X = 936.4 mm, ..., W = 180.0 deg, ... };    Fanuc
     ST     phi_1 : ARRAY[1..4] OF REAL := [0.0, 0.1, 2(0.5)];    structured text (IEC 61131-3): 0.5 twice
            sample_time : LREAL := 0.0008;
 
 1. `read_program`: the language of a text by its head.
-2. `_read_krl`, `_read_rapid`: positions (of the joints, or of the tool) and moves.
+2. `_read_krl`, `_read_rapid`, `_read_fanuc`: positions (of the joints, or of the tool) and moves.
 3. `_build_table`: an array of positions is a path, and what is declared next to it is not. Without an array
    the rows are the positions in the order of the moves, if every move names one or holds its numbers; else
    in the order of the text.
@@ -17,7 +18,7 @@
    array is one. A scalar that is named like the time between samples gives the clock.
 
 Sources: KUKA System Software, Operating and Programming Instructions for System Integrators; ABB, Technical
-reference manual: RAPID Instructions, Functions and Data types.
+reference manual: RAPID Instructions, Functions and Data types; Fanuc, ASCII program files of the R-30iA.
 """
 
 from __future__ import annotations
@@ -248,6 +249,30 @@ def _iter_targets(lists: _Lists, name: str, offset: int, *, in_array: bool) -> I
     values = (value for inner in lists for value in inner)
     present = (math.nan if isinstance(value, list) or abs(value) > MIN_ABSENT else value for value in values)
     yield _Target(kind, {c: v for c, v in zip(columns, present, strict=True) if c}, name, offset, in_array)
+
+
+# Fanuc
+
+FANUC_JOINTS, FANUC_POSES = _Kind("joint position", "table"), _Kind("tool position", "path")
+_POSITION = re.compile(r"\bP\[\s*(\d+)[^\]]*\]\s*\{\s*GP1\s*:(.*?)(?:\bGP\d|\}\s*;)", re.DOTALL)
+_COMPONENT = re.compile(r"\b(J\d|E\d|[XYZWPR])\s*=\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*(deg|mm)\b")
+_MOTION = re.compile(r"^\s*\d+:\s*[JLCAS]\s+(PR?)\[\s*(\d+)", re.MULTILINE)
+
+
+def _read_fanuc(program: Program) -> MemoryTable:
+    """Return the positions of the first group of a program of Fanuc; registers are not in the program.
+
+    Raises:
+        LogError: As `_build_table`.
+    """
+    targets = []
+    for match in _POSITION.finditer(program.text):
+        values = {f"{name} [{unit}]": float(text) for name, text, unit in _COMPONENT.findall(match[2])}
+        kind = FANUC_JOINTS if "J1 [deg]" in values else FANUC_POSES
+        targets += [_Target(kind, values, f"P[{match[1]}]", match.start())] if values else []
+    motions = _MOTION.finditer(program.text)
+    moves = [f"P[{match[2]}]" if match[1] == "P" else None for match in motions]
+    return _build_table(program, targets, moves, (FANUC_JOINTS, FANUC_POSES))
 
 
 # Rows of positions
@@ -497,7 +522,12 @@ def _line(*patterns: str) -> re.Pattern[str]:
 
 
 _LANGUAGES = (
-    _Language("a Fanuc program (/PROG)", re.compile(r"\A\s*/PROG\b")),
+    _Language(
+        "a Fanuc program (/PROG)",
+        re.compile(r"\A\s*/PROG\b"),
+        re.compile(r"^\s*\d+:\s*!.*", re.MULTILINE),
+        _read_fanuc,
+    ),
     _Language("a Yaskawa job (/JOB)", re.compile(r"\A\s*/JOB\b")),
     _Language("a program in URScript", _line(r"(?:movej|movel|movep|servoj)\s*\(")),
     _Language(
