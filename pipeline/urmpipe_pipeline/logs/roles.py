@@ -199,6 +199,9 @@ def _find_joints(
         return NamedJoints(()), pose
     of_tool = {*pose.position, *pose.rotation, *(column for group in pose.alternatives for column in group)}
     free = [column for column in numeric if column not in of_tool and not column.moves_nothing]
+    if options.position:  # the others of their name are not joints: pos_4 after pos_1, pos_2, pos_3
+        stems = {column.key.rstrip("0123456789") for column in pose.position} - {""}
+        free = [column for column in free if column.key.rstrip("0123456789") not in stems]
     if stated:
         named = _stated(stated, file, robot)
     else:
