@@ -55,8 +55,6 @@ def _fields(simulation: Simulation, table: ExportTable) -> dict[str, Any]:
         "values": np.column_stack(values) if values else np.empty((len(simulation.t_ns), 0)),
         "names": [column.name for column in signals],
         "units": [column.unit for column in signals],
-        "clock_names": ["t"],
-        "clock_units": ["s"],
     }
 
 

@@ -51,7 +51,7 @@ def read_mat(path: Path, head: bytes, options: LogMap) -> MemoryTable:
             table = _grid_table(run) if run["rows"] == "grid" else _file_table(run)
             return MemoryTable(path.stem, table, path=path)
         if isinstance(simulated, Mapping) and "values" in simulated:
-            return MemoryTable(path.stem, _file_table(simulated), path=path)
+            return MemoryTable(path.stem, _simulation_table(simulated), path=path)
     return _make_variable_table(path, variables, options)
 
 
@@ -204,7 +204,7 @@ def _grid_table(run: Mapping[str, Any]) -> pa.Table:
 
 
 def _file_table(run: Mapping[str, Any]) -> pa.Table:
-    """Return the rows of a log's file, or of a simulation, under their names, after their exact clock."""
+    """Return the rows of a log's file under the names that it has, with its exact clock in front."""
     clock = np.asarray(run["clock_ns"]).ravel().astype(np.int64)
     names, units = _texts(run["clock_names"]), _texts(run["clock_units"])
     columns: list[tuple[str, str, Any]] = []
@@ -214,10 +214,17 @@ def _file_table(run: Mapping[str, Any]) -> pa.Table:
         times = clock.astype("datetime64[ns]") if exponent is None else decimals(clock, exponent)
         columns.append((names[0] if len(names) == 1 else "t", unit, times))
     labels, units = _texts(run["names"]), _texts(run["units"])
-    if labels:
-        values = np.asarray(run["values"], dtype=np.float64).reshape(-1, len(labels))
-        columns += zip(labels, units, values.T, strict=True)
+    values = np.asarray(run["values"], dtype=np.float64).reshape(-1, len(labels))
+    columns += zip(labels, units, values.T, strict=True)
     return with_roles(_table(columns), json.loads(run["metadata"]))
+
+
+def _simulation_table(simulated: Mapping[str, Any]) -> pa.Table:
+    """Return the signals of a simulation under their names, after their clock."""
+    clock, names = np.asarray(simulated["clock_ns"]).ravel(), _texts(simulated["names"])
+    values = np.asarray(simulated["values"], dtype=np.float64).reshape(len(clock), -1)
+    signals = ((name, "", column) for name, column in zip(names, values.T, strict=True))
+    return _table([("t [s]", "", decimals(clock.astype(np.int64), 9)), *signals])
 
 
 def _table(columns: Sequence[tuple[str, str, Any]]) -> pa.Table:
