@@ -189,7 +189,7 @@ def _find_joints(
     *,
     path: bool,
 ) -> tuple[NamedJoints, Pose]:
-    """Return the joints by a schema, names or rates, and the recorded pose beside them."""
+    """Return the joints by a schema, names or rates, and the recorded pose next to them."""
     file = tables[0].file
     stated = tuple(column for column in numeric if column.index in stated_joints(tables[column.table]))
     robots = () if path else stated or called_as_joints(numeric, robot)
@@ -585,11 +585,11 @@ def signal_roles(columns: Sequence[Column], table: LogTable, robot: Chain | None
 
 
 def check_not_long_form(joints: Sequence[Column], columns: Sequence[Column], table: LogTable) -> None:
-    """Raise if a table may have a row per joint: beside its only joint names repeat in order, or joints.
+    """Raise if a table may have a row per joint: next to its only joint names repeat in order, or joints.
 
     Args:
         joints: The joints that were found.
-        columns: The columns beside the clock.
+        columns: The columns next to the clock.
         table: The table.
 
     Raises:
