@@ -428,8 +428,8 @@ class _Writer:
         columns.insert(int(self.random.integers(len(columns))), column)
         return [episode == 0, episode == 1]
 
-    def damage(self, columns: list[Column], rows: list[list[str]]) -> list[int]:
-        """Damage a row; return the rows where a reader may find it."""
+    def damage(self, columns: list[Column], rows: list[list[str]], masks: list[np.ndarray]) -> list[int]:
+        """Damage a row; return the rows where a reader may find it. The masks go with their rows."""
         if not self.leave_out(0.2, "damage"):
             return []
         kind, row = self.pick(DAMAGE), int(self.random.integers(5, len(rows) - 5))
@@ -447,6 +447,8 @@ class _Writer:
             rows[row] = rows[row][: max(numbers[0] + 1, len(rows[row]) // 2)]
         elif kind == "swapped":
             rows[row], rows[row + 1] = rows[row + 1], rows[row]
+            for mask in masks:
+                mask[[row, row + 1]] = mask[[row + 1, row]]
         elif kind == "spike":
             column = self.pick(numbers)
             rows[row][column] = repr(1000.0 * _number(rows[row][column] or "0.1") + 1.0)
@@ -454,6 +456,8 @@ class _Writer:
             rows[row] = ["0.0" if k in numbers else cell for k, cell in enumerate(rows[row])]
         elif kind == "repeated-row":
             rows[row + 1] = list(rows[row])
+            for mask in masks:
+                mask[row + 1] = mask[row]
         else:
             rows[row + 1] = [rows[row][k] if k in clocks else cell for k, cell in enumerate(rows[row + 1])]
         is_quiet = kind in ("spike", "zeros") or (
@@ -496,7 +500,7 @@ class _Writer:
             [",", ",", ",", ";", "\t", ", ", "|"] + ["  ", " "] * (not has_empty and not has_spaces)
         )
         header, units = self.header(columns, delimiter)
-        damaged = self.damage(columns, rows)
+        damaged = self.damage(columns, rows, masks)
         truth = _truth(columns, rows, masks, self)
         if header and not damaged and self.chance(0.12):
             return self.other_format(rows, header, units, truth)
