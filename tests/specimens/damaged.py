@@ -329,9 +329,11 @@ def in_between_on_wrap() -> Made:
 
 @specimen
 def angles_of_unknown_unit() -> Made:
-    """10..60 without a unit, slow: degrees by the look of it, but nothing in the file says so."""
+    """Joints at 2..8 and q6 at 27..43 without a unit, slow: degrees, or rad and a flange that turns on."""
     truth = motion(30, 0.5)
-    q = np.round(35 + 8 * np.sin(0.1 * truth.t[:, np.newaxis] + np.arange(6)), 6)
+    q = np.round(
+        [5, 5, 5, 5, 5, 35] + [3, 3, 3, 3, 3, 8] * np.sin(0.1 * truth.t[:, np.newaxis] + np.arange(6)), 6
+    )
     return _log("angles_of_unknown_unit", truth.t, q)
 
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.logs.columns import NAME_JOINTS, REST, Column, Kind, listed, take
-from urmpipe_pipeline.logs.names import FIRST_NUMBER, family_of, numbered_alike
+from urmpipe_pipeline.logs.names import FIRST_NUMBER, SLIDES, family_of, numbered_alike
 from urmpipe_pipeline.logs.pose_columns import OF_POSITION
 from urmpipe_pipeline.logs.rates import MAX_JOINTS
 from urmpipe_pipeline.logs.vocabulary import vocabulary
@@ -30,7 +30,6 @@ _NEAR_TOOL = re.compile(r"(tcp|tpc|ctp|tool|tip|eef|endeff|werkzeug)|(?:^|_)ee(?
 _TORQUES = re.compile(r"[tp]_?[xyz]")  # names of a position that forces next to them make torques
 _DERIVATIVE = re.compile(r"d{1,2}_?[a-z]|q2d|q?dd?_")  # ddq1, d_q1, q2d_1
 _MARKERS = frozenset({"limit", "limits", "index", "min", "max"})  # of other values of a joint
-_SLIDES = re.compile(r"[dsl]_?(?P<n>\d+)")  # what a prismatic joint is called next to q1, q2
 
 
 def coverage_warnings(
@@ -58,7 +57,7 @@ def coverage_warnings(
 
     def is_named_as_joints(column: Column) -> bool:
         name = _words(column)
-        slides = _SLIDES.fullmatch(column.key)
+        slides = SLIDES.fullmatch(column.key)
         if slides and numbers and int(slides["n"]) == max(numbers) + 1:
             return True
         if column.kind == Kind.COMMANDED or column.words & excluded or column.moves_nothing:

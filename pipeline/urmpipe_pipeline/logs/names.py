@@ -37,6 +37,7 @@ MAX_LENGTH = 200  # letters of a name in a family: no recorder writes longer one
 
 _AXES = {name: k for names in ("xyzw", "abc", ("roll", "pitch", "yaw")) for k, name in enumerate(names)}
 _LETTER = re.compile(r"[^\W\d_]")  # without one, the rest of a name is no name: sensor_1 is no joint 1
+SLIDES = re.compile(r"[dsl]_?(?P<n>\d+)")  # what a prismatic joint is called next to q1, q2
 FIRST_NUMBER, _LAST_NUMBER = re.compile(r"\d+"), re.compile(r"\d+(?=\D*$)")
 
 
@@ -221,6 +222,7 @@ def find_joints(
     families = [family for family in families if family in known or len(family.columns) in sizes]
     joints = (
         _by_order(free, file, robot)
+        or _by_part(free, file, robot)
         or _by_number(free, families, file, count)
         or _by_word(free, file, count)
         or _by_unit(free, file, count, half_pose=half_pose)
@@ -255,6 +257,8 @@ def _by_order(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJo
     for names in _orders(robot):
         columns = named_after(free, names, "position")
         arms = _arms(free, names) if columns or count in (None, len(names)) else []
+        if columns and robot is None and {*map(_part, _of_parts(free))} - {*map(_part, columns)}:
+            continue  # a longer arm has these names as well
         if columns and count in (None, len(columns)):
             whose = "the robot's" if robot and names == robot.coordinates else "known"
             others = tuple(arm for arm in arms if not {*arm} & {*columns})
@@ -277,6 +281,34 @@ def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column,
             if _role_beside(column, name) == "position":
                 arms.setdefault(_words_around(column, name), {}).setdefault(name, column)
     return [tuple(arm[name] for name in names) for arm in arms.values() if len(arm) == len(names)]
+
+
+def _by_part(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJoints | None:
+    """Return the joints by the parts of an arm in their names, from the shoulder on to the wrist."""
+    columns = _of_parts(free)
+    count = len(robot.coordinates) if robot else None
+    if len(columns) < 3 or count not in (None, len(columns)) or some_named(free, robot)[0]:
+        return None
+    _ask_if_several(columns, file, count)
+    parts = [_part(column) for column in columns]
+    if parts != sorted(parts) or len({*parts}) < 2:
+        return None
+    candidates, words = _candidates(free), vocabulary().joint_words["position"]
+    _ask_if_partial(columns, free, of_first_kind(candidates), file, count)
+    names = tuple("_".join(w for w in c.bare.split("_") if w not in words) for c in columns)
+    others = same_quantities(columns, candidates)
+    return NamedJoints(columns, "the parts of an arm in their names", names=names, alternatives=others)
+
+
+def _of_parts(free: Sequence[Column]) -> tuple[Column, ...]:
+    """Return the columns with a part of an arm in their names, none if some are coordinates of it."""
+    columns = [column for column in _not_commanded(of_first_kind(_candidates(free))) if _part(column) >= 0]
+    return () if any(column.words & {"x", "y", "z"} for column in columns) else tuple(columns)
+
+
+def _part(column: Column) -> int:
+    """Return the place of the first part of an arm in a name; -1 if there is none."""
+    return next((k for k, part in enumerate(vocabulary().parts) if part.search(column.bare)), -1)
 
 
 def _by_number(
@@ -311,6 +343,9 @@ def _by_number(
         numbered = {n: [c for c in spare if str(n) in FIRST_NUMBER.findall(c.key)] for n in gaps}
         fillers = {n: group[0] for n, group in numbered.items() if len(group) == 1}
         together = family.columns | fillers
+        if len(fillers) == len(gaps) and all(SLIDES.fullmatch(column.key) for column in fillers.values()):
+            columns = tuple(together[n] for n in sorted(together))
+            return NamedJoints(columns, "their names, in the order of their numbers", tuple(sorted(together)))
         choices = [take([together[n] for n in sorted(together)])] if len(fillers) == len(gaps) else []
         raise LogError(Finding(message, file=file, hints=(*choices, *cure(len(gaps), spare, count))))
     if larger := _sharing_a_mark(still, columns):

@@ -72,7 +72,6 @@ ONE_TURN = math.tau * 1.01  # [rad], of joints that turn once either way, as UR'
 TWO_TURNS = 2 * math.tau  # [rad]; joints of arms turn no further either way
 MAX_WRAP_DEVIATION = 20.0 / 360.0  # share of a turn by which a step may differ from it
 MAX_JOINT_SPEED = 30.0  # [rad/s]; no joint of an arm is faster for a tenth of the time
-TEN_TURNS = 10 * math.tau  # [rad]; not even joints without limits are moved so far
 MAX_DEGREES = 720.0  # [deg], two turns; larger values are ticks or per cent
 MAX_SIZE_ROWS = 10_000  # that show the usual size of values
 SPEED_WINDOW = 20  # rows over which a clock may hurry, as a recorder that stores late rows at once
@@ -496,17 +495,16 @@ def too_fast_as_radians(values: FloatArray, t_ns: IntArray | None) -> str | None
 
 
 def too_far_as_radians(values: FloatArray) -> str | None:
-    """Return why values are unlikely in rad and likely in deg: two joints go beyond ten turns; or None.
+    """Return why values are unlikely in rad and likely in deg: two joints go beyond two turns; or None.
 
-    Values up to 100 may be per cent, whole numbers beyond a turn in deg are counts. In the file's own units,
-    shape (n, columns).
+    Whole numbers beyond a turn in deg are counts. In the file's own units, shape (n, columns).
     """
     sizes = sorted(usual_peak(column[:, np.newaxis]) for column in values.T)
     known = values[np.isfinite(values)]
     are_counts = sizes[-1] > 360 and bool((known % 1 == 0).all())
-    if len(sizes) < 2 or sizes[-2] <= TEN_TURNS or not 100 < sizes[-1] <= np.degrees(ONE_TURN) or are_counts:
+    if len(sizes) < 2 or sizes[-2] <= TWO_TURNS or sizes[-1] > np.degrees(ONE_TURN) or are_counts:
         return None
-    return f"as rad values of {sizes[-1]:.6g} and {sizes[-2]:.6g} are more than ten turns"
+    return f"as rad values of {sizes[-1]:.6g} and {sizes[-2]:.6g} are more than two turns"
 
 
 def peak(values: FloatArray) -> float:

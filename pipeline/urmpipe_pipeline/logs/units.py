@@ -8,8 +8,9 @@
 4. Joints without a unit have that of the other joints, or that of their wraps. A column that does not
    wrap itself may be a joint that slides, unless an arm or another unit says that none does: it is assumed
    to be in deg, or in rad up to two turns; a larger one is asked about.
-5. Else rad is assumed up to two turns, deg if joints would be too fast or far in rad, m, and mm from
-   `MAX_METRES` for a joint that slides or a position. Other joint values beyond two turns are asked about.
+5. Else rad is assumed up to two turns, deg if joints would be too fast in rad, or two of them too far; m,
+   and mm from `MAX_METRES`, for a joint that slides or a position. Other values beyond two turns are asked
+   about, as are those that may be per cent.
 
 The inference of a unit states its basis (given, named, proved or assumed) and why. What the user gives is
 used; values or kinematics that contradict it are a warning with the assumption.
@@ -64,6 +65,7 @@ MAX_METRES = 20.0  # larger values without a unit are not in [m]
 MAX_SLIDES = 3  # joints of a gantry or a delta robot
 COUNTS_PER_TURN = (1024, 4096, 16384, 65536)  # of the encoders of servos and motors
 USUAL_COUNTS = 4096  # Dynamixel, Feetech
+PER_CENT = 100.0
 PATH_WIDTHS = (3, 6, 7)  # columns of a path: x, y, z, and three angles or a quaternion
 
 _ALLOWED: dict[JointKind | None, tuple[Quantity, ...]] = {
@@ -448,7 +450,10 @@ class UnitFinder:
             raise LogError(self._ask_angle(large, values, large))
         fast = too_fast_as_radians(values, joints.t_ns) if largest <= MAX_DEGREES else None
         may_be_path = _are_unnamed(columns) and len(columns) in PATH_WIDTHS
-        far = None if may_be_path else too_far_as_radians(values)
+        may_be_share = largest <= PER_CENT and any(
+            pattern.search(column.bare) for column in columns for pattern in vocabulary().per_cent
+        )
+        far = None if may_be_path or may_be_share else too_far_as_radians(values)
         if not (fast or far) and usual_peak(values) > TWO_TURNS:
             all_slide = may_slide and len(columns) == MAX_SLIDES
             sliding = columns if all_slide else () if may_slide else None

@@ -113,6 +113,8 @@ class Vocabulary:
         self.joint_of_row = _compiled(joint["of_row"])
         self.marks = frozenset[str](joint["marks"])
         self.orders = tuple(tuple[str, ...](order) for order in joint["orders"])
+        self.per_cent = _compiled(joint["per_cent"])
+        self.parts = _compiled(joint["parts"])
         self.other = frozenset[str]((*joint["other"], *joint["grippers"]))
         self.grippers = frozenset[str](joint["grippers"])
         self.measured_markers = frozenset[str](joint["measured"])
@@ -212,6 +214,8 @@ def split_unit(name: str) -> tuple[str, str | None]:
     (c_arm_wigwag_deg) or inside of it (joint_rad_1, qd_deg_s_1) is told, and stays part of the name as well.
     """
     match = _BRACKETS.match(name)
+    if match and match["inside"].strip() == "t":  # q_1(t), a function
+        return match["label"].strip(), None
     if match and not match["inside"].strip().isdigit():
         return match["label"].strip(), match["inside"].strip()
     inside = _INSIDE.search(name.strip())

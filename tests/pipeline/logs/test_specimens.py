@@ -233,7 +233,7 @@ WRONG = [
     # the units
     Wrong(
         "angles_of_unknown_unit",
-        [r"values up to 4[23]\.?\d* in q1, .* no unit, allowed: rad or deg; .*--unit "],
+        [r"values up to 3[67]\.?\d* in q1, .* no unit, allowed: rad or deg; .*--unit "],
     ),
     Wrong("header_says_rad", [r"(?=.*J1)(?=.*found)(?=.*rad)(?=.*(deg|360))"]),
     Wrong("header_says_deg_krc", [r"(?=.*AxisPos_Act1)(?=.*rad)(?=.*(deg|°))(?=.*\d mm)"], "ur5e", None),
