@@ -97,7 +97,8 @@ def without_header(
     if texts := [column for column in columns if column.text]:
         is_text = np.array([column.text for column in columns])
         odd = is_text | find_odd_columns(table.values([column.index for column in columns]))
-        groups = [group for group in _groups(columns, odd, count) if not {*group} & {*texts}]
+        empty = [column for column in columns if np.isnan(table.values([column.index])).all()]
+        groups = [group for group in _groups(columns, odd, count) if not {*group} & {*texts, *empty}]
         cell = format_value(table.cells(texts[0].index)[0])
         message = f"{cell} in column {texts[0].number} of a table without a header"
         raise which_joints(table.file, message, groups)
@@ -249,7 +250,7 @@ def find_odd_columns(values: FloatArray) -> BoolArray:
     """Return which columns are unlike joints, or unlike the others, shape (columns,).
 
     They go further than any arm's joint, or than one in rad where most of the others do not; they move seldom
-    while others do; or they count.
+    while others do; they count; or they are empty.
 
     Args:
         values: The columns in the file's own units, shape (n, columns); NaN where a sample is missing.
@@ -264,7 +265,8 @@ def find_odd_columns(values: FloatArray) -> BoolArray:
         is_integer = (values[0] % 1.0 == 0.0) & (steps[0] % 1.0 == 0.0)
     counts = is_integer & (steps[0] > 0.0) & (steps == steps[0]).all(axis=0)
     seldom = (moves > 0.0) & (moves < MAX_SELDOM * np.median(moves))
-    return np.asarray((size > TWO_TURNS[in_rad]) | seldom | (counts & (len(values) > 3)))
+    empty = np.isnan(values).all(axis=0)
+    return np.asarray((size > TWO_TURNS[in_rad]) | seldom | (counts & (len(values) > 3)) | empty)
 
 
 def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[Sequence[Column]]:

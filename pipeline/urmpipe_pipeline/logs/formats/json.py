@@ -43,8 +43,14 @@ MAX_DIGITS = 17  # decimal digits of a double
 _SEPARATORS = str.maketrans('\t\r\n"', "   '")  # would end a cell or a line of text with tabs
 _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 _BEGINNING = re.compile(r'\s*(?:\[\s*(?:[\[{]|$)|\{\s*")')
-_ASSIGNED = re.compile(r"\s*\w+ *= *(?:\w+\.array\()?(?=\[\s*\[)")  # a variable of Python
+_PRINTED = re.compile(
+    r"\s*(?:\w+ *= *)?(?:(?:\w+\.)?(?:array|tensor)\()?(?=\[\s*\[)"
+)  # by Python, NumPy, PyTorch
+_CALLED = re.compile(r"\s*(?:\w+ *= *)?(?:\w+\.)?(?:array|tensor)\(\[")
+_PRINTED_END = re.compile(r"\](?:,\s*\w+='?[\w.:]+'?)*,?\s*\)?\s*\Z")
 _LAST_COMMA = re.compile(r",\s*\]")
+_BLANK = re.compile(r"(?<=[\d.\]nf])\s+(?=[-+.\d\[ni])")  # between numbers or rows that no comma parts
+_POINT = re.compile(r"(?<=\d)\.(?!\d)")
 _DOCUMENT = re.compile(r"\s*(?:\[\s*\{|[\[{]\r?\n)")  # no other text begins so
 _YAML_LINE = re.compile(r"\s*+(?:-(?: .*)?|[\w./~]++:(?: .*)?|.*---|-?[\d.][^:]*|[^:]*\],?|#.*)")
 _YAML_NEXT = re.compile(r"^( *+)(?:- )*[\w./~]++: *+\n(?:\1 +\S| *- )", re.MULTILINE)  # a key above its value
@@ -137,19 +143,17 @@ def read_document(segment: Segment, options: LogMap) -> MemoryTable | None:
         LogError: If it is damaged or holds no arrays of numbers; with a question if they have several
             lengths, or are those of several episodes.
     """
-    is_json = _BEGINNING.match(segment.head) or _ASSIGNED.match(segment.head)
+    is_json = _BEGINNING.match(segment.head) or _PRINTED.match(segment.head)
     form = "JSON" if is_json else "YAML" if _is_yaml(segment) else ""
     if not form or _is_json_lines(segment) or (form == "YAML" and _has_documents(segment)):
         return None
     file, text = str(segment.path), segment.text()
-    if match := _ASSIGNED.match(text):
-        text = _LAST_COMMA.sub("]", text[match.end() :].rstrip(") \r\n"))
     try:
-        document = _read_yaml(segment, text) if form == "YAML" else _DECODER.decode(text)
+        document = _read_yaml(segment, text) if form == "YAML" else _decode(text)
     except (ValueError, RecursionError) as error:
         is_lone = "\n" not in text.strip()
         if form == "JSON" and not (
-            is_lone or _DOCUMENT.match(text) or segment.path.suffix.lower() == ".json"
+            is_lone or _DOCUMENT.match(text) or _CALLED.match(text) or segment.path.suffix.lower() == ".json"
         ):
             return None
         reason, line = str(error), None
@@ -182,6 +186,20 @@ def read_document(segment: Segment, options: LogMap) -> MemoryTable | None:
     table = make_array_table(segment.path, choice, values, scalars, "/", options, unused, is_named=named)
     inferences = (Inference(form, "a document", "its beginning"), *table.inferences)
     return replace(table, name=log_stem(segment.path), inferences=inferences)
+
+
+def _decode(text: str) -> Any:
+    """Return a document of JSON, or an array as a program prints it, its numbers as texts.
+
+    Raises:
+        JSONDecodeError: If it is damaged.
+    """
+    with suppress(ValueError):
+        return _DECODER.decode(text)
+    if match := _PRINTED.match(text):
+        text = _LAST_COMMA.sub("]", _PRINTED_END.sub("]", text[match.end() :]))
+        text = _POINT.sub(".0", _BLANK.sub(",", text)).replace("nan", "NaN").replace("inf", "Infinity")
+    return _DECODER.decode(text)
 
 
 def _is_json_lines(segment: Segment) -> bool:

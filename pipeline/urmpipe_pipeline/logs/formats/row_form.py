@@ -26,6 +26,7 @@ CLOSING = {"[": "]", "(": ")", "{": "}"}
 MAX_SHOWN = 40  # characters of a row in a message
 _WRAPPED = re.compile(r"\b(?:\w+\.)?(?:float|int)\d+\(([^()]*)\)")  # np.float64(0.1)
 _NUMBERS = re.compile(r"[^\s,;\[\](){}\"]+")
+_QUOTED = re.compile(r'"(\s*[-+]?\d*\.\d[-+.\deE]*(?:[,;\s]+[-+.\deE]+){2,}\s*)"')  # "0.1,0.2,0.3": an array
 _ARRAY_SIGN = "\x01"  # no text has it
 
 
@@ -56,6 +57,7 @@ class RowForm:
         continued: Whether arrays continue in a next line, which then begins with a blank.
         labels: The text before each value, in the order of the row; empty in a plain table.
         tail: The end of each row after its last value.
+        quoted: Whether arrays have quotes for brackets.
     """
 
     names: tuple[str, ...]
@@ -66,11 +68,13 @@ class RowForm:
     continued: bool = False
     labels: tuple[str, ...] = ()
     tail: str = ""
+    quoted: bool = False
 
     def rows(self, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
         """Yield each row with the number of its first line; other lines among labelled rows are left out."""
         waiting: tuple[int, str] | None = None
-        for number, line in lines:
+        for number, text in lines:
+            line = with_brackets(text) if self.quoted else text
             if waiting and self.continued and line[:1] in (" ", "\t"):
                 waiting = (waiting[0], f"{waiting[1]} {line.lstrip()}")
                 continue
@@ -173,6 +177,8 @@ class RowForm:
         Returns:
             None if a row is not like the others, or may not be: it is to be read as `values` does.
         """
+        if self.quoted:
+            text = with_brackets(text)
         if "(" in text and self.opening:
             text = _WRAPPED.sub(r"\1", text)
         if self.continued:
@@ -219,6 +225,11 @@ class RowForm:
         else:
             row = between.join(values) + r"[ \t]*+\r?$"
         return re.compile(rf"^[ \t]*+{row}", re.MULTILINE)
+
+
+def with_brackets(text: str) -> str:
+    """Return a text with brackets in place of the quotes around arrays."""
+    return _QUOTED.sub(r"[\1]", text)
 
 
 def numbers_in(array: str) -> list[str]:

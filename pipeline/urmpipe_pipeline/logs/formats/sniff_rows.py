@@ -3,8 +3,8 @@
 1. `sniff_labels`: `Time: 0.015  q values: [0.1, 0.2]  mode=3`, as KUKA's FRI examples and consoles write. The
    labels are learnt from the first rows: all of them have the same ones, in the same order. An array
    may precede the first label.
-2. `sniff_arrays`: cells that are str of a NumPy array or a list, also over several lines. A number replaces
-   each array while the other cells are understood.
+2. `sniff_arrays`: cells that are str of a NumPy array or a list, over several lines as well, or numbers in
+   quotes. A number replaces each array while the other cells are understood.
 3. `name_echoed_columns`: `ros2 topic echo --csv /joint_states`, a table without header.
    Source: rosidl_runtime_py, message_to_csv: the fields of sensor_msgs/JointState in order (seconds,
    nanoseconds, frame, names, positions, velocities, efforts), arrays spread over cells, an empty one as one.
@@ -21,7 +21,14 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.cells import is_missing, is_number, is_text, printable
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
-from urmpipe_pipeline.logs.formats.row_form import CLOSING, RowForm, numbers_in, spread_names, usual_length
+from urmpipe_pipeline.logs.formats.row_form import (
+    CLOSING,
+    RowForm,
+    numbers_in,
+    spread_names,
+    usual_length,
+    with_brackets,
+)
 from urmpipe_pipeline.logs.formats.sniff import sniff
 from urmpipe_pipeline.logs.formats.text import HeadLine, Segment, head_lines
 from urmpipe_pipeline.logs.formats.text_table import TextTable
@@ -124,16 +131,18 @@ def sniff_arrays(
         LogError: As `sniff`, or if the arrays have decimal commas.
         OptionError: As `sniff`.
     """
-    lines = list(head_lines(segment)) if any(sign in segment.head for sign in CLOSING) else []
-    opening = next((sign for sign in CLOSING if _begin_cells(lines, sign)), None)
+    lines = list(head_lines(segment)) if any(sign in segment.head for sign in (*CLOSING, '"')) else []
+    plain = [replace(line, text=with_brackets(line.text)) for line in lines]
+    quoted = plain != lines
+    opening = next((sign for sign in CLOSING if _begin_cells(plain, sign)), None)
     if opening is None:
         return None
     # a line with an open bracket continues in the next one, if that begins with a blank
     continued = any(
         line.text.count(opening) > line.text.count(CLOSING[opening]) and after.text.startswith((" ", "\t"))
-        for line, after in pairwise(lines)
+        for line, after in pairwise(plain)
     )
-    form = RowForm((), (), ",", opening=opening, continued=continued)
+    form = RowForm((), (), ",", opening=opening, continued=continued, quoted=quoted)
     places = {line.number: line.offset for line in lines}
     numbered = form.rows((line.number, line.text) for line in lines)
     rows = [HeadLine(number, places[number], text) for number, text in numbered]
