@@ -446,8 +446,8 @@ def _find_large_steps(
     """
     roles = plan.roles
     joints = [columns.index(joint) for joint in roles.joints if joint in columns]
-    values = numbers.values[:, joints]
-    rows = np.flatnonzero(np.isfinite(values[:MAX_ROWS]).all(axis=1))
+    values = numbers.values[:MAX_ROWS, joints]
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
     if not joints or len(joints) < len(roles.joints) or len(rows) < MIN_ROWS:
         return None
     steps = joint_steps(values[rows], roles.joints, plan.units, plan.tables.known)
@@ -457,7 +457,9 @@ def _find_large_steps(
     if are_few or size.sum() > (1 + MAX_REST_SHARE) * size[moves].sum():
         return None
     rates = [columns.index(rate) for rate in roles.rates if rate in columns]
-    if _quantile(size[moves], 0.5) <= MIN_STEP or (rates and period_of(values, numbers.values[:, rates])):
+    if _quantile(size[moves], 0.5) <= MIN_STEP or (
+        rates and period_of(values, numbers.values[:MAX_ROWS, rates])
+    ):
         return None
     return np.stack([rows[moves], rows[moves + 1]]), steps[moves]
 
