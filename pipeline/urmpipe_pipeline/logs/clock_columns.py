@@ -9,7 +9,8 @@
 3. without a header: text and dates as above; Unix times; a split time; the column that alone increases,
    - first or last, in steps that jitter, as those of no joint do, or
    - first, in even steps, while other columns move.
-   What increases in another way may be the time, a counter or a joint: the user is asked.
+   What increases in another way may be the time, a counter or a joint: the user is asked, unless several
+   columns do so and none of them is the first or the last.
 
 A split time is whole seconds in one column, and the rest of a second in ns, us, ms or decimals in another: by
 their names, or because their sum continues where the seconds step as it does within a second.
@@ -407,6 +408,8 @@ def _find_rising(
         is_even = steps[clock] == "even" and not _counts_rows(values[clock])
         if is_first and is_even and _others_move(clock, table):
             return TimeColumns((clock,), "the first column alone increases in even steps")
+    if len(clocks) > 1 and not {0, len(table.names) - 1} & {clock.index for clock in clocks}:
+        return None  # joints that move one way
     near = [column for column in columns if column not in clocks and _is_nearly_rising(column, table)]
     near = near if len(near) == 1 or clocks else []
     candidates = [*clocks, *(c for c in near if c.index == 0 or c not in values)]

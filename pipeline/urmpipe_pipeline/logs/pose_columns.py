@@ -145,6 +145,12 @@ def _find_xyz(
     return (best[0].ordered(), _alternatives(best[0], valid)) if is_clear else ((), ())
 
 
+def planar_positions(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
+    """Return the pairs of columns that are x and y of a tool without z."""
+    families = find_families(columns, vocabulary().tcp_position, 0)
+    return [family.ordered() for family in prefer_measured(families) if sorted(family.columns) == [0, 1]]
+
+
 def _alternatives(family: Family, families: Sequence[Family]) -> tuple[tuple[Column, ...], ...]:
     """Return the columns of the other families of as many."""
     count = len(family.columns)
@@ -273,6 +279,11 @@ def trailing_pose(columns: Sequence[Column], table: LogTable, *, path: bool = Fa
             if holds.any() if path else np.count_nonzero(~holds) <= MAX_ODD * len(holds):
                 return pose
     return None
+
+
+def leading_pose(columns: Sequence[Column], table: LogTable) -> Pose | None:
+    """Return the pose that the first seven columns of more hold: x, y, z and a quaternion; or None."""
+    return trailing_pose(columns[:7], table) if len(columns) > 7 else None
 
 
 def turns_as_quaternion(columns: Sequence[Column], tables: Sequence[LogTable]) -> bool:

@@ -73,6 +73,7 @@ from urmpipe_pipeline.logs.pose_columns import (
     Pose,
     chosen_pose,
     find_pose,
+    planar_positions,
     turns_as_quaternion,
     with_form,
 )
@@ -360,8 +361,13 @@ def _path(
         answers = () if robot else (take(some),)
         raise LogError(Finding(message, file=file, hints=(record, *answers, other)))
     none = f"no joint columns in {listed(columns)}" if columns else "no column of numbers except times"
-    times = () if columns else (TIMES_OF_ANOTHER,)
-    raise which_joints(file, none, _may_be(numeric, columns, tables, robot), need, *times)
+    further = [] if columns else [TIMES_OF_ANOTHER]
+    further += (
+        []
+        if robot
+        else [take(pair, "reads a plane path", parameter="position") for pair in planar_positions(numeric)]
+    )
+    raise which_joints(file, none, _may_be(numeric, columns, tables, robot), need, *further)
 
 
 def _may_move(columns: Sequence[Column]) -> list[Column]:

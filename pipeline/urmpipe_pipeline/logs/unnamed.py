@@ -40,6 +40,7 @@ from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import (
     Pose,
     chosen_pose,
+    leading_pose,
     trailing_pose,
     with_form,
 )
@@ -93,7 +94,7 @@ def without_header(
     if behind and len(columns_before(behind, columns)) <= 1:
         return _path_of_poses(behind, columns, table, options)
     if path:
-        return _path_by_place(columns, table, options, pose or behind)
+        return _path_by_place(columns, table, options, pose or leading_pose(columns, table) or behind)
     if texts := [column for column in columns if column.text]:
         is_text = np.array([column.text for column in columns])
         odd = is_text | find_odd_columns(table.values([column.index for column in columns]))
@@ -232,7 +233,7 @@ def _joints_among(
         evidence = f"half of the steps agree within {100 * blocks[0].variation:.2g} %"
         return joints, rates, f"columns {listed(rates)} are their rates: {evidence}"
     odd = find_odd_columns(values)
-    may_be_path = len(free) == 3
+    may_be_path = len(free) == 3 or leading_pose(free, table) is not None
     if not blocks and count is None and len(free) <= MAX_UNASKED and not odd.any() and not may_be_path:
         return tuple(free), (), "no header: joints in order"
     groups = [[free[k] for k in block.joints] for block in blocks] + _groups(free, odd, count)
