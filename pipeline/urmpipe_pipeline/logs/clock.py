@@ -485,8 +485,8 @@ def append_time_file(tables: Tables, options: LogMap) -> tuple[Tables, int | Non
     if file_column is None:
         return tables, None
     if len(tables.tables) > 1:
-        found = f"{format_value(options.time or '')} for {len(tables.tables)} tables"
-        raise OptionError(Finding(parameter="time", found=found, allowed="FILE:COLUMN for one table"))
+        fault = f"{format_value(options.time or '')} for {len(tables.tables)} tables"
+        raise OptionError(Finding(parameter="time", found=fault, allowed="FILE:COLUMN for one table"))
     times = open_tables([file_column[0]], LogMap())  # it may be written in another way than the log
     table, rows = across(times.tables[0]), tables.tables[0].rows
     if rows is not None and rows[-1] < table.count_rows():

@@ -1,6 +1,6 @@
 """The columns of a log: those of all its tables in a row, with names, units and places.
 
-1. `Column`, `columns_of`: a column, and what its name says; names in the cells beside it replace numbers.
+1. `Column`, `columns_of`: a column, and what its name says; names in the cells next to it replace numbers.
 2. `find_column`, `chosen_columns`, `given_units`: the columns that the user means, by name, number or range.
 3. `columns_of_side`, `select_side`, `side_of`, `columns_of_topic`: part of a table by words in the names.
 4. `which_joints`, `take`: the question which columns are the joints, and its choices; hints about units.
@@ -133,7 +133,7 @@ class Column:
 
     @property
     def kind(self) -> Kind:
-        """Whether its values were measured or commanded, as far as its name says so."""
+        """Whether its values were measured or commanded, if its name says so."""
         return kind_of(self.marked.measured, self.marked.commanded)
 
     @property
@@ -161,7 +161,7 @@ class Column:
 def columns_of(tables: Sequence[LogTable], titles: Sequence[str]) -> tuple[Column, ...]:
     """Return the columns of some tables.
 
-    A column that is named in the cells beside it has this name: rostopic echo -p writes name0, name1, ...
+    A column that is named in the cells next to it has this name: rostopic echo -p writes name0, name1, ...
     with a joint's name in each row, and position0, position1, ...: position0 becomes position.NAME.
 
     Args:
@@ -265,8 +265,8 @@ def columns_named(
         LogError: If several match the same, each of them named.
     """
     matches = {
-        what: [column for column in columns if any(pattern.search(column.key) for pattern in alike)]
-        for what, alike in patterns.items()
+        what: [column for column in columns if any(pattern.search(column.key) for pattern in of_what)]
+        for what, of_what in patterns.items()
     }
     several = [
         Finding(f"found {listed(group)}, allowed: one of them", tables[group[0].table].file)
@@ -374,20 +374,20 @@ def columns_of_side(columns: Sequence[Column], options: LogMap, file: str) -> li
         if not chosen and not options.shared:
             raise _no_side_error(columns, f"with {_quote(options.side)}", "side", file)
     if options.pair is not None:
-        side, other = map(_words, options.pair)
+        side, other = map(_split_side, options.pair)
         is_rest = side == {REST}
         chosen = [c for c in chosen if not other <= c.words and (is_rest or side <= c.words)]
         if not chosen:
             words = "" if is_rest else f"with {_quote(options.pair[0])} and "
             raise _no_side_error(columns, f"{words}without {options.pair[1]}", "sides", file)
         if not is_rest:
-            chosen = [_without_words(column, side) for column in chosen]
+            chosen = [_without(column, side) for column in chosen]
     return chosen or list(columns)
 
 
 def without_other_side(columns: Sequence[Column], options: LogMap) -> tuple[Column, ...]:
     """Return the columns without those of another side, unless no time remains."""
-    other = _words(options.pair[1]) if options.pair else frozenset((REST,))
+    other = _split_side(options.pair[1]) if options.pair else frozenset((REST,))
     of_side = {column.number for column in select_side(columns, options.side or "")}
     rest = tuple(c for c in columns if c.number in of_side and (other == {REST} or not other <= c.words))
     return rest if any(column.is_time for column in rest) else tuple(columns)
@@ -398,9 +398,9 @@ def select_side(columns: Sequence[Column], side: str) -> list[Column]:
 
     A column whose name differs from that of a column of the side only by these words is another side's.
     """
-    if not (words := _words(side)):
+    if not (words := _split_side(side)):
         return list(columns)
-    of_side = {c: replace(_without_words(c, words), side=words) for c in columns if words <= c.words}
+    of_side = {c: replace(_without(c, words), side=words) for c in columns if words <= c.words}
     quantities = {(column.quantity, column.unit_text) for column in of_side.values()}
     names = [column.marked.key.split("_") for column in of_side]
     places = {tuple(k for k, word in enumerate(name) if word in words) for name in names} - {()}
@@ -423,7 +423,7 @@ def select_side(columns: Sequence[Column], side: str) -> list[Column]:
 
 
 def side_of(group: Sequence[Column], groups: Sequence[Sequence[Column]]) -> str | None:
-    """Return the fewest words that select one of several groups of columns, behind those that the user chose.
+    """Return the fewest words that select one of several groups of columns, after those that the user chose.
 
     None if there are no such words.
     """
@@ -439,15 +439,19 @@ def side_of(group: Sequence[Column], groups: Sequence[Sequence[Column]]) -> str 
     return None
 
 
-def _words(side: str) -> frozenset[str]:
+def _split_side(side: str) -> frozenset[str]:
     return frozenset(re.findall(r"[^\W_]+", side.lower()))
 
 
 def _quote(side: str) -> str:
-    return f"the word {side}" if len(_words(side)) == 1 else f"the words {', '.join(sorted(_words(side)))}"
+    return (
+        f"the word {side}"
+        if len(_split_side(side)) == 1
+        else f"the words {', '.join(sorted(_split_side(side)))}"
+    )
 
 
-def _without_words(column: Column, words: frozenset[str]) -> Column:
+def _without(column: Column, words: frozenset[str]) -> Column:
     """Return a column that is matched without some words of its name, of which some remain."""
     parts = re.findall(r"[^\W_]+|[\W_]+", column.matched or split_unit(column.header)[0])
     dropped = words - vocabulary().stems
@@ -513,7 +517,7 @@ def by_arm(columns: Sequence[Column]) -> list[list[Column]]:
 
 def which_joints(
     file: str,
-    found: str,
+    fault: str,
     groups: Sequence[Sequence[Column]],
     allowed: str = UNKNOWN,
     *hints: Hint,
@@ -523,7 +527,7 @@ def which_joints(
 
     Args:
         file: The file.
-        found: What was found, and why it does not decide.
+        fault: What was found, and why it does not decide.
         groups: Columns that may be all joints; the likeliest first.
         allowed: What is allowed.
         hints: What else helps.
@@ -537,7 +541,7 @@ def which_joints(
         is_unique = all(names[column.called] == 1 for column in group)
         choices.append(Hint("side", side, "takes these") if side else take(group, by_number=not is_unique))
     return LogError(
-        Finding(f"found {found}, allowed: {allowed}", file, hints=(*hints, *choices, NAME_JOINTS))
+        Finding(f"found {fault}, allowed: {allowed}", file, hints=(*hints, *choices, NAME_JOINTS))
     )
 
 
@@ -575,7 +579,7 @@ def unit_inference(
 ) -> Inference:
     """Return the inference of the unit of some columns, with the other unit that it may be.
 
-    What is given for every angle reaches some columns, and others are given one by one, as the first is.
+    A unit for every angle reaches some columns; the others have one each, as the first.
     """
     names, other = tuple(column.name for column in columns), OTHER_UNIT.get(unit)
     every = every and len(columns) > 1 and unit in ("rad", "deg")

@@ -117,7 +117,7 @@ class Group(NamedTuple):
 
 
 class Proposal(NamedTuple):
-    """The columns of each role in SI, in the order of `ROLES` behind the time, and how their units are known.
+    """The columns of each role in SI, in the order of `ROLES` after the time, and how their units are known.
 
     Attributes:
         groups: The columns of joints, rates, accelerations, position, orientation.

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.logs.columns import NAME_JOINTS, REST, Column, Kind, listed, take
-from urmpipe_pipeline.logs.names import FIRST_NUMBER, SLIDES, family_of, numbered_alike
+from urmpipe_pipeline.logs.names import FIRST_NUMBER, SLIDES, family_of, group_by_number
 from urmpipe_pipeline.logs.pose_columns import OF_POSITION
 from urmpipe_pipeline.logs.rates import MAX_JOINTS
 from urmpipe_pipeline.logs.vocabulary import vocabulary
@@ -50,13 +50,13 @@ def coverage_warnings(
     if not joints or not all(column.header for column in joints):
         return []
     words, numbers = vocabulary(), family_of(joints)[0]
-    names = [_words(column) for column in joints]
+    names = [_split_name(column) for column in joints]
     shared = frozenset.intersection(*map(frozenset, names))
     units = {column.unit for column in joints} - {None}
-    excluded = words.other | words.joint_words["rate"] | words.joint_words["acceleration"] | _MARKERS
+    excluded = words.other | words.joint_terms["rate"] | words.joint_terms["acceleration"] | _MARKERS
 
     def is_named_as_joints(column: Column) -> bool:
-        name = _words(column)
+        name = _split_name(column)
         slides = SLIDES.fullmatch(column.key)
         if slides and numbers and int(slides["n"]) == max(numbers) + 1:
             return True
@@ -78,7 +78,7 @@ def coverage_warnings(
     return [LogWarning(COLUMNS_NOT_READ, message, hints=(hint,))]
 
 
-def _words(column: Column) -> list[str]:
+def _split_name(column: Column) -> list[str]:
     """Return the words of a name without its numbers: of joint2_pos joint and pos."""
     return [word for word in re.split(r"[_\d]+", column.bare) if word]
 
@@ -89,7 +89,7 @@ def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -
     They begin as the names of the position, or are angles if these begin with x, y, z.
     """
     words = vocabulary()
-    excluded = words.joint_words["rate"] | words.joint_words["acceleration"] | (words.other - _TOOL)
+    excluded = words.joint_terms["rate"] | words.joint_terms["acceleration"] | (words.other - _TOOL)
     stem = OF_POSITION.sub("", os.path.commonprefix([c.key for c in position]))  # noqa: RUF071 (names)
     free = [c for c in unused if not c.words & excluded and (c.unit is None or c.unit.quantity == "angle")]
     near = [c for c in free if c.key.startswith(stem) if stem or (c.unit and not c.unit.order)]
@@ -110,7 +110,7 @@ def path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
     angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"]
     columns = joints or angles or list(unused)
     if len(columns) > MAX_JOINTS and not joints:
-        families = [group for group in numbered_alike(columns, FIRST_NUMBER) if len(group) <= MAX_JOINTS]
+        families = [group for group in group_by_number(columns, FIRST_NUMBER) if len(group) <= MAX_JOINTS]
         joints = columns = [column for group in families if len(group) >= MIN_JOINTS for column in group]
     if len(columns) < MIN_JOINTS or len(columns) > MAX_JOINTS > len(joints):
         return []
@@ -136,7 +136,7 @@ def tcp_warnings(rest: Sequence[Column]) -> list[LogWarning]:
 def _is_like_tcp(column: Column) -> bool:
     """Return whether the name of a column is that of a position, or near to one."""
     words = vocabulary()
-    excluded = words.other - _TOOL | words.joint_words["rate"] | words.joint_words["acceleration"]
+    excluded = words.other - _TOOL | words.joint_terms["rate"] | words.joint_terms["acceleration"]
     if column.words & (excluded | _TOOL_VALUES) or (column.unit and column.unit.quantity != "length"):
         return False
     if any(pattern.search(column.plain) for pattern in words.tcp_position):

@@ -50,7 +50,7 @@ def _is_column(value: Any) -> bool:
 
 
 def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Return a test for lists of such values; a text and a table are none."""
+    """Return a test for lists of such values; a text and a table are not."""
 
     def fit(value: Any) -> bool:
         is_single = isinstance(value, (str, Mapping)) or hasattr(value, "columns")
@@ -138,7 +138,7 @@ class LogMap:
             neighbours.
         poses: Whether the rows are static poses, which no motion joins: a clock of theirs is a label.
         measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of
-            its own, and behind them of its orientation, if it was.
+            its own, and after them of its orientation, if it was.
         shared: Whether they apply to several logs: columns and joints that a log lacks belong to another.
         pair: Of a comparison of two sides of a table, the word of this side, or "rest", and of the other.
         robot: Name or file of the arm, or None.
@@ -197,8 +197,8 @@ class LogMap:
         for entry in fields(self):
             value, metadata = getattr(self, entry.name), entry.metadata
             if metadata and not ((value is None and entry.default is None) or metadata["fits"](value)):
-                found = format_value(value)
-                errors.append(Finding(parameter=entry.name, found=found, allowed=metadata["allowed"]))
+                fault = format_value(value)
+                errors.append(Finding(parameter=entry.name, found=fault, allowed=metadata["allowed"]))
         if errors:
             raise OptionError(*errors)
         for name in ("joints", "names", "position", "orientation", "measured"):

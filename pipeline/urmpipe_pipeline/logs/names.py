@@ -1,4 +1,4 @@
-"""Joints by their names: families of columns that share a name but for a number or an axis.
+"""Joints by their names: families of columns that share a name except for a number or an axis.
 
 1. `find_families`: the columns that match patterns of the vocabulary, without words for measured, commanded.
 2. `find_joints`: by the names of the robot's joints or of a known arm; by a word and a number; by a word for
@@ -54,7 +54,7 @@ class Family:
         kind: What these words say.
         known: Whether a pattern has their complete name, with these words; else only without them.
         columns: The columns by their number.
-        twins: Columns that share a number with one of them.
+        duplicates: Columns that share a number with one of them.
     """
 
     rank: int
@@ -62,7 +62,7 @@ class Family:
     kind: Kind
     known: bool
     columns: dict[int, Column] = field(default_factory=dict)
-    twins: list[Column] = field(default_factory=list)
+    duplicates: list[Column] = field(default_factory=list)
 
     @property
     def is_measured(self) -> bool:
@@ -70,7 +70,7 @@ class Family:
         return all(column.marked.measured - {"sensor"} for column in self.columns.values())
 
     def shares_name(self, other: Family) -> bool:
-        """Return whether the names are the same, with or without a sign beside the number."""
+        """Return whether the names are the same, with or without a sign next to the number."""
         return re.sub("_?#_?", "#", self.name) == re.sub("_?#_?", "#", other.name)
 
     def ordered(self) -> tuple[Column, ...]:
@@ -96,7 +96,7 @@ def find_families(columns: Iterable[Column], patterns: Patterns, order: int) -> 
         shape = tuple(tuple(vocabulary().marked.findall(word)) for word in column.plain.split("_"))
         family = families.setdefault((*identity, shape, None), Family(*identity))
         if number in family.columns:
-            family.twins.append(column)
+            family.duplicates.append(column)
             if column.unit_text == family.columns[number].unit_text:
                 continue
             family = families.setdefault((*identity, shape, column.unit_text), Family(*identity))
@@ -169,16 +169,16 @@ def drop_unknown(families: Sequence[Family], *, lone: bool) -> list[Family]:
     return known or (list(families) if lone else [])
 
 
-def numbered_alike(
+def group_by_number(
     columns: Sequence[Column], number: re.Pattern[str] = _LAST_NUMBER
 ) -> list[tuple[Column, ...]]:
     """Return families of two columns or more of one table whose names differ by a number, their last one."""
-    alike: dict[tuple[str, int], list[Column]] = {}
+    families: dict[tuple[str, int], list[Column]] = {}
     for column in columns:
         stem = number.sub("#", column.key, count=1)
         if stem != column.key:
-            alike.setdefault((stem, column.table), []).append(column)
-    return [tuple(family) for family in alike.values() if len(family) > 1]
+            families.setdefault((stem, column.table), []).append(column)
+    return [tuple(family) for family in families.values() if len(family) > 1]
 
 
 # 2. Joints
@@ -230,25 +230,25 @@ def find_joints(
     )
     kinds = {column.kind for column in joints.columns}
     same = same_quantities(joints.columns, free) if len(kinds) > 1 else ()
-    alike = [
+    further = [
         family.ordered()
         for family in families
         if len(family.columns) == len(joints.columns) and not {*family.ordered()} & {*joints.columns}
     ]
-    surer = [group for group in alike if kinds and group[0].kind == Kind.MEASURED < min(kinds)]
+    surer = [group for group in further if kinds and group[0].kind == Kind.MEASURED < min(kinds)]
     if same or surer:
         _ask_groups([joints.columns, *surer, *same], file)
-    return joints._replace(alternatives=tuple(dict.fromkeys((*joints.alternatives, *alike))))
+    return joints._replace(alternatives=tuple(dict.fromkeys((*joints.alternatives, *further))))
 
 
 def _moving() -> frozenset[str]:
-    words = vocabulary().joint_words
+    words = vocabulary().joint_terms
     return words["rate"] | words["acceleration"]
 
 
 def _ask_groups(groups: Sequence[Sequence[Column]], file: str) -> NoReturn:
-    found = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
-    raise which_joints(file, found, groups, "one", by_side=True)
+    fault = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
+    raise which_joints(file, fault, groups, "one", by_side=True)
 
 
 def _by_order(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJoints | None:
@@ -261,8 +261,8 @@ def _by_order(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJo
             continue  # a longer arm has these names as well
         if columns and count in (None, len(columns)):
             whose = "the robot's" if robot and names == robot.coordinates else "known"
-            others = tuple(arm for arm in arms if not {*arm} & {*columns})
-            return NamedJoints(columns, f"{whose} joint names", names=tuple(names), alternatives=others)
+            further = tuple(arm for arm in arms if not {*arm} & {*columns})
+            return NamedJoints(columns, f"{whose} joint names", names=tuple(names), alternatives=further)
         first = [arm for arm in arms if arm[0].kind == min(other[0].kind for other in arms)]
         if count in (None, len(names)) and len(first) > 1:
             _ask_groups(first, file)
@@ -278,7 +278,7 @@ def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column,
     arms: dict[frozenset[str] | None, dict[str, Column]] = {}
     for name in names:
         for column in columns:
-            if _role_beside(column, name) == "position":
+            if _find_role(column, name) == "position":
                 arms.setdefault(_words_around(column, name), {}).setdefault(name, column)
     return [tuple(arm[name] for name in names) for arm in arms.values() if len(arm) == len(names)]
 
@@ -293,11 +293,11 @@ def _by_part(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJoi
     parts = [_part(column) for column in columns]
     if parts != sorted(parts) or len({*parts}) < 2:
         return None
-    candidates, words = _candidates(free), vocabulary().joint_words["position"]
+    candidates, words = _candidates(free), vocabulary().joint_terms["position"]
     _ask_if_partial(columns, free, of_first_kind(candidates), file, count)
     names = tuple("_".join(w for w in c.bare.split("_") if w not in words) for c in columns)
-    others = same_quantities(columns, candidates)
-    return NamedJoints(columns, "the parts of an arm in their names", names=names, alternatives=others)
+    same = same_quantities(columns, candidates)
+    return NamedJoints(columns, "the parts of an arm in their names", names=names, alternatives=same)
 
 
 def _of_parts(free: Sequence[Column]) -> tuple[Column, ...]:
@@ -324,7 +324,7 @@ def _by_number(
     surer = [family for family in families if family.kind == Kind.MEASURED < best[0].kind]
     if len(best) + len(surer) > 1 and any(len(family.columns) > 1 for family in (*best, *surer)):
         _ask_groups([family.ordered() for family in (*best, *surer)], file)
-    if len(best) > 1:  # one plot a joint, each with a number of its own
+    if len(best) > 1:  # a plot per joint, each with its number
         columns = tuple(column for family in best for column in family.ordered())
         return NamedJoints(columns, "their names; the order is the file's")
     family = best[0]
@@ -335,7 +335,7 @@ def _by_number(
     lowest = min(family.columns)
     first = lowest if len(columns) == 1 else min(lowest, 1)
     gaps = [n for n in range(first, first + len(columns)) if n not in family.columns]
-    if gaps and not family.twins:  # twins are another error
+    if gaps and not family.duplicates:  # duplicates are another error
         missing = ", ".join(map(str, gaps))
         allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
         message = f"found joint columns {listed(columns)} and none with number {missing}, allowed: {allowed}"
@@ -385,9 +385,9 @@ def _by_unit(free: Sequence[Column], file: str, count: int | None, *, half_pose:
 
 
 def _candidates(free: Sequence[Column]) -> list[Column]:
-    others = vocabulary().other | _moving()
+    excluded = vocabulary().other | _moving()
     return [
-        column for column in free if not column.words & others and not (column.unit and column.unit.order)
+        column for column in free if not column.words & excluded and not (column.unit and column.unit.order)
     ]
 
 
@@ -395,7 +395,7 @@ def _ask_if_several(columns: Sequence[Column], file: str, count: int | None) -> 
     """Raise the question which are the joints if each number, or name of one side, is there several times."""
     if count is not None:
         return
-    groups = max(numbered_alike(columns), numbered_alike(columns, FIRST_NUMBER), key=_min_size)
+    groups = max(group_by_number(columns), group_by_number(columns, FIRST_NUMBER), key=_min_size)
     if len(groups) > 1:
         names = "; ".join(f"{group[0].header} to {group[-1].header}" for group in groups)
         raise which_joints(file, f"several groups of numbered columns: {names}", groups, "one")
@@ -453,11 +453,11 @@ def _ask_if_partial(
     moving = _moving() | vocabulary().grippers
     columns = _not_commanded(of_first_kind([column for column in free if not column.words & moving]))
     same = _sharing_a_mark(columns, family)
-    others = [c for c in free if c not in family and (c in same or (c in still and c.words & words))]
-    if others and len(family) != count:
-        together = [column for column in free if column in family or column in others]
-        found = f"{listed(family)}, whose names say that they are positions, beside {listed(others)}"
-        raise which_joints(file, found, [together, family])
+    further = [c for c in free if c not in family and (c in same or (c in still and c.words & words))]
+    if further and len(family) != count:
+        together = [column for column in free if column in family or column in further]
+        fault = f"{listed(family)}, whose names say that they are positions, next to {listed(further)}"
+        raise which_joints(file, fault, [together, family])
 
 
 def of_first_kind(columns: Sequence[Column]) -> list[Column]:
@@ -487,14 +487,14 @@ def _sharing_a_mark(columns: Sequence[Column], required: Sequence[Column] = ()) 
 
     In wrist_angle_pos and elbow_pos that is the last one. They include all columns that are required.
     """
-    alike: dict[tuple[str, int], list[Column]] = {}
+    by_place: dict[tuple[str, int], list[Column]] = {}
     for column in columns:
         words = column.key.split("_")
         for place, word in enumerate(words):
             if word in vocabulary().marks:
                 for at in (place, place - len(words)):
-                    alike.setdefault((word, at), []).append(column)
-    complete = [group for group in alike.values() if {*required} <= {*group}]
+                    by_place.setdefault((word, at), []).append(column)
+    complete = [group for group in by_place.values() if {*required} <= {*group}]
     return tuple(sorted(complete, key=len)[-1]) if complete else ()
 
 
@@ -512,14 +512,14 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     Args:
         columns: Candidates.
         names: Names of the joints.
-        role: position, rate or acceleration: decided by the words beside the joint's name.
+        role: position, rate or acceleration: decided by the words next to the joint's name.
     """
     result = []
     for name in names:
-        matches = [column for column in columns if _role_beside(column, name) == role]
+        matches = [column for column in columns if _find_role(column, name) == role]
         matches = [c for c in matches if c.kind == min(other.kind for other in matches)]
         words = frozenset(key(name).split("_"))
-        exact = [c for c in matches if c.words - words <= vocabulary().joint_words["position"]]
+        exact = [c for c in matches if c.words - words <= vocabulary().joint_terms["position"]]
         matches = exact if len(exact) == 1 else matches
         if len(matches) != 1:
             return ()
@@ -527,9 +527,9 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     return tuple(result) if len(set(result)) == len(result) else ()
 
 
-def _role_beside(column: Column, name: str) -> str | None:
-    """Return what a column says about a joint: by the words beside the joint's name in its name."""
-    around, words = _words_around(column, name), vocabulary().joint_words
+def _find_role(column: Column, name: str) -> str | None:
+    """Return what a column says about a joint: by the words next to the joint's name in its name."""
+    around, words = _words_around(column, name), vocabulary().joint_terms
     if around is None or around & vocabulary().other or column.moves_nothing:
         return None
     order = column.unit.order if column.unit else 0
@@ -542,10 +542,10 @@ def _role_beside(column: Column, name: str) -> str | None:
 def _words_around(column: Column, name: str) -> frozenset[str] | None:
     """Return the other words of a column with the name of a joint, which they may interrupt; else None."""
     for text in (column.marked.key, column.bare):
-        before, inner, behind = f"_{text}_".partition(f"_{key(name)}_")
+        before, inner, after = f"_{text}_".partition(f"_{key(name)}_")
         if inner:
             marks = column.marked.measured | column.marked.commanded
-            return frozenset(f"{before}_{behind}".split("_")) - {""} | marks
+            return frozenset(f"{before}_{after}".split("_")) - {""} | marks
     return None
 
 
@@ -579,7 +579,7 @@ def family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...
             number_of = {column: n for n, column in family.columns.items()}
             return tuple(number_of[column] for column in joints), ()
     for names in vocabulary().orders:
-        of_joint = [[name for name in names if _role_beside(c, name) == "position"] for c in joints]
+        of_joint = [[name for name in names if _find_role(c, name) == "position"] for c in joints]
         if all(len(matching) == 1 for matching in of_joint):
             return (), tuple(matching[0] for matching in of_joint)
     return (), ()

@@ -221,8 +221,8 @@ def _find_roles(
         if plots := one_plot_a_file(columns, tables, robot):
             return plots
         _check_one_log(columns, tables, options)
-    is_own = tables.known is not None and tables.known.own and not (tables.foreign or options.joints)
-    return _roles_by_names(columns, tables, options, robot, own_joints(columns) if is_own else None)
+    is_ours = tables.known is not None and tables.known.own and not (tables.foreign or options.joints)
+    return _roles_by_names(columns, tables, options, robot, own_joints(columns) if is_ours else None)
 
 
 def _roles_by_names(

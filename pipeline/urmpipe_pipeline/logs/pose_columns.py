@@ -1,7 +1,7 @@
 """The tool centre point that a log recorded: the columns of its position and orientation, and their form.
 
 1. `find_pose`: by names: x, y, z and a rotation vector in a row (pose_0, ...); a matrix by its numbers, too;
-   x, y, z of the tool or as measured from outside, with the only orientation beside them; p1, p2, p3 with a
+   x, y, z of the tool or as measured from outside, with the only orientation next to them; p1, p2, p3 with a
    quaternion. Of several positions those measured are read.
 2. `chosen_pose`, `with_form`: the columns and the form that the user gives.
 3. `trailing_pose`: the last columns of a table without names, by their numbers: R R^T = I and a row
@@ -32,7 +32,7 @@ ORTHOGONAL = 1e-2  # entries of R R^T may differ from those of I by this: matric
 MAX_LENGTH_DEVIATION = 0.02  # of a quaternion from 1: they are printed with two digits or more
 MAX_ODD = 0.25  # share of rows that may be wrong where the others show what columns without names hold
 MIN_ROWS = 3  # in fewer, four numbers have length 1 by chance
-OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)_$")  # behind the device
+OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)_$")  # after the device
 
 _LIKE_JOINT = re.compile(r"q_?\d")  # names that quaternions and joints have
 _PLACES = np.arange(16).reshape(4, 4)  # of the entries of a homogeneous transform among its columns
@@ -97,7 +97,7 @@ def find_pose(
                 same = [other for other in families if other.shares_name(family)]
                 return replace(pose, alternatives=_alternatives(family, same))
     inside = [column for column in numeric if not column.words & words.outside]
-    if any(column.key in ("fx", "f_x") for column in inside):  # tx, ty, tz beside forces are torques
+    if any(column.key in ("fx", "f_x") for column in inside):  # tx, ty, tz next to forces are torques
         inside = [c for c in inside if not (c.key.startswith("t") and len(c.key) <= len("t_x"))]
     families = drop_unknown(find_families(inside, words.tcp_position, 0), lone=path)
     position, alternatives = _find_xyz(families, path=path)
@@ -121,7 +121,7 @@ def find_pose(
 def _find_counted_pose(
     numeric: Sequence[Column], tables: Sequence[LogTable], form: RotationForm | None
 ) -> Pose:
-    """Return p1, p2, p3 and the only quaternion beside them, of length 1 in most rows; else no pose."""
+    """Return p1, p2, p3 and the only quaternion next to them, of length 1 in most rows; else no pose."""
     families = prefer_measured(find_families(numeric, vocabulary().tcp_counted, 0))
     families = [family for family in families if _numbers(family) == range(3)]
     if len(families) != 1:
@@ -131,7 +131,7 @@ def _find_counted_pose(
     rotation, forms = _find_rotation(rest, tables, form)
     if len(rotation) != 4 or not _is_rotation(rotation, tables):
         return Pose()
-    return Pose(position, rotation, forms, "the four columns beside them have length 1")
+    return Pose(position, rotation, forms, "the four columns next to them have length 1")
 
 
 def _find_xyz(
@@ -207,7 +207,7 @@ def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
     if not (options.position or options.measured):
         if options.orientation:
             hint = Hint("position", None, "names x, y, z")
-            message = "found without a position, allowed: beside x, y, z"
+            message = "found without a position, allowed: next to x, y, z"
             raise OptionError(Finding(message, parameter="orientation", hints=(hint,)))
         return None
     if is_outside := bool(options.measured):
@@ -226,7 +226,7 @@ def chosen_pose(columns: Sequence[Column], options: LogMap) -> Pose | None:
     if rotation and not forms:
         of_form = f"{column_count(options.rotation)}, as {options.rotation} has" if options.rotation else ""
         parameter = "measured" if is_outside else "orientation"
-        count = format_count(len(rotation), "column") + " behind x, y, z" * is_outside
+        count = format_count(len(rotation), "column") + " after x, y, z" * is_outside
         raise OptionError(Finding(parameter=parameter, found=count, allowed=of_form or "3, 4 or 9"))
     return Pose(position, rotation, tuple(forms), "given as an option", measured=is_outside)
 
@@ -240,9 +240,9 @@ def with_form(pose: Pose, form: RotationForm | None) -> Pose:
     if form is None or not pose.rotation:
         return pose
     if column_count(form) != len(pose.rotation):
-        found = f"{form}, which has {column_count(form)} columns, for {listed(pose.rotation)}"
+        fault = f"{form}, which has {column_count(form)} columns, for {listed(pose.rotation)}"
         allowed = f"a form of {len(pose.rotation)} columns"
-        raise OptionError(Finding(parameter="rotation", found=found, allowed=allowed))
+        raise OptionError(Finding(parameter="rotation", found=fault, allowed=allowed))
     return replace(pose, forms=(form,))
 
 

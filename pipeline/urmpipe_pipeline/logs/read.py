@@ -86,7 +86,7 @@ def read_numbers(
 
 
 def open_map(files: Sequence[Path | MemoryTable], options: LogMap, error: LogError) -> LogMap:
-    """Return the map of a log that cannot be read yet: what is given, what its files show, and the questions.
+    """Return the map of a log that cannot be read yet: the options, what its files show, and the questions.
 
     Args:
         files: The files.
@@ -191,16 +191,16 @@ def read_series(file: Path, names: Sequence[str], options: LogMap | None = None)
         tables = open_tables([file], options)
         columns = columns_of(tables.tables, tables.titles)
         selected = map_collecting_errors(lambda name: find_column(columns, name, file=str(file)), names)
-        given = given_units(columns, options)
-        clocks = find_clocks(tables, columns, options, given)
-        plan = Plan(tables, clocks, Roles(joints=tuple(selected)), given)
+        stated = given_units(columns, options)
+        clocks = find_clocks(tables, columns, options, stated)
+        plan = Plan(tables, clocks, Roles(joints=tuple(selected)), stated)
         rows = read_rows(plan, skip_bad=options.skip_bad)
     values = rows.values(plan.roles.joints).copy()
     _check_complete(file, selected, values)
     t_ns, warnings = None if rows.clock is None else rows.clock - rows.clock[0], list[LogWarning]()
     if t_ns is None:
         t_ns, _, warnings = even_clock(rows.count, options.period)
-    units = [given.get(column.number) or column.unit for column in selected]
+    units = [stated.get(column.number) or column.unit for column in selected]
     for j, unit in enumerate(units):
         values[:, j] *= unit.factor if unit else 1.0
     texts = tuple(_unit_text(column, unit) for column, unit in zip(selected, units, strict=True))

@@ -1,7 +1,7 @@
 """What each column of a table with names is: joints, rates, accelerations, recorded tool centre point.
 
 1. `assign`: the joints are the columns that the user names, that a schema calls joints, that are named like
-   the robot's joints or like those of an arm (`names`), or whose rates stand beside them.
+   the robot's joints or like those of an arm (`names`), or whose rates are next to them.
 2. Without joints, x, y, z are a path; else a question whose choices are the columns that may be joints.
 3. `written_roles`: the columns of what urmpipe writes itself, by their metadata or all names together.
 4. `signal_roles`: the signals of a simulation: its only array of joints, else a question.
@@ -62,8 +62,8 @@ from urmpipe_pipeline.logs.names import (
     family_of,
     find_families,
     find_joints,
+    group_by_number,
     named_after,
-    numbered_alike,
     of_first_kind,
     proved_by_rates,
     same_quantities,
@@ -97,7 +97,7 @@ class Roles:
         forms: The forms that the orientation may have; one if it is known.
         inferences: How each is known.
         warnings: What a person should know.
-        measured: Whether the tool centre point was measured from outside, in a frame of its own.
+        measured: Whether the tool centre point was measured from outside, in another frame.
         further: What else was requested, by what it is.
     """
 
@@ -209,7 +209,7 @@ def _find_joints(
         half_pose = bool(pose.position and not pose.rotation)
         named = find_joints(free, file, robot, half_pose=half_pose, path=bool(pose.position))
         if not (named.columns or pose.position or some_named(free, robot)[0]):
-            named = proved_by_rates(numbered_alike(free), tables)
+            named = proved_by_rates(group_by_number(free), tables)
         if len(named.columns) == 4 and turns_as_quaternion(named.columns, tables):
             message = f"{listed(named.columns)} with length 1 in each row, as a quaternion has"
             raise which_joints(file, message, [named.columns])
@@ -223,7 +223,7 @@ def _find_joints(
 
 
 def _stated(stated: Sequence[Column], file: str, robot: Chain | None) -> NamedJoints:
-    """Return the joints among the columns that a schema states, by their names, else all but a gripper's."""
+    """Return the joints among the columns that a schema states: by their names, else all without grippers."""
     first = [column for column in stated if column.kind == min(other.kind for other in stated)]
     arm = tuple(column for column in first if not column.words & vocabulary().grippers) or tuple(first)
     try:
@@ -318,7 +318,7 @@ def _path(
     *,
     path: bool,
 ) -> Roles:
-    """Return the roles of a path; raise if it is none either."""
+    """Return the roles of a path; raise if it has no position either."""
     file = tables[0].file
     pose = pose if pose.position else find_pose(numeric, tables, path=True)
     if pose.position:
@@ -373,8 +373,8 @@ def _path(
 def _may_move(columns: Sequence[Column]) -> list[Column]:
     """Return the columns that may be joints by name and unit: no rates, torques and such."""
     words = vocabulary()
-    others = words.joint_words["rate"] | words.joint_words["acceleration"] | words.other | words.outside
-    free = [column for column in columns if not column.words & others]
+    excluded = words.joint_terms["rate"] | words.joint_terms["acceleration"] | words.other | words.outside
+    free = [column for column in columns if not column.words & excluded]
     return [
         column
         for column in free
@@ -387,7 +387,7 @@ def _may_be(
 ) -> list[Sequence[Column]]:
     """Return the columns that may be joints whatever their names, if they are as many as an arm has.
 
-    A column that counts is none, and the only one that rises may be a time, in a table without a clock.
+    A column that counts is excluded, and the only one that rises may be a time, in a table without a clock.
     """
     candidates = _may_move(numeric)
     steps = {column: np.diff(tables[column.table].numbers(column.index)) for column in candidates}
@@ -407,7 +407,7 @@ def _may_be(
     candidates = [column for column in candidates if len(rising) != 1 or column is not rising[0]]
     counts = {len(robot.coordinates)} if robot else range(1, MAX_JOINTS + 1)
     candidates = of_first_kind(candidates)
-    groups = [*by_arm(candidates), *numbered_alike(candidates), *numbered_alike(candidates, FIRST_NUMBER)]
+    groups = [*by_arm(candidates), *group_by_number(candidates), *group_by_number(candidates, FIRST_NUMBER)]
     groups.sort(key=len, reverse=True)
     return [group for group in groups if len(group) in counts]
 
@@ -449,8 +449,8 @@ def _with_warnings(
         (group, same_quantities(group, rest)) for group in (roles.rates, roles.accelerations, roles.rotation)
     ]
     passed, covered = [], {*roles.columns}
-    for group, others in pairs:
-        for other in others:
+    for group, passed_over in pairs:
+        for other in passed_over:
             if new := tuple(column for column in other if column not in covered):
                 passed.append((group, new))
                 covered |= {*new}
@@ -516,7 +516,7 @@ def written_roles(columns: Sequence[Column], table: LogTable, robot: Chain | Non
         inferences += [Inference(what, _names(group), why)] if group else []
     used = [column for group in groups for column in group]
     rest = [column for column in columns if column not in used]
-    inferences += not_used(rest, "urmpipe makes them anew")
+    inferences += not_used(rest, "urmpipe computes them again")
     forms = forms if rotation else []
     return Roles(joints, rates, accelerations, position, rotation, tuple(forms), tuple(inferences))
 

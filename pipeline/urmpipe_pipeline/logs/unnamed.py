@@ -2,7 +2,7 @@
 
 1. Poses: a table of seven numbers, the last four of length 1, or of a homogeneous transform (12 or 16
    numbers), alone or after a time, is a path, as TUM and KITTI write it: joints keep no such law.
-2. Joints: as many columns as the robot has; columns whose rates stand beside them (`rates`); without a robot
+2. Joints: as many columns as the robot has; columns whose rates are next to them (`rates`); without a robot
    a few columns that move alike, with a warning. A pose may follow the joints.
 3. Otherwise a question whose choices are blocks of columns.
 4. Plots: one column of numbers a file, joined by the numbers in the names of columns or files.
@@ -90,11 +90,11 @@ def without_header(
         joints = chosen_columns(columns, options.joints, parameter="joints")
         check_count(joints, table.file, robot)
         return _by_place(joints, columns, robot, GIVEN, pose)
-    behind = trailing_pose(columns, table, path=path) if pose is None else None
-    if behind and len(columns_before(behind, columns)) <= 1:
-        return _path_of_poses(behind, columns, table, options)
+    last = trailing_pose(columns, table, path=path) if pose is None else None
+    if last and len(columns_before(last, columns)) <= 1:
+        return _path_of_poses(last, columns, table, options)
     if path:
-        return _path_by_place(columns, table, options, pose or leading_pose(columns, table) or behind)
+        return _path_by_place(columns, table, options, pose or leading_pose(columns, table) or last)
     if texts := [column for column in columns if column.text]:
         is_text = np.array([column.text for column in columns])
         odd = is_text | find_odd_columns(table.values([column.index for column in columns]))
@@ -106,10 +106,10 @@ def without_header(
     if not columns:
         message = "found no column except the time, allowed: the joints"
         raise LogError(Finding(message, file=table.file, hints=(TIMES_OF_ANOTHER,)))
-    if behind and len(columns_before(behind, columns)) < count:
-        behind = None
-    pose = with_form(pose or behind or Pose(), options.rotation)
-    free = columns_before(behind, columns) if behind else columns
+    if last and len(columns_before(last, columns)) < count:
+        last = None
+    pose = with_form(pose or last or Pose(), options.rotation)
+    free = columns_before(last, columns) if last else columns
     free = [column for column in free if column not in (*pose.position, *pose.rotation)]
     if not free and pose.position:
         return _path_roles(pose, columns)
@@ -134,7 +134,7 @@ def _by_place(
     pose: Pose | None,
     rates: tuple[Column, ...] = (),
 ) -> Roles:
-    """Return joints that are called as the robot's, or q1, q2, ..., their rates, and the pose beside them."""
+    """Return joints, called as those of the robot or q1, q2, ..., their rates, and the pose next to them."""
     pose = pose or Pose()
     rest = [column for column in columns if column not in (*joints, *rates, *pose.position, *pose.rotation)]
     inferences = [

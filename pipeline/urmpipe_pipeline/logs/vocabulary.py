@@ -16,7 +16,7 @@ from urmpipe_models.math3d import RotationForm
 Quantity = Literal["angle", "length", "time", "date", "ratio", "other"]  # other: torque, force, current, ...
 Patterns = tuple[re.Pattern[str], ...]
 
-SURELY_SECONDS = 0.05  # a time between samples of so much or less is in s: in ms it would be 20 kHz or more
+SURELY_SECONDS = 0.05  # a time between samples of this or less is in s: in ms it would be 20 kHz or more
 
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
 _INSIDE = re.compile(
@@ -24,7 +24,7 @@ _INSIDE = re.compile(
     r"(?P<rate>[\s_./]?(?:per[\s_.])?s(?:ec(?:ond)?)?(?P<power>\^?2|_2(?=[\s_./]\w))?)?(?=[\s_./]\w|$)",
     re.IGNORECASE,
 )
-"""A unit among the words of a name, or behind them, perhaps one per second."""
+"""A unit among the words of a name, or after them, perhaps one per second."""
 
 _CAPITAL = re.compile(r"(?<=[a-z\d])(?=[A-Z])")
 _BEGINS, _ENDS = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # of a word of letters
@@ -62,7 +62,7 @@ class KnownSource:
         name: Its name.
         columns: Patterns that must each match a column's name; none if nothing gives it away.
         units: Unit of a quantity where a column's name does not say its own.
-        own: Whether urmpipe itself writes it: what it says of its columns is no matter of doubt.
+        own: Whether urmpipe itself writes it: what it states of its columns is certain.
     """
 
     name: str
@@ -109,7 +109,7 @@ class Vocabulary:
         self.episode = tuple[str, ...](data["episode"]["names"])
         roles = ("position", "rate", "acceleration")
         self.joint = {role: _compiled(joint[role]) for role in roles}
-        self.joint_words = {role: frozenset[str](joint[f"{role}_words"]) for role in roles}
+        self.joint_terms = {role: frozenset[str](joint[f"{role}_words"]) for role in roles}
         self.joint_of_row = _compiled(joint["of_row"])
         self.marks = frozenset[str](joint["marks"])
         self.orders = tuple(tuple[str, ...](order) for order in joint["orders"])
@@ -182,7 +182,7 @@ class Vocabulary:
         patterns = (*self.time, *self.durations, *self.index, *self.tcp_position)
         patterns += tuple(pattern for of_role in self.joint.values() for pattern in of_role)
         patterns += tuple(pattern for words in self.tcp_rotations for pattern in words.patterns)
-        words = self.other.union(*self.joint_words.values(), *self.orders)
+        words = self.other.union(*self.joint_terms.values(), *self.orders)
         words |= self.measured_markers | self.commanded
         return name in words or bool(self.arms.fullmatch(name)) or any(p.search(name) for p in patterns)
 
@@ -211,7 +211,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
     """Return a column's name without its unit, and the unit's text: "q1 [deg]" is q1 and deg.
 
     An index such as in state.q[0] and joint(1) stays part of the name. A unit as the last word
-    (c_arm_wigwag_deg) or inside of it (joint_rad_1, qd_deg_s_1) is told, and stays part of the name as well.
+    (c_arm_wigwag_deg) or inside of it (joint_rad_1, qd_deg_s_1) is returned, and stays in the name.
     """
     match = _BRACKETS.match(name)
     if match and match["inside"].strip() == "t":  # q_1(t), a function

@@ -209,8 +209,8 @@ def choice_error(
     shown = ", ".join([*choices][:MAX_CHOICES]) + ", ..." * (len(choices) > MAX_CHOICES)
     if requested is None:
         return question(path, f"{len(choices)} {what}: {shown}", option, choices.items())
-    found = format_value(requested)
-    return OptionError(Finding(file=str(path), parameter=option, found=found, allowed=shown))
+    fault = format_value(requested)
+    return OptionError(Finding(file=str(path), parameter=option, found=fault, allowed=shown))
 
 
 def question(path: Path, fault: str, option: str, choices: Iterable[tuple[Any, str]]) -> LogError:

@@ -244,6 +244,6 @@ def _field(table: LogTable, column: int, joint: str = "", *, is_joint: bool = Fa
 def _may_be_position(table: LogTable, column: int) -> bool:
     """Return whether name and unit of a column may be those of joint positions."""
     words, unit = vocabulary(), vocabulary().unit(_unit_of(table, column))
-    not_positions = words.other.union(*(words.joint_words[role] for role in ("rate", "acceleration")))
+    not_positions = words.other.union(*(words.joint_terms[role] for role in ("rate", "acceleration")))
     is_size = unit is None or (unit.quantity in ("angle", "length") and not unit.order)
     return is_size and not {*_labels(table)[column].split("_")} & not_positions

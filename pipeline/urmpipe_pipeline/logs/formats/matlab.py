@@ -192,8 +192,8 @@ def _grid_table(run: Mapping[str, Any]) -> pa.Table:
     columns: dict[str, Any] = {"row": np.arange(1, rows + 1)}
     if len(clock):
         columns = {"t [s]": decimals(clock.astype(np.int64), 9)}
-    for key, (before, behind) in zip(("q", "qd", "qdd"), ORDERS.values(), strict=True):
-        names = [f"{before}{name} [{unit}{behind}]" for name, unit in zip(joints, units, strict=True)]
+    for key, (before, after) in zip(("q", "qd", "qdd"), ORDERS.values(), strict=True):
+        names = [f"{before}{name} [{unit}{after}]" for name, unit in zip(joints, units, strict=True)]
         columns |= dict(zip(names, _matrix(run[key], rows).T, strict=False))
     if not len(clock):
         point = np.column_stack([_matrix(run[key], rows) for key in ("p", "euler_zyx")])

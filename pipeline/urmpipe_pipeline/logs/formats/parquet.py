@@ -77,7 +77,7 @@ def dataframe_to_table(table: Any, name: str) -> MemoryTable:
         name: Name of the log.
 
     Raises:
-        LogError: If a stream, or the query behind it, fails.
+        LogError: If a stream, or its query, fails.
     """
     pandas = sys.modules.get("pandas")
     if pandas is not None and isinstance(table, pandas.DataFrame):

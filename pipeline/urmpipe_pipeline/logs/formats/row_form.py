@@ -103,7 +103,7 @@ class RowForm:
         if self.opening and text.count(self.opening) != text.count(closing):
             raise RowError(f"found {shorten(text)}, allowed: as many {self.opening} as {closing}")
         if self.labels:
-            cells = self._behind_labels(text)
+            cells = self._after_labels(text)
         else:
             arrays = iter(self.arrays(text))
             cells = split_line(self.replace_arrays(text, lambda _: _ARRAY_SIGN), self.delimiter)
@@ -112,7 +112,7 @@ class RowForm:
         is_array = [bool(self.opening) and c.startswith(self.opening) and c.endswith(closing) for c in cells]
         return [numbers_in(cell) if array else cell for cell, array in zip(cells, is_array, strict=True)]
 
-    def _behind_labels(self, text: str) -> list[str]:
+    def _after_labels(self, text: str) -> list[str]:
         places: list[tuple[int, int]] = []
         end = 0
         for label in self.labels:

@@ -167,9 +167,9 @@ def _signs(parameter: str, chosen: str | None, allowed: Sequence[str]) -> Sequen
     sign = _SIGNS.get(chosen.lower(), chosen)
     if sign not in allowed:
         names = ", ".join(_NAMES[sign] for sign in allowed)
-        found = format_value(chosen)
+        fault = format_value(chosen)
         raise OptionError(
-            Finding(parameter=parameter, found=found, allowed=f"{names}, or the character itself")
+            Finding(parameter=parameter, found=fault, allowed=f"{names}, or the character itself")
         )
     return (sign,)
 
@@ -397,7 +397,7 @@ def _name_cells(
         # if few rows keep the others from being understood, each of them is named
         for few, column, allowed in (
             (uncounted, 0, f"a count, as before what line {line} names"),
-            (filled, -1, f"no cell behind what line {line} names"),
+            (filled, -1, f"no cell after what line {line} names"),
         ):
             if len(few) <= FEW * len(rows):
                 file = str(segment.path)
@@ -444,8 +444,8 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine], options: Mapping[str, s
     """Return why no row of numbers was found with the signs that were given."""
     file, allowed = str(segment.path), "a table with one row per sample"
     if segment.has_more and len(body) < MIN_LINES:
-        found = f"no row of numbers in the first {len(segment.head)} letters"
-        return Finding(file=file, found=found, allowed=allowed)
+        fault = f"no row of numbers in the first {len(segment.head)} letters"
+        return Finding(file=file, found=fault, allowed=allowed)
     if not body:
         return Finding(f"found no line with content, allowed: {allowed}", file=file)
     line = body[0].number
@@ -453,6 +453,6 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine], options: Mapping[str, s
     if len(body) <= 2 and all(is_text(cell, ".") for cell in cells if cell):
         return Finding("found a header and no rows, allowed: one row per sample", file=file, line=line)
     signs = [f"{what} {_NAMES[_SIGNS.get(sign.lower(), sign)]}" for what, sign in options.items()]
-    found = f"{body[0].text.strip()[:60]!r} and no row of numbers below it"
-    found += f" with {' and '.join(signs)}" if signs else ""
-    return Finding(file=file, line=line, found=found, allowed=allowed)
+    fault = f"{body[0].text.strip()[:60]!r} and no row of numbers below it"
+    fault += f" with {' and '.join(signs)}" if signs else ""
+    return Finding(file=file, line=line, found=fault, allowed=allowed)

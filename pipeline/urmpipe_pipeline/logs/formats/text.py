@@ -51,8 +51,8 @@ _ROW_PER_SAMPLE = Hint("", effect="write one row per sample, one column per join
 def check_width(columns: int, file: str, line: int | None = None) -> None:
     """Raise a `LogError` if a table has more columns than it may have."""
     if columns > MAX_TABLE_COLUMNS:
-        found, allowed = f"more than {MAX_TABLE_COLUMNS} columns", "as many as that"
-        raise LogError(Finding(file=file, line=line, found=found, allowed=allowed, hints=(_ROW_PER_SAMPLE,)))
+        fault, allowed = f"more than {MAX_TABLE_COLUMNS} columns", "as many as that"
+        raise LogError(Finding(file=file, line=line, found=fault, allowed=allowed, hints=(_ROW_PER_SAMPLE,)))
 
 
 def unpacked_limit(size: int) -> int:
@@ -65,8 +65,8 @@ def check_unpacked_size(path: Path, unpacked: int) -> None:
     size = path.stat().st_size
     limit = unpacked_limit(size)
     if unpacked > limit:
-        found = f"{size} bytes that unpack to {unpacked}"
-        raise LogError(Finding(file=str(path), found=found, allowed=f"{limit} at most"))
+        fault = f"{size} bytes that unpack to {unpacked}"
+        raise LogError(Finding(file=str(path), found=fault, allowed=f"{limit} at most"))
 
 
 class Compression(NamedTuple):
@@ -118,15 +118,15 @@ def unpack(path: Path, compression: Compression) -> bytes:
             while length <= limit and (block := unpacked.read(_BLOCK)):
                 length += content.write(block)
     except errors as error:
-        found = f"a {compression.name} archive that is damaged or cut ({str(error).rstrip('.')})"
+        fault = f"a {compression.name} archive that is damaged or cut ({str(error).rstrip('.')})"
         hint = Hint("", effect=f"copy it again, or keep what can be read: {command}")
-        raise LogError(Finding(file=str(path), found=found, allowed="a whole one", hints=(hint,))) from None
+        raise LogError(Finding(file=str(path), found=fault, allowed="a whole one", hints=(hint,))) from None
     if length > limit:
-        found, hint = (
+        fault, hint = (
             f"{size} bytes that unpack to more",
             Hint("", effect=f"unpack it if it is a log: {command}"),
         )
-        raise LogError(Finding(file=str(path), found=found, allowed=f"{limit} bytes", hints=(hint,)))
+        raise LogError(Finding(file=str(path), found=fault, allowed=f"{limit} bytes", hints=(hint,)))
     return content.getvalue()
 
 
@@ -261,8 +261,8 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
         name = path.with_suffix(".tar" if raw[257:262] == b"ustar" else "")
         container = _find_container(name, raw, any_suffix)
     if size == 0:
-        found = "found an empty file, allowed: a table with one row per sample"
-        raise LogError(Finding(found, file=str(path)))
+        fault = "found an empty file, allowed: a table with one row per sample"
+        raise LogError(Finding(fault, file=str(path)))
     mark, encoding = _find_encoding(raw)
     if data is not None and compression is not None and (container or encoding is None):
         content = f"{container.what if container else 'a binary file'} in a {compression.name} archive"
@@ -302,11 +302,11 @@ def check_line_lengths(segment: Segment) -> None:
         while block := file.read(MAX_LINE_BYTES // 8):
             first = block.find(sign)
             if length + (len(block) if first < 0 else first) > MAX_LINE_BYTES:
-                found, allowed = f"a line of more than {MAX_LINE_BYTES >> 20} MiB", "shorter lines"
+                fault, allowed = f"a line of more than {MAX_LINE_BYTES >> 20} MiB", "shorter lines"
                 with segment.open() as before:
                     line = 1 + before.read(read - length).count(sign)
                 hints, name = (_ROW_PER_SAMPLE,), str(segment.path)
-                raise LogError(Finding(file=name, line=line, found=found, allowed=allowed, hints=hints))
+                raise LogError(Finding(file=name, line=line, found=fault, allowed=allowed, hints=hints))
             length = length + len(block) if first < 0 else len(block) - 1 - block.rfind(sign)
             read += len(block)
 
@@ -357,13 +357,13 @@ def _export_advice(container: Container, path: Path) -> Finding:
 
 
 def _no_text(path: Path, raw: bytes) -> Finding:
-    """Return the finding about bytes that no text has: with their line if text stands above it."""
+    """Return the finding about bytes that no text has: with their line if there is text above it."""
     place = next(k for k, byte in enumerate(raw) if byte in _CONTROL)
     line = raw.count(b"\n", 0, place) + 1
     if line <= _TITLE_LINES:
         return Finding("found a binary file, allowed: a text table (CSV)", file=str(path))
-    found = f"the byte 0x{raw[place]:02x}"
-    return Finding(file=str(path), line=line, found=found, allowed="text, as in the lines above")
+    fault = f"the byte 0x{raw[place]:02x}"
+    return Finding(file=str(path), line=line, found=fault, allowed="text, as in the lines above")
 
 
 def _find_encoding(raw: bytes) -> tuple[int, str | None]:
