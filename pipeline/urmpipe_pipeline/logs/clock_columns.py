@@ -136,6 +136,7 @@ def suggest_time_column(
     for column in columns:
         is_free = column not in used and not column.text
         may_be = not column.unit_text or (column.unit and column.unit.quantity == "time")
+        may_be = may_be and not column.words & {"x", "y", "z"}
         if is_free and may_be and _is_rising(column, table):
             return column
     return None

@@ -207,15 +207,6 @@ def listed(columns: Sequence[Column], most: int = 24) -> str:
     return ", ".join(names)
 
 
-def find_numbers(names: Sequence[str]) -> list[int] | None:
-    """Return the last number in each name, if the names are the same without it and the numbers differ."""
-    matches = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
-    parts = [match.groups() for match in matches if match]
-    numbers = [int(number) for _, number, _ in parts]
-    same = len({(before, after) for before, _, after in parts}) == 1
-    return numbers if same and len(set(numbers)) == len(names) else None
-
-
 def check_unique_names(
     used: Sequence[Column], columns: Sequence[Column], tables: Sequence[LogTable], remedy: Hint
 ) -> None:

@@ -24,7 +24,6 @@ COLUMNS_NOT_READ = "columns-not-read"
 TCP_NOT_READ = "tcp-not-read"
 MIN_JOINTS = 3  # fewer columns are a radius, a speed, a flag
 
-_TOOL = frozenset({"tcp", "tool", "pose", "cartesian"})  # words of the tool itself
 _TOOL_VALUES = frozenset(["analog", "digital", "input", "output", "in", "out", "bits", "offset", "payload"])
 _NEAR_TOOL = re.compile(r"(tcp|tpc|ctp|tool|tip|eef|endeff|werkzeug)|(?:^|_)ee(?:_|$)")  # also misspelled
 _TORQUES = re.compile(r"[tp]_?[xyz]")  # names of a position that forces next to them make torques
@@ -89,7 +88,7 @@ def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -
     They begin as the names of the position, or are angles if these begin with x, y, z.
     """
     words = vocabulary()
-    excluded = words.joint_terms["rate"] | words.joint_terms["acceleration"] | (words.other - _TOOL)
+    excluded = words.joint_terms["rate"] | words.joint_terms["acceleration"] | (words.other - words.tool)
     stem = OF_POSITION.sub("", os.path.commonprefix([c.key for c in position]))  # noqa: RUF071 (names)
     free = [c for c in unused if not c.words & excluded and (c.unit is None or c.unit.quantity == "angle")]
     near = [c for c in free if c.key.startswith(stem) if stem or (c.unit and not c.unit.order)]
@@ -136,7 +135,7 @@ def tcp_warnings(rest: Sequence[Column]) -> list[LogWarning]:
 def _is_like_tcp(column: Column) -> bool:
     """Return whether the name of a column is that of a position, or near to one."""
     words = vocabulary()
-    excluded = words.other - _TOOL | words.joint_terms["rate"] | words.joint_terms["acceleration"]
+    excluded = words.other - words.tool | words.joint_terms["rate"] | words.joint_terms["acceleration"]
     if column.words & (excluded | _TOOL_VALUES) or (column.unit and column.unit.quantity != "length"):
         return False
     if any(pattern.search(column.plain) for pattern in words.tcp_position):

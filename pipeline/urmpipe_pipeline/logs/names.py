@@ -23,12 +23,12 @@ from urmpipe_pipeline.logs.columns import (
     RECORD,
     Column,
     Kind,
-    find_numbers,
     kind_of,
     listed,
     take,
     which_joints,
 )
+from urmpipe_pipeline.logs.formats.cells import find_numbers
 from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.rates import period_of
 from urmpipe_pipeline.logs.vocabulary import Patterns, key, vocabulary
@@ -358,7 +358,7 @@ def _by_word(free: Sequence[Column], file: str, count: int | None) -> NamedJoint
     """Return the joints by a word for positions at the same place of their names."""
     candidates = _candidates(free)
     still = _not_commanded(of_first_kind(candidates))
-    family = _sharing_a_mark(still)
+    family = tuple(c for c in _sharing_a_mark(still) if not c.words & {"x", "y", "z"})
     if not family or count not in (None, len(family)):
         return None
     _ask_if_several(family, file, count)
@@ -378,6 +378,11 @@ def _by_unit(free: Sequence[Column], file: str, count: int | None, *, half_pose:
     if not any(column.unit and column.unit.quantity == "angle" for column in sized):
         return None
     _ask_if_several(sized, file, count)
+    angles = [column for column in sized if column.unit and column.unit.quantity == "angle"]
+    shared = frozenset.intersection(*(column.words for column in sized))
+    if count is None and len(angles) < len(sized) and not shared:  # a length may be a slide, or a height
+        fault = f"{listed(sized)}, whose units are those of joints that turn and of lengths"
+        raise which_joints(file, fault, [sized, angles])
     if count not in (None, len(sized)) or (half_pose and count is None and len(sized) == 3):
         return None
     evidence = "their units; the order is the file's"

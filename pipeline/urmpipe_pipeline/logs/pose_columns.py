@@ -145,10 +145,21 @@ def _find_xyz(
     return (best[0].ordered(), _alternatives(best[0], valid)) if is_clear else ((), ())
 
 
-def planar_positions(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
-    """Return the pairs of columns that are x and y of a tool without z."""
-    families = find_families(columns, vocabulary().tcp_position, 0)
-    return [family.ordered() for family in prefer_measured(families) if sorted(family.columns) == [0, 1]]
+def may_be_positions(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
+    """Return the groups of columns whose names differ by x, y and z alone, or by x and y."""
+    words = vocabulary()
+    excluded = words.joint_terms["rate"] | words.joint_terms["acceleration"] | (words.other - words.tool)
+    groups: dict[tuple[str, ...], dict[str, Column]] = {}
+    for column in columns:
+        parts = column.plain.split("_")
+        axes = [k for k, part in enumerate(parts) if part in ("x", "y", "z")]
+        is_length = column.unit is None or column.unit.quantity == "length"
+        if axes and is_length and not column.words & excluded:
+            stem = *parts[: axes[-1]], "#", *parts[axes[-1] + 1 :]
+            groups.setdefault(stem, {}).setdefault(parts[axes[-1]], column)
+    return [
+        tuple(group[axis] for axis in sorted(group)) for group in groups.values() if {*group} >= {"x", "y"}
+    ]
 
 
 def _alternatives(family: Family, families: Sequence[Family]) -> tuple[tuple[Column, ...], ...]:

@@ -73,7 +73,7 @@ from urmpipe_pipeline.logs.pose_columns import (
     Pose,
     chosen_pose,
     find_pose,
-    planar_positions,
+    may_be_positions,
     turns_as_quaternion,
     with_form,
 )
@@ -82,6 +82,7 @@ from urmpipe_pipeline.logs.vocabulary import vocabulary
 from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 
 GIVEN = "given as an option"  # evidence of columns that the user named
+MAX_POSITIONS = 6  # choices of x, y, z in a question
 
 
 @dataclass(frozen=True, slots=True)
@@ -362,11 +363,10 @@ def _path(
         raise LogError(Finding(message, file=file, hints=(record, *answers, other)))
     none = f"no joint columns in {listed(columns)}" if columns else "no column of numbers except times"
     further = [] if columns else [TIMES_OF_ANOTHER]
-    further += (
-        []
-        if robot
-        else [take(pair, "reads a plane path", parameter="position") for pair in planar_positions(numeric)]
-    )
+    positions = [] if robot else may_be_positions(numeric)
+    further += [take(group, "reads a path", parameter="position") for group in positions[:MAX_POSITIONS]]
+    of_tool = {column for group in positions for column in group}
+    numeric = [column for column in numeric if column not in of_tool] if len(of_tool) > 2 else numeric
     raise which_joints(file, none, _may_be(numeric, columns, tables, robot), need, *further)
 
 

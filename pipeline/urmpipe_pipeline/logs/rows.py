@@ -295,10 +295,13 @@ def unknown_times(numbers: Numbers, clock: Clock) -> Iterator[Finding]:
     """Yield row and column where a row has no time, or one that cannot be read."""
     if numbers.clock is None or not clock.columns:
         return
-    name = clock.columns[0].header
-    for k in np.flatnonzero(numbers.clock == NO_TIME).tolist():
+    name, has_none = clock.columns[0].header, numbers.clock == NO_TIME
+    known = np.flatnonzero(~has_none)
+    is_within = len(known) > 0 and not has_none[known[0] : known[-1]].any()
+    rows = (Hint("rows", f"{known[0] + 1}:{known[-1] + 1}", "reads those with a time"),) if is_within else ()
+    for k in np.flatnonzero(has_none).tolist():
         message = "found no time, allowed: a time in every row"
-        yield Finding(message, row=k + 1, column=name, hints=OTHER_TIME)
+        yield Finding(message, row=k + 1, column=name, hints=(*rows, *OTHER_TIME))
     for k in np.flatnonzero(numbers.clock == UNREADABLE).tolist():
         text = " ".join(cells.text(k).strip() for cells in numbers.texts)
         message = f"found {text[:MAX_CELL_LENGTH]!r}, allowed: times as in the other rows"

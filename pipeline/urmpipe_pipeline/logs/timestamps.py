@@ -416,12 +416,14 @@ def _find_static_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) 
     if poses is None:
         return ""
     rows, steps = poses
+    rates = numbers.values[:MAX_ROWS, [columns.index(rate) for rate in plan.roles.rates if rate in columns]]
     lengths, turned = np.linalg.norm(steps, axis=1), np.linalg.norm(np.diff(steps, axis=0), axis=1)
     is_aimless = _quantile(turned, TURN_QUANTILE) >= MIN_TURN * _quantile(lengths, TURN_QUANTILE)
     seen = f"the joints step by up to {np.abs(steps).max():.2g} rad (or m) from row to row, in"
     if numbers.clock is None:
         jumps = np.count_nonzero(lengths[1:-1] > 2 * np.maximum(lengths[:-2], lengths[2:]))
-        if not is_aimless and jumps < max(3, MIN_JUMPS * len(lengths)):
+        is_moving = 2 * np.count_nonzero((rates != 0).any(axis=1)) > len(rates)  # static poses have no rates
+        if is_moving or (not is_aimless and jumps < max(3, MIN_JUMPS * len(lengths))):
             return _LIKE_POSES
         return f"no clock, and {seen} {'no direction' if is_aimless else 'lines with jumps between them'}"
     times = numbers.clock[rows]

@@ -9,7 +9,7 @@
    wrap itself may be a joint that slides, unless an arm or another unit says that none does: it is assumed
    to be in deg, or in rad up to two turns; a larger one is asked about.
 5. Else rad is assumed up to two turns, deg if joints would be too fast in rad, or two of them too far; m,
-   and mm from `MAX_METRES`, for a joint that slides or a position. Other values beyond two turns are asked
+   and mm from `MAX_REACH`, for a joint that slides or a position. Other values beyond two turns are asked
    about, as are those that may be per cent.
 
 The inference of a unit states its basis (given, named, proved or assumed) and why. What the user gives is
@@ -61,7 +61,6 @@ UNIT_NOT_REACHED = "unit-not-reached"  # the unit for every angle, by columns wh
 GIVEN = "given as an option"  # why a unit is that of the user
 MAX_REACH = 10.0  # [m], of a coordinate; no arm reaches further
 MIN_REACH = 0.02  # [m]; a tool that moves has a larger coordinate
-MAX_METRES = 20.0  # larger values without a unit are not in [m]
 MAX_SLIDES = 3  # joints of a gantry or a delta robot
 COUNTS_PER_TURN = (1024, 4096, 16384, 65536)  # of the encoders of servos and motors
 USUAL_COUNTS = 4096  # Dynamixel, Feetech
@@ -415,7 +414,7 @@ class UnitFinder:
 
     def _assume_length(self, columns: Sequence[Column], size: float, role: Role) -> Unit:
         """Return m, or mm beyond any arm."""
-        is_far = size > MAX_METRES
+        is_far = size > MAX_REACH
         unit = vocabulary().units["mm" if is_far else "m"]
         hints = unit_hints(columns if role == "joint" else columns[:1], OTHER_UNIT[unit.name])
         hints = which_unit(columns, "m", every=False) if is_far else hints

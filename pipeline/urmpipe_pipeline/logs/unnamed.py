@@ -29,11 +29,11 @@ from urmpipe_pipeline.logs.columns import (
     UNKNOWN,
     Column,
     chosen_columns,
-    find_numbers,
     listed,
     take,
     which_joints,
 )
+from urmpipe_pipeline.logs.formats.cells import find_numbers
 from urmpipe_pipeline.logs.formats.log_table import USUAL_COUNTS, LogTable
 from urmpipe_pipeline.logs.formats.opening import Tables
 from urmpipe_pipeline.logs.log_map import LogMap
@@ -60,6 +60,7 @@ ASSUMED_JOINTS = "assumed-joints"  # warning: all columns of a table without nam
 NO_HEADER = "no header states what they are"
 TWO_TURNS = 720.0, 2.0 * math.tau  # [deg], [rad]: no joint goes further, as clocks, wheels and counts do
 MAX_SELDOM = 0.2  # a column that moves in a smaller share of the rows than others may be a gripper's
+YOUBOT_COLUMNS = 13  # chassis (3), arm (5), wheels (4), gripper, as a scene of CoppeliaSim takes them
 MAX_UNASKED = 7  # columns that are joints where no robot states how many there are; more may be blocks
 
 
@@ -233,10 +234,12 @@ def _joints_among(
         evidence = f"half of the steps agree within {100 * blocks[0].variation:.2g} %"
         return joints, rates, f"columns {listed(rates)} are their rates: {evidence}"
     odd = find_odd_columns(values)
-    may_be_path = len(free) == 3 or leading_pose(free, table) is not None
+    pose = leading_pose(free, table)
+    may_be_path = len(free) == 3 or pose is not None
     if not blocks and count is None and len(free) <= MAX_UNASKED and not odd.any() and not may_be_path:
         return tuple(free), (), "no header: joints in order"
-    groups = [[free[k] for k in block.joints] for block in blocks] + _groups(free, odd, count)
+    groups = [[free[k] for k in block.joints] for block in blocks] + [free[7:]] * (pose is not None)
+    groups += _groups(free, odd, count)  # next to those after a pose, of a base that moves
     doubtful = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
     message = f"{len(free)} columns that no header names"
     message += f", of which {listed(doubtful)} may not be joints" if doubtful else ""
@@ -290,7 +293,10 @@ def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[S
         for size in ((3, *USUAL_COUNTS) if len(free) == 9 else USUAL_COUNTS)
         for k in (range(0, len(free), size) if len(free) % size == 0 else (0,))
     ]
-    return [*tiles, *near[:1], free]
+    starts = [k for k in range(1, len(odd)) if odd[k - 1] and not odd[k]]
+    after_odd = [free[k : k + size] for k in starts[:1] for size in USUAL_COUNTS[:2]]
+    base = [free[3:8]] if len(free) == YOUBOT_COLUMNS else []
+    return [*tiles, *near[:1], *base, *after_odd, free]
 
 
 # 4. Plots

@@ -117,6 +117,7 @@ class Vocabulary:
         self.parts = _compiled(joint["parts"])
         self.other = frozenset[str]((*joint["other"], *joint["grippers"]))
         self.grippers = frozenset[str](joint["grippers"])
+        self.tool = frozenset[str](joint["tool"])
         self.measured_markers = frozenset[str](joint["measured"])
         self.commanded = frozenset[str](joint["commanded"])
         self.goals = frozenset[str](joint["goals"])
@@ -179,7 +180,7 @@ class Vocabulary:
 
     def is_column(self, name: str) -> bool:
         """Return whether the `key` of a name is that of a column: of a time, a joint, the tool, an arm."""
-        patterns = (*self.time, *self.durations, *self.index, *self.tcp_position)
+        patterns = (*self.time, *self.durations, *self.index, *self.tcp_position, *self.tcp_pose_vector)
         patterns += tuple(pattern for of_role in self.joint.values() for pattern in of_role)
         patterns += tuple(pattern for words in self.tcp_rotations for pattern in words.patterns)
         words = self.other.union(*self.joint_terms.values(), *self.orders)

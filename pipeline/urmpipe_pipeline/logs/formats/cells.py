@@ -149,6 +149,15 @@ def count_up(cells: Sequence[str]) -> bool:
     return list(cells) == [str(first + k) for k in range(len(cells))]
 
 
+def find_numbers(names: Sequence[str]) -> list[int] | None:
+    """Return the last number in each name, if the names are the same without it and the numbers differ."""
+    matches = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
+    parts = [match.groups() for match in matches if match]
+    numbers = [int(number) for _, number, _ in parts]
+    same = len({(before, after) for before, _, after in parts}) == 1
+    return numbers if same and len(set(numbers)) == len(names) else None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TextCells:
     """The cells of a column of text.

@@ -29,7 +29,7 @@ from urmpipe_models.files import log_stem
 from urmpipe_pipeline.array_choice import Name, choose_arrays
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.logs.formats.arrays import Array, make_array_table, settle_choice
-from urmpipe_pipeline.logs.formats.cells import is_number, printable
+from urmpipe_pipeline.logs.formats.cells import find_numbers, is_number, printable
 from urmpipe_pipeline.logs.formats.files import import_optional
 from urmpipe_pipeline.logs.formats.log_table import MAX_SAMPLED_ROWS
 from urmpipe_pipeline.logs.formats.memory import MemoryTable
@@ -321,7 +321,10 @@ def _iter_arrays(
         for key, inner in tables.items():
             yield (*name, key, ""), inner, joints
     elif isinstance(value, dict) and _are_samples(value):
-        yield name, list(value.values()), joints
+        numbers = find_numbers([*value])
+        order = np.argsort(numbers, kind="stable").tolist() if numbers else range(len(value))
+        samples = list(value.values())
+        yield name, [samples[k] for k in order], joints
     elif isinstance(value, dict):
         key_of_names, joints = _find_names(value, joints)
         for key, inner in value.items():
