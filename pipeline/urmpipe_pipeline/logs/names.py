@@ -554,18 +554,6 @@ def _words_around(column: Column, name: str) -> frozenset[str] | None:
     return None
 
 
-def called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
-    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
-    if robot is None:
-        return ()
-    columns = named_after(numeric, robot.coordinates, "position")
-    is_exact = all(
-        key(name) in (column.key, column.bare)
-        for name, column in zip(robot.coordinates, columns, strict=False)
-    )
-    return columns if is_exact else ()
-
-
 def some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[Column, ...], list[str]]:
     """Return the columns of most joints with known names, and the names that have none; nothing of fewer."""
     for names in _orders(robot):

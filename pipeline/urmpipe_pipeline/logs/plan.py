@@ -44,14 +44,14 @@ from urmpipe_pipeline.logs.columns import (
 )
 from urmpipe_pipeline.logs.formats.cells import is_missing
 from urmpipe_pipeline.logs.formats.log_table import LogTable
+from urmpipe_pipeline.logs.formats.long_form import LONG, MAX_NAMES
 from urmpipe_pipeline.logs.formats.opening import PATH, Tables
-from urmpipe_pipeline.logs.formats.shape import ROWS_READ
+from urmpipe_pipeline.logs.formats.shape import AS_TABLE, ROWS_READ
 from urmpipe_pipeline.logs.formats.text_table import TextTable
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.roles import (
     Roles,
     assign,
-    check_not_long_form,
     own_joints,
     signal_roles,
     written_roles,
@@ -162,7 +162,7 @@ def make_plan(
         clocks = tuple(settle_unit_by_speed(clock, tables, roles.joints, units) for clock in clocks)
     for index in {column.table for column in roles.joints}:
         of_table = [column for column in rest if column.table == index]
-        check_not_long_form(roles.joints, of_table, tables.tables[index])
+        _check_not_long_form(roles.joints, of_table, tables.tables[index])
     warnings = [
         LogWarning(f"{name}-not-used", "no effect: not in this log", parameter=name)
         for name in ("topic", "episode")
@@ -175,6 +175,38 @@ def make_plan(
         return Plan(tables, clocks, roles, units, poses=True)
     is_timed = options.period is not None or options.time not in (None, "none") or time_file is not None
     return Plan(tables, clocks, roles, units, time_file, False if is_timed else None)
+
+
+def _check_not_long_form(joints: Sequence[Column], columns: Sequence[Column], table: LogTable) -> None:
+    """Raise if a table may have a row per joint: next to its only joint names repeat in order, or joints.
+
+    Args:
+        joints: The joints that were found.
+        columns: The columns next to the clock.
+        table: The table.
+
+    Raises:
+        LogError: With the question what a row is.
+    """
+    if len(joints) != 1 or table.header is None or any(known.what == "layout" for known in table.inferences):
+        return
+    for column in columns:
+        cells = table.cells(column.index)
+        count, is_joint = len(set(cells)), "joint" in column.key.split("_")
+        if column in joints or not 2 <= count <= MAX_NAMES or (len(cells) < 3 * count and not is_joint):
+            continue
+        is_name = all(not cell or not cell[0].isdigit() or cell.isdigit() for cell in cells[:count])
+        if not is_name or (not is_joint and any(cell != cells[k % count] for k, cell in enumerate(cells))):
+            continue
+        effects = {LONG: "takes each row as a joint in a sample", AS_TABLE: "takes each row as a sample"}
+        raise LogError(
+            Finding(
+                file=table.file,
+                found=f"{column.header} with {count} names",
+                allowed="one row per sample, or one per joint in each sample",
+                hints=tuple(Hint("layout", layout, effect) for layout, effect in effects.items()),
+            )
+        )
 
 
 def _unused_files(tables: Tables, roles: Roles) -> list[LogWarning]:

@@ -5,7 +5,6 @@
 2. Without joints, x, y, z are a path; else a question whose choices are the columns that may be joints.
 3. `written_roles`: the columns of what urmpipe writes itself, by their metadata or all names together.
 4. `signal_roles`: the signals of a simulation: its only array of joints, else a question.
-5. `check_not_long_form`: the question whether a table has a row per joint.
 """
 
 from __future__ import annotations
@@ -44,8 +43,7 @@ from urmpipe_pipeline.logs.coverage import (
 )
 from urmpipe_pipeline.logs.formats.cells import grouped_number
 from urmpipe_pipeline.logs.formats.log_table import LogTable
-from urmpipe_pipeline.logs.formats.long_form import LONG, MAX_NAMES
-from urmpipe_pipeline.logs.formats.shape import AS_TABLE
+from urmpipe_pipeline.logs.formats.long_form import LONG
 from urmpipe_pipeline.logs.formats.urmpipe_tables import GIVEN as GIVEN_KEY
 from urmpipe_pipeline.logs.formats.urmpipe_tables import (
     RECORDED,
@@ -57,7 +55,6 @@ from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.names import (
     FIRST_NUMBER,
     NamedJoints,
-    called_as_joints,
     cure,
     family_of,
     find_families,
@@ -78,7 +75,7 @@ from urmpipe_pipeline.logs.pose_columns import (
     with_form,
 )
 from urmpipe_pipeline.logs.rates import MAX_JOINTS
-from urmpipe_pipeline.logs.vocabulary import vocabulary
+from urmpipe_pipeline.logs.vocabulary import key, vocabulary
 from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 
 GIVEN = "given as an option"  # evidence of columns that the user named
@@ -194,7 +191,7 @@ def _find_joints(
     """Return the joints by a schema, names or rates, and the recorded pose next to them."""
     file = tables[0].file
     stated = tuple(column for column in numeric if column.index in stated_joints(tables[column.table]))
-    robots = () if path else stated or called_as_joints(numeric, robot)
+    robots = () if path else stated or _called_as_joints(numeric, robot)
     rest = [column for column in numeric if column not in robots]
     pose = chosen_pose(columns, options) or find_pose(rest, tables, options.rotation, path=path)
     if path:
@@ -221,6 +218,18 @@ def _find_joints(
     if kinds and is_commanded and not (options.position or options.measured):
         pose = Pose()  # where the tool was to be
     return named, pose
+
+
+def _called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
+    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
+    if robot is None:
+        return ()
+    columns = named_after(numeric, robot.coordinates, "position")
+    is_exact = all(
+        key(name) in (column.key, column.bare)
+        for name, column in zip(robot.coordinates, columns, strict=False)
+    )
+    return columns if is_exact else ()
 
 
 def _stated(stated: Sequence[Column], file: str, robot: Chain | None) -> NamedJoints:
@@ -585,38 +594,3 @@ def signal_roles(columns: Sequence[Column], table: LogTable, robot: Chain | None
     inferences = [joint_inference(joints, "the only array of joints among the signals")]
     inferences += not_used(rest, "signals next to the joints")
     return Roles(joints, rates, accelerations, inferences=tuple(inferences))
-
-
-# 5. Long form
-
-
-def check_not_long_form(joints: Sequence[Column], columns: Sequence[Column], table: LogTable) -> None:
-    """Raise if a table may have a row per joint: next to its only joint names repeat in order, or joints.
-
-    Args:
-        joints: The joints that were found.
-        columns: The columns next to the clock.
-        table: The table.
-
-    Raises:
-        LogError: With the question what a row is.
-    """
-    if len(joints) != 1 or table.header is None or any(known.what == "layout" for known in table.inferences):
-        return
-    for column in columns:
-        cells = table.cells(column.index)
-        count, is_joint = len(set(cells)), "joint" in column.key.split("_")
-        if column in joints or not 2 <= count <= MAX_NAMES or (len(cells) < 3 * count and not is_joint):
-            continue
-        is_name = all(not cell or not cell[0].isdigit() or cell.isdigit() for cell in cells[:count])
-        if not is_name or (not is_joint and any(cell != cells[k % count] for k, cell in enumerate(cells))):
-            continue
-        effects = {LONG: "takes each row as a joint in a sample", AS_TABLE: "takes each row as a sample"}
-        raise LogError(
-            Finding(
-                file=table.file,
-                found=f"{column.header} with {count} names",
-                allowed="one row per sample, or one per joint in each sample",
-                hints=tuple(Hint("layout", layout, effect) for layout, effect in effects.items()),
-            )
-        )
