@@ -44,6 +44,7 @@ from urmpipe_pipeline.logs.formats.log_table import LogTable
 from urmpipe_pipeline.logs.formats.opening import PATH
 from urmpipe_pipeline.logs.log_map import LogMap
 from urmpipe_pipeline.logs.pose_columns import trailing_pose
+from urmpipe_pipeline.logs.rates import proved_blocks
 from urmpipe_pipeline.logs.unnamed import clock_before_pose, columns_before
 from urmpipe_pipeline.logs.vocabulary import vocabulary
 
@@ -411,6 +412,8 @@ def _find_rising(
             return TimeColumns((clock,), "the first column alone increases in even steps")
     if len(clocks) > 1 and not {0, len(table.names) - 1} & {clock.index for clock in clocks}:
         return None  # joints that move one way
+    if len(clocks) > 1 and proved_blocks(table.values([column.index for column in columns]), joints):
+        return None
     near = [column for column in columns if column not in clocks and _is_nearly_rising(column, table)]
     near = near if len(near) == 1 or clocks else []
     candidates = [*clocks, *(c for c in near if c.index == 0 or c not in values)]

@@ -31,6 +31,7 @@ SURE_VARIED = 0.1  # ... and where the period is exact to a percent: noise of a 
 EXACT = 0.001  # share of a period by which it is rounded; well sampled, the rule errs by less
 
 
+@np.errstate(divide="ignore", invalid="ignore")
 def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     """Return the time between rows with which joints step as their rates say, and how much it varies.
 
@@ -53,12 +54,11 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     counts = np.count_nonzero(is_clear, axis=0)
     if np.count_nonzero(counts) < min(2, q.shape[1]):
         return None
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = steps / means
-        period = float(np.median(ratios[is_clear]))
-        if not 0 < period < np.inf:
-            return None
-        deviations = np.abs(ratios / period - 1)
+    ratios = steps / means
+    period = float(np.median(ratios[is_clear]))
+    if not 0 < period < np.inf:
+        return None
+    deviations = np.abs(ratios / period - 1)
     variation = float(np.median(deviations[is_clear]))
     errors = [abs(np.median(ratios[rows, j]) / period - 1) for j, rows in enumerate(is_clear.T) if counts[j]]
     deviation = 4 * variation / np.sqrt(counts[counts > 0])  # 2.2 standard errors of a median
@@ -68,6 +68,17 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     period = float(np.abs(steps[is_usual]).sum() / np.abs(means[is_usual]).sum())
     rounded = (float(f"{period:.{digits}g}") for digits in range(1, 17))
     return next(value for value in rounded if abs(value - period) <= EXACT * period), variation
+
+
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
+def _agree_on(fit: tuple[float, float], q: FloatArray, rates: FloatArray, rows: int) -> bool:
+    """Return whether several joints with different steady rates move as they say, over all rows."""
+    means = rates.mean(axis=0)
+    periods = (q[-1] - q[0]) / (means * (rows - 1))
+    is_same = np.abs(periods / fit[0] - 1) <= MAX_PERIOD_DEVIATION
+    sizes = np.abs(means[is_same])
+    is_sure = len(sizes) >= MIN_SURE_JOINTS and fit[1] <= SURE_VARIED
+    return is_sure and bool(sizes.std() > MAX_VARIATION * sizes.mean())
 
 
 def _steps_and_mean_rates(q: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -106,9 +117,12 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
 
     def prove(joints: range, rates: range) -> Block | None:
         q, v = (slice(place.start, place.stop, place.step) for place in (joints, rates))
-        if np.count_nonzero(varies[v]) < min(2, len(rates)):
+        is_varied = np.count_nonzero(varies[v]) >= min(2, len(rates))
+        if not is_varied and len(rates) < MIN_SURE_JOINTS:
             return None
         fit = period_of(values[:, q], values[:, v])
+        if not is_varied and (fit is None or not _agree_on(fit, known[:, q], known[:, v], len(values))):
+            return None
         is_sure = count or len(joints) >= MIN_SURE_JOINTS or (fit and fit[1] <= SURE_VARIED)
         return Block(joints, rates, fit[1]) if fit and is_sure else None
 
