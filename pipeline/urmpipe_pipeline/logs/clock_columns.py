@@ -9,8 +9,9 @@
 3. without a header: text and dates as above; Unix times; a split time; the column that alone increases,
    - first or last, in steps that jitter, as those of no joint do, or
    - first, in even steps, while other columns move.
-   What increases in another way may be the time, a counter or a joint: the user is asked, unless several
-   columns do so and none of them is the first or the last.
+   What increases in another way may be the time, a counter or a joint: the user is asked. Of several columns
+   that do so none is the time if all are joints with their rates, or if neither the first nor the last of
+   the table begins at 0 or more; the first is, if the others are joints with their rates.
 
 A split time is whole seconds in one column, and the rest of a second in ns, us, ms or decimals in another: by
 their names, or because their sum continues where the seconds step as it does within a second.
@@ -401,6 +402,7 @@ def _find_rising(
     steps = {column: kind_of_steps(numbers) for column, numbers in values.items()}
     is_one_more = joints is not None and len(table.names) == joints + 1
     clocks = [c for c in values if is_one_more or steps[c] != "smooth" or values[c][0] == 0.0]
+    clocks = [c for c in clocks if is_one_more or steps[c] == "even" or values[c][0] >= 0.0]
     if len(clocks) == 1:
         (clock,) = clocks
         is_first, is_last = clock.index == 0, clock.index == len(table.names) - 1
@@ -410,10 +412,15 @@ def _find_rising(
         is_even = steps[clock] == "even" and not _counts_rows(values[clock])
         if is_first and is_even and _others_move(clock, table):
             return TimeColumns((clock,), "the first column alone increases in even steps")
-    if len(clocks) > 1 and not {0, len(table.names) - 1} & {clock.index for clock in clocks}:
-        return None  # joints that move one way
-    if len(clocks) > 1 and proved_blocks(table.values([column.index for column in columns]), joints):
-        return None
+    if len(clocks) > 1:
+        if not {0, len(table.names) - 1} & {clock.index for clock in clocks if values[clock][0] >= 0}:
+            return None  # joints that move one way
+        numbers = table.values([column.index for column in columns])
+        if proved_blocks(numbers, joints):
+            return None
+        if clocks[0] == columns[0] and proved_blocks(numbers[:, 1:], joints):
+            why = "it increases, and the columns after it are joints and their rates"
+            return TimeColumns((clocks[0],), why)
     near = [column for column in columns if column not in clocks and _is_nearly_rising(column, table)]
     near = near if len(near) == 1 or clocks else []
     candidates = [*clocks, *(c for c in near if c.index == 0 or c not in values)]

@@ -113,12 +113,12 @@ def read_rows(plan: Plan, *, skip_bad: bool = False) -> Rows:
 def _read_table(plan: Plan, index: int, columns: Sequence[Column], skip_bad: bool) -> Numbers:
     table, clock = plan.tables.tables[index], plan.clocks[index]
     numbers = table.read([column.index for column in columns], clock.parts)
+    if clock.are_durations:
+        numbers = sum_durations(table, numbers, clock)
     numbers, warnings, too_many = _skip_unread(table, numbers, skip_bad)
     numbers, inferences = _drop_empty_end(read_text_times(table, clock.parts, numbers))
     numbers = continue_over_midnight(numbers, clock)
     numbers, padding = without_padding(numbers, lambda: table.all_rows)
-    if clock.are_durations:
-        numbers = sum_durations(numbers, clock.columns[0].name)
     numbers = separate_repeated(detect_static_poses(plan, columns, numbers))
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"

@@ -219,22 +219,26 @@ def continue_over_midnight(numbers: Numbers, clock: Clock) -> Numbers:
     return replace(numbers, clock=days, warnings=(*numbers.warnings, warning))
 
 
-def sum_durations(numbers: Numbers, name: str) -> Numbers:
-    """Return the numbers with times in place of the durations in [ns] of the column of this name.
+def sum_durations(table: LogTable, numbers: Numbers, clock: Clock) -> Numbers:
+    """Return the numbers of a table with times in place of the durations of its clock, in [ns].
 
     A duration is the time since the previous row, so that the first one is before the first row; if the last
-    one is 0 and the first is not, the time to the next row.
+    one is 0 and the first is not, the time to the next row. Those of rows that are not read count as well.
     """
-    durations = numbers.clock
+    rows = None if table.whole is None else table.rows
+    durations = numbers.clock if table.whole is None else table.whole.read((), clock.parts).clock
     if durations is None or not len(durations):
         return numbers
     is_known = durations > UNREADABLE
     to_next = len(durations) > 1 and is_known[-1] and durations[-1] == 0 < durations[0]
     times = np.cumsum(np.where(is_known, durations, 0))
     times = np.where(is_known, times - durations if to_next else times, durations)
+    times = times if rows is None else times[rows]
     which = "to the next row" if to_next else "since the row before"
-    message = f"{name} is one duration per row: the time is their sum, each taken as the time {which}"
-    warning = LogWarning(SUMMED, message, hints=OTHER_TIME)
+    message = (
+        f"{clock.columns[0].name} is one duration per row: the time is their sum, each taken as the time"
+    )
+    warning = LogWarning(SUMMED, f"{message} {which}", hints=OTHER_TIME)
     return replace(numbers, clock=times, warnings=(*numbers.warnings, warning))
 
 

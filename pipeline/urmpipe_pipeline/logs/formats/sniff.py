@@ -310,6 +310,8 @@ def _join_groups(names: Row, groups: Row) -> Row:
     if len(groups) == len(repeated) and all(groups):  # blanks between them are no cells
         places = dict(zip(repeated, groups, strict=True))
         groups = [places.get(k, "") for k in range(len(names))]
+    elif len(groups) == len(names) - 1 and all(groups) and names[-1]:
+        groups = ["", *groups]  # that of the time is blank
     if abs(len(groups) - len(names)) > 1:
         return names
     groups = [*groups, ""][: len(names)]

@@ -141,7 +141,8 @@ class TextTable(LogTable):
             sample = self.form.read_cells(self.form.read_values(texts))
         else:
             sample = tuple(tuple(split_line(text, self.delimiter)) for text in texts)
-        return replace(self, rows=in_file, sample=sample, inferences=(*self.inferences, *inferences))
+        inferences = (*self.inferences, *inferences)
+        return replace(self, rows=in_file, sample=sample, inferences=inferences, whole=self.whole or self)
 
     def lines_of(self, rows: Sequence[int]) -> dict[int, int]:
         """Return the line of the file of some data rows, both from 1."""
