@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.logs.columns import NAME_JOINTS, REST, Column, Kind, listed, take
-from urmpipe_pipeline.logs.names import FIRST_NUMBER, SLIDES, family_of, group_by_number
+from urmpipe_pipeline.logs.names import SLIDES, family_of, of_first_kind
 from urmpipe_pipeline.logs.pose_columns import OF_POSITION
 from urmpipe_pipeline.logs.rates import MAX_JOINTS
 from urmpipe_pipeline.logs.vocabulary import vocabulary
@@ -102,16 +102,12 @@ def orientation_warnings(position: Sequence[Column], unused: Sequence[Column]) -
 def path_warnings(unused: Sequence[Column]) -> list[LogWarning]:
     """Return the warning that several columns next to a path are not read.
 
-    They are called joints; else angles, if there are any; else all; of more than an arm's joints those in
-    numbered families.
+    They are called joints; else angles, if there are any; else all that are not commanded.
     """
     joints = [column for column in unused if "joint" in column.words]
     angles = [c for c in unused if c.unit is not None and c.unit.quantity == "angle"]
-    columns = joints or angles or list(unused)
-    if len(columns) > MAX_JOINTS and not joints:
-        families = [group for group in group_by_number(columns, FIRST_NUMBER) if len(group) <= MAX_JOINTS]
-        joints = columns = [column for group in families if len(group) >= MIN_JOINTS for column in group]
-    if len(columns) < MIN_JOINTS or len(columns) > MAX_JOINTS > len(joints):
+    columns = joints or angles or of_first_kind(unused)
+    if len(columns) < MIN_JOINTS:
         return []
     message = f"x, y, z are read as a path, and {listed(columns, most=8)} are not read"
     hint = take(columns, "takes them as the joints") if len(columns) <= MAX_JOINTS else NAME_JOINTS

@@ -107,7 +107,7 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
 
     Args:
         values: The columns in the file's own units, shape (n, columns); NaN where a sample is missing.
-        count: How many joints the arm has; None if unknown: then rates are right after or before joints.
+        count: How many joints the arm has; None if unknown.
     """
     columns, known = values.shape[1], values[:: 1 + len(values) // MAX_ROWS]
     known = known[np.isfinite(known).all(axis=1)]
@@ -132,11 +132,7 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
         if columns % width or turns < 2:
             continue
         pairs = list(permutations(range(turns), 2))
-        places = [
-            (range(i * width, (i + 1) * width), range(k * width, (k + 1) * width))
-            for i, k in pairs
-            if count or abs(i - k) == 1
-        ]
+        places = [(range(i * width, (i + 1) * width), range(k * width, (k + 1) * width)) for i, k in pairs]
         places += [(range(i, columns, turns), range(k, columns, turns)) for i, k in pairs]
         blocks = [block for place in places if (block := prove(*place))]
         if first := [block for block in blocks if block.joints not in [other.rates for other in blocks]]:
