@@ -347,7 +347,11 @@ def _find_without_header(
     pose_clock = _find_before_pose(columns, table, options)
     if pose_clock is not None or len(columns) in (1, joints):
         return pose_clock
-    named = chosen_columns(columns, options.joints, parameter="joints")
+    named = [
+        column
+        for parameter in ("joints", "position", "orientation", "measured")
+        for column in chosen_columns(columns, getattr(options, parameter), parameter=parameter)
+    ]
     free = [column for column in columns if column not in named and column.index in table.numeric_columns]
     clock = _find_date_in_digits(free, table) or _find_unix_time(free, table)
     if clock is not None:

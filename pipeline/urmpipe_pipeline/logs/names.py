@@ -378,11 +378,6 @@ def _by_unit(free: Sequence[Column], file: str, count: int | None, *, half_pose:
     if not any(column.unit and column.unit.quantity == "angle" for column in sized):
         return None
     _ask_if_several(sized, file, count)
-    angles = [column for column in sized if column.unit and column.unit.quantity == "angle"]
-    shared = frozenset.intersection(*(column.words for column in sized))
-    if count is None and len(angles) < len(sized) and not shared:  # a length may be a slide, or a height
-        fault = f"{listed(sized)}, whose units are those of joints that turn and of lengths"
-        raise which_joints(file, fault, [sized, angles])
     if count not in (None, len(sized)) or (half_pose and count is None and len(sized) == 3):
         return None
     evidence = "their units; the order is the file's"

@@ -120,9 +120,11 @@ def without_header(
     if robot or rates or len(joints) == 1:
         return roles
     assumption = f"columns {joints[0].number} to {joints[-1].number} are the joints"
-    hints = (take(joints, "confirms it"), Hint("joints", None, "names others"))
+    hints = [take(joints, "confirms it"), Hint("joints", None, "names others")]
+    if len(joints) == 2 and not pose.position:
+        hints.append(take(joints, "reads x, y", parameter="position"))
     message = f"no header names the columns: {assumption}, in order"
-    warning = LogWarning(ASSUMED_JOINTS, message, hints=hints, assumption=assumption, role="joint")
+    warning = LogWarning(ASSUMED_JOINTS, message, hints=tuple(hints), assumption=assumption, role="joint")
     inferences = (replace(roles.inferences[0], basis="assumed"), *roles.inferences[1:])
     return replace(roles, inferences=inferences, warnings=(*roles.warnings, warning))
 
@@ -245,6 +247,8 @@ def _joints_among(
     message += f", of which {listed(doubtful)} may not be joints" if doubtful else ""
     message += f", and robot {robot.name} has {count} joints" if robot else ""
     as_path = (Hint("source", "path", "reads them as x, y, z"),) if may_be_path else ()
+    if len(free) == 2 and not robot:
+        as_path = (take(free, "reads x, y", parameter="position"),)
     transposed = Hint("layout", "transposed", "takes the rows as joints")
     as_rows = (transposed,) if len(values) <= MAX_UNASKED < len(free) else ()
     raise which_joints(table.file, message, groups, UNKNOWN, *as_path, *as_rows)
