@@ -9,9 +9,8 @@
 3. without a header: text and dates as above; Unix times; a split time; the column that alone increases,
    - first or last, in steps that jitter, as those of no joint do, or
    - first, in even steps, while other columns move.
-   What increases in another way may be the time, a counter or a joint: the user is asked. Of several columns
-   that do so none is the time if all are joints with their rates, or if neither the first nor the last of
-   the table begins at 0 or more; the first is, if the others are joints with their rates.
+   What increases in another way may be the time, a counter or a joint: the user is asked, unless all columns
+   are joints and their rates, or all after the first.
 
 A split time is whole seconds in one column, and the rest of a second in ns, us, ms or decimals in another: by
 their names, or because their sum continues where the seconds step as it does within a second.
@@ -406,7 +405,6 @@ def _find_rising(
     steps = {column: kind_of_steps(numbers) for column, numbers in values.items()}
     is_one_more = joints is not None and len(table.names) == joints + 1
     clocks = [c for c in values if is_one_more or steps[c] != "smooth" or values[c][0] == 0.0]
-    clocks = [c for c in clocks if is_one_more or steps[c] == "even" or values[c][0] >= 0.0]
     if len(clocks) == 1:
         (clock,) = clocks
         is_first, is_last = clock.index == 0, clock.index == len(table.names) - 1
@@ -417,8 +415,6 @@ def _find_rising(
         if is_first and is_even and _others_move(clock, table):
             return TimeColumns((clock,), "the first column alone increases in even steps")
     if len(clocks) > 1:
-        if not {0, len(table.names) - 1} & {clock.index for clock in clocks if values[clock][0] >= 0}:
-            return None  # joints that move one way
         numbers = table.values([column.index for column in columns])
         if proved_blocks(numbers, joints):
             return None

@@ -222,8 +222,8 @@ def find_joints(
     families = [family for family in families if family in known or len(family.columns) in sizes]
     joints = (
         _by_order(free, file, robot)
-        or _by_part(free, file, robot)
         or _by_number(free, families, file, count)
+        or _by_part(free, file, robot)
         or _by_word(free, file, count)
         or _by_unit(free, file, count, half_pose=half_pose)
         or NamedJoints(())
@@ -257,7 +257,7 @@ def _by_order(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJo
     for names in _orders(robot):
         columns = named_after(free, names, "position")
         arms = _arms(free, names) if columns or count in (None, len(names)) else []
-        if columns and robot is None and {*map(_part, _of_parts(free))} - {*map(_part, columns)}:
+        if columns and robot is None and _lacks_parts(columns, free):
             continue  # a longer arm has these names as well
         if columns and count in (None, len(columns)):
             whose = "the robot's" if robot and names == robot.coordinates else "known"
@@ -284,7 +284,7 @@ def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column,
 
 
 def _by_part(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJoints | None:
-    """Return the joints by the parts of an arm in their names, from the shoulder on to the wrist."""
+    """Return the joints by the parts of an arm in their names, from its base to its wrist."""
     columns = _of_parts(free)
     count = len(robot.coordinates) if robot else None
     if len(columns) < 3 or count not in (None, len(columns)) or some_named(free, robot)[0]:
@@ -301,9 +301,28 @@ def _by_part(free: Sequence[Column], file: str, robot: Chain | None) -> NamedJoi
 
 
 def _of_parts(free: Sequence[Column]) -> tuple[Column, ...]:
-    """Return the columns with a part of an arm in their names, none if some are coordinates of it."""
+    """Return the columns whose names are those of the joints of an arm by its parts: forearm_roll_joint."""
     columns = [column for column in _not_commanded(of_first_kind(_candidates(free))) if _part(column) >= 0]
-    return () if any(column.words & {"x", "y", "z"} for column in columns) else tuple(columns)
+    are_joints = all("joint" in column.words for column in columns)
+    words = vocabulary().joint_terms["position"] | vocabulary().part_motions
+
+    def is_joint(column: Column) -> bool:
+        remaining = vocabulary().parts[_part(column)].sub("_", column.bare).split("_")
+        return are_joints or all(_is_of_joint(word, words) for word in remaining)
+
+    return tuple(filter(is_joint, columns))
+
+
+def _is_of_joint(word: str, words: frozenset[str]) -> bool:
+    """Return whether a word of a name, without its number, is of a joint, an arm or a side."""
+    plain = word.strip("0123456789")
+    return not plain or plain in words or plain == "j" or bool(vocabulary().arms.fullmatch(plain))
+
+
+def _lacks_parts(columns: Sequence[Column], free: Sequence[Column]) -> bool:
+    """Return whether other columns are named as some, and are of parts of an arm that these lack."""
+    others = [c for c in _of_parts(free) if ("joint" in c.words) == ("joint" in columns[0].words)]
+    return not {*map(_part, others)} <= {*map(_part, columns)}
 
 
 def _part(column: Column) -> int:
@@ -343,9 +362,6 @@ def _by_number(
         numbered = {n: [c for c in spare if str(n) in FIRST_NUMBER.findall(c.key)] for n in gaps}
         fillers = {n: group[0] for n, group in numbered.items() if len(group) == 1}
         together = family.columns | fillers
-        if len(fillers) == len(gaps) and all(SLIDES.fullmatch(column.key) for column in fillers.values()):
-            columns = tuple(together[n] for n in sorted(together))
-            return NamedJoints(columns, "their names, in the order of their numbers", tuple(sorted(together)))
         choices = [take([together[n] for n in sorted(together)])] if len(fillers) == len(gaps) else []
         raise LogError(Finding(message, file=file, hints=(*choices, *cure(len(gaps), spare, count))))
     if larger := _sharing_a_mark(still, columns):

@@ -362,7 +362,8 @@ def plan_topic(tables: Tables, options: LogMap, robot: Chain | None) -> Plan:
     with_values = listed([column for column in columns if column.number not in absent], 4)
     why = f"{format_count(int(is_other.sum()), 'row')} of other topics, with {with_values}, left out"
     rows = np.flatnonzero(~is_other)
-    table = table.take(rows, Inference(ROWS_READ, f"{len(rows)} of {len(is_other)}", why))
+    chosen = table.take(rows, Inference(ROWS_READ, f"{len(rows)} of {len(is_other)}", why))
+    table = replace(chosen, whole=table.whole or table)
     in_topic = (*tables.tables[:main], table, *tables.tables[main + 1 :])
     plan = make_plan(replace(tables, tables=in_topic), options, robot)
     empty = {column.number for column in without_values(~is_other)}

@@ -71,10 +71,10 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
 
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")
-def _agree_on(fit: tuple[float, float], q: FloatArray, rates: FloatArray, rows: int) -> bool:
+def _agree_on(fit: tuple[float, float], q: FloatArray, rates: FloatArray, steps: int) -> bool:
     """Return whether several joints with different steady rates move as they say, over all rows."""
     means = rates.mean(axis=0)
-    periods = (q[-1] - q[0]) / (means * (rows - 1))
+    periods = (q[-1] - q[0]) / (means * steps)
     is_same = np.abs(periods / fit[0] - 1) <= MAX_PERIOD_DEVIATION
     sizes = np.abs(means[is_same])
     is_sure = len(sizes) >= MIN_SURE_JOINTS and fit[1] <= SURE_VARIED
@@ -109,10 +109,12 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
         values: The columns in the file's own units, shape (n, columns); NaN where a sample is missing.
         count: How many joints the arm has; None if unknown.
     """
-    columns, known = values.shape[1], values[:: 1 + len(values) // MAX_ROWS]
-    known = known[np.isfinite(known).all(axis=1)]
-    if len(known) < MIN_ROWS:
+    columns = values.shape[1]
+    rows = np.arange(0, len(values), 1 + len(values) // MAX_ROWS)
+    rows = rows[np.isfinite(values[rows]).all(axis=1)]
+    if len(rows) < MIN_ROWS:
         return []
+    known = values[rows]
     varies = known.std(axis=0) > MAX_VARIATION * np.abs(known.mean(axis=0))  # else any ramp is a joint of it
 
     def prove(joints: range, rates: range) -> Block | None:
@@ -121,7 +123,9 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
         if not is_varied and len(rates) < MIN_SURE_JOINTS:
             return None
         fit = period_of(values[:, q], values[:, v])
-        if not is_varied and (fit is None or not _agree_on(fit, known[:, q], known[:, v], len(values))):
+        if not is_varied and (
+            fit is None or not _agree_on(fit, known[:, q], known[:, v], rows[-1] - rows[0])
+        ):
             return None
         is_sure = count or len(joints) >= MIN_SURE_JOINTS or (fit and fit[1] <= SURE_VARIED)
         return Block(joints, rates, fit[1]) if fit and is_sure else None

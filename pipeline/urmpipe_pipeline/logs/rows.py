@@ -113,12 +113,12 @@ def read_rows(plan: Plan, *, skip_bad: bool = False) -> Rows:
 def _read_table(plan: Plan, index: int, columns: Sequence[Column], skip_bad: bool) -> Numbers:
     table, clock = plan.tables.tables[index], plan.clocks[index]
     numbers = table.read([column.index for column in columns], clock.parts)
-    if clock.are_durations:
-        numbers = sum_durations(table, numbers, clock)
     numbers, warnings, too_many = _skip_unread(table, numbers, skip_bad)
     numbers, inferences = _drop_empty_end(read_text_times(table, clock.parts, numbers))
     numbers = continue_over_midnight(numbers, clock)
     numbers, padding = without_padding(numbers, lambda: table.all_rows)
+    if clock.are_durations:
+        numbers = sum_durations(table, numbers, clock)
     numbers = separate_repeated(detect_static_poses(plan, columns, numbers))
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
@@ -298,7 +298,17 @@ def unknown_times(numbers: Numbers, clock: Clock) -> Iterator[Finding]:
     name, has_none = clock.columns[0].header, numbers.clock == NO_TIME
     known = np.flatnonzero(~has_none)
     is_within = len(known) > 0 and not has_none[known[0] : known[-1]].any()
-    rows = (Hint("rows", f"{known[0] + 1}:{known[-1] + 1}", "reads those with a time"),) if is_within else ()
+    rows = (
+        (
+            Hint(
+                "rows",
+                f"{numbers.file_row(int(known[0]) + 1)}:{numbers.file_row(int(known[-1]) + 1)}",
+                "reads those with a time",
+            ),
+        )
+        if is_within
+        else ()
+    )
     for k in np.flatnonzero(has_none).tolist():
         message = "found no time, allowed: a time in every row"
         yield Finding(message, row=k + 1, column=name, hints=(*rows, *OTHER_TIME))

@@ -223,17 +223,21 @@ def sum_durations(table: LogTable, numbers: Numbers, clock: Clock) -> Numbers:
     """Return the numbers of a table with times in place of the durations of its clock, in [ns].
 
     A duration is the time since the previous row, so that the first one is before the first row; if the last
-    one is 0 and the first is not, the time to the next row. Those of rows that are not read count as well.
+    one is 0 and the first is not, the time to the next row. Those of rows that are left out count as well.
     """
-    rows = None if table.whole is None else table.rows
-    durations = numbers.clock if table.whole is None else table.whole.read((), clock.parts).clock
+    durations = numbers.clock
     if durations is None or not len(durations):
         return numbers
+    if table.whole is not None and table.rows is not None:
+        every = table.whole.read((), clock.parts).clock
+        rows = table.rows[: len(durations)] if numbers.rows is None else numbers.rows - 1  # of the file
+        if every is not None and rows[-1] < len(every):
+            durations = every[: rows[-1] + 1]
     is_known = durations > UNREADABLE
     to_next = len(durations) > 1 and is_known[-1] and durations[-1] == 0 < durations[0]
     times = np.cumsum(np.where(is_known, durations, 0))
     times = np.where(is_known, times - durations if to_next else times, durations)
-    times = times if rows is None else times[rows]
+    times = times if durations is numbers.clock else times[rows]
     which = "to the next row" if to_next else "since the row before"
     message = (
         f"{clock.columns[0].name} is one duration per row: the time is their sum, each taken as the time"
@@ -380,6 +384,7 @@ def separate_repeated(numbers: Numbers) -> Numbers:
 
 MAX_JOINT_SPEED = 20.0  # rad/s or m/s, which no joint of an arm exceeds from pose to pose
 MIN_STEP = MAX_JOINT_SPEED * DEFAULT_PERIOD  # rad or m, median step of static poses
+MIN_SPEED = 0.05  # rate in any unit, in half of the rows, that static poses do not have
 MIN_POSE_STEP = MIN_STEP / 10  # smaller steps are between measurements of one pose
 MAX_REST_SHARE = 0.1  # sum of these steps / sum of the others
 MIN_ROWS = 6  # fewer show nothing
@@ -426,7 +431,8 @@ def _find_static_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) 
     seen = f"the joints step by up to {np.abs(steps).max():.2g} rad (or m) from row to row, in"
     if numbers.clock is None:
         jumps = np.count_nonzero(lengths[1:-1] > 2 * np.maximum(lengths[:-2], lengths[2:]))
-        is_moving = 2 * np.count_nonzero((rates != 0).any(axis=1)) > len(rates)  # static poses have no rates
+        speeds = np.abs(rates[np.isfinite(rates).all(axis=1)]).max(axis=1, initial=0.0)
+        is_moving = len(speeds) > 0 and np.ptp(speeds) > 0 and _quantile(speeds, 0.5) >= MIN_SPEED
         if is_moving or (not is_aimless and jumps < max(3, MIN_JUMPS * len(lengths))):
             return _LIKE_POSES
         return f"no clock, and {seen} {'no direction' if is_aimless else 'lines with jumps between them'}"

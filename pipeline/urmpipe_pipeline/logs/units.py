@@ -64,7 +64,7 @@ MIN_REACH = 0.02  # [m]; a tool that moves has a larger coordinate
 MAX_SLIDES = 3  # joints of a gantry or a delta robot
 COUNTS_PER_TURN = (1024, 4096, 16384, 65536)  # of the encoders of servos and motors
 USUAL_COUNTS = 4096  # Dynamixel, Feetech
-PER_CENT = 100.0
+PER_CENT = 100.0  # of a joint's range, either way
 PATH_WIDTHS = (3, 6, 7)  # columns of a path: x, y, z, and three angles or a quaternion
 
 _ALLOWED: dict[JointKind | None, tuple[Quantity, ...]] = {

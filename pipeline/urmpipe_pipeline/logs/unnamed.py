@@ -95,7 +95,7 @@ def without_header(
     if last and len(columns_before(last, columns)) <= 1:
         return _path_of_poses(last, columns, table, options)
     if path:
-        return _path_by_place(columns, table, options, pose or leading_pose(columns, table) or last)
+        return _path_by_place(columns, table, options, pose or last or leading_pose(columns, table))
     if texts := [column for column in columns if column.text]:
         is_text = np.array([column.text for column in columns])
         odd = is_text | find_odd_columns(table.values([column.index for column in columns]))

@@ -114,6 +114,7 @@ class Vocabulary:
         self.marks = frozenset[str](joint["marks"])
         self.orders = tuple(tuple[str, ...](order) for order in joint["orders"])
         self.per_cent = _compiled(joint["per_cent"])
+        self.part_motions = frozenset[str](joint["part_motions"])
         self.parts = _compiled(joint["parts"])
         self.other = frozenset[str]((*joint["other"], *joint["grippers"]))
         self.grippers = frozenset[str](joint["grippers"])
@@ -180,7 +181,7 @@ class Vocabulary:
 
     def is_column(self, name: str) -> bool:
         """Return whether the `key` of a name is that of a column: of a time, a joint, the tool, an arm."""
-        patterns = (*self.time, *self.durations, *self.index, *self.tcp_position, *self.tcp_pose_vector)
+        patterns = (*self.time, *self.durations, *self.index, *self.tcp_position)
         patterns += tuple(pattern for of_role in self.joint.values() for pattern in of_role)
         patterns += tuple(pattern for words in self.tcp_rotations for pattern in words.patterns)
         words = self.other.union(*self.joint_terms.values(), *self.orders)

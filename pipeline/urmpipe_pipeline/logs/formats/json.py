@@ -54,6 +54,7 @@ _POINT = re.compile(r"(?<=\d)\.(?!\d)")
 _DOCUMENT = re.compile(r"\s*(?:\[\s*\{|[\[{]\r?\n)")  # no other text begins so
 _YAML_LINE = re.compile(r"\s*+(?:-(?: .*)?|[\w./~]++:(?: .*)?|.*---|-?[\d.][^:]*|[^:]*\],?|#.*)")
 _YAML_NEXT = re.compile(r"^( *+)(?:- )*[\w./~]++: *+\n(?:\1 +\S| *- )", re.MULTILINE)  # a key above its value
+_COUNTED = re.compile(r"[^\d.]*\d+")  # names of samples that count: p1, p2; not 0.05, 0.1
 _ENTRY = re.compile(r"(?P<stem>[^\[\]]*)\[\d+\]")  # of an array
 _ALIAS = re.compile(r"(?:[-:] |^)[*&]\w", re.MULTILINE)
 MIN_YAML = 0.9  # share of lines: a message of the program that prints may be among them
@@ -291,7 +292,11 @@ def _only_indices(names: Iterable[str]) -> bool:
     """Return whether columns are the entries of one array that has no name, or none that a column has."""
     matches = [_ENTRY.fullmatch(name) for name in names]
     stems = {match["stem"] for match in matches if match}
-    is_known = stems != {""} and any(vocabulary().is_column(key(name)) for name in names)
+    keys = [key(name) for name in names]
+    is_known = stems != {""} and any(
+        vocabulary().is_column(name) or any(p.search(name) for p in vocabulary().tcp_pose_vector)
+        for name in keys
+    )
     return all(matches) and len(stems) == 1 and not is_known
 
 
@@ -321,7 +326,7 @@ def _iter_arrays(
         for key, inner in tables.items():
             yield (*name, key, ""), inner, joints
     elif isinstance(value, dict) and _are_samples(value):
-        numbers = find_numbers([*value])
+        numbers = find_numbers([*value]) if all(map(_COUNTED.fullmatch, value)) else None
         order = np.argsort(numbers, kind="stable").tolist() if numbers else range(len(value))
         samples = list(value.values())
         yield name, [samples[k] for k in order], joints

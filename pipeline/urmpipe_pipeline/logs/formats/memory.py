@@ -259,7 +259,6 @@ class ArrowTable(LogTable):
             arrow=(arrow := self.arrow.take(arrow_column(rows))),
             sample=_sample_cells(arrow),
             inferences=(*self.inferences, *inferences),
-            whole=self.whole or self,
         )
 
     def lines_of(self, rows: Sequence[int]) -> dict[int, int]:

@@ -26,7 +26,9 @@ CLOSING = {"[": "]", "(": ")", "{": "}"}
 MAX_SHOWN = 40  # characters of a row in a message
 _WRAPPED = re.compile(r"\b(?:\w+\.)?(?:float|int)\d+\(([^()]*)\)")  # np.float64(0.1)
 _NUMBERS = re.compile(r"[^\s,;\[\](){}\"]+")
-_QUOTED = re.compile(r'"(\s*[-+]?\d*\.\d[-+.\deE]*(?:[,;\s]+[-+.\deE]+){2,}\s*)"')  # "0.1,0.2,0.3": an array
+_PLAIN = r"(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan)"
+_QUOTED = re.compile(rf'"\s*({_PLAIN}(?:[,;\s]+{_PLAIN}){{2,}})\s*"')  # "0.1,0.2,0.3": an array
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}(,\d{3})+(\.\d+)?")
 _ARRAY_SIGN = "\x01"  # no text has it
 
 
@@ -229,7 +231,17 @@ class RowForm:
 
 def with_brackets(text: str) -> str:
     """Return a text with brackets in place of the quotes around arrays."""
-    return _QUOTED.sub(r"[\1]", text)
+    return _QUOTED.sub(lambda match: f"[{match[1]}]" if _is_array(match[1]) else match[0], text)
+
+
+def quoted_lengths(text: str) -> tuple[int, ...]:
+    """Return how many numbers each array in quotes has."""
+    return tuple(len(numbers_in(array)) for array in _QUOTED.findall(text) if _is_array(array))
+
+
+def _is_array(text: str) -> bool:
+    """Return whether numbers in quotes are an array: no codes, no number with signs between its thousands."""
+    return ("." in text or "nan" in text) and not _THOUSANDS.fullmatch(text)
 
 
 def numbers_in(array: str) -> list[str]:

@@ -267,7 +267,8 @@ def _choose_ranges(table: LogTable, ranges: str) -> LogTable:
     if is_read.all():
         return table
     why = f"{GIVEN}: {ranges}"
-    return table.take(np.flatnonzero(is_read), _rows_read(int(is_read.sum()), count, why))
+    chosen = table.take(np.flatnonzero(is_read), _rows_read(int(is_read.sum()), count, why))
+    return replace(chosen, whole=table)
 
 
 def _rows_read(rows: int, count: int, why: str) -> Inference:

@@ -310,7 +310,7 @@ def _join_groups(names: Row, groups: Row) -> Row:
     if len(groups) == len(repeated) and all(groups):  # blanks between them are no cells
         places = dict(zip(repeated, groups, strict=True))
         groups = [places.get(k, "") for k in range(len(names))]
-    elif len(groups) == len(names) - 1 and all(groups) and names[-1]:
+    elif repeated and len(groups) == len(names) - 1 and all(groups) and _begin_alike(names, ["", *groups]):
         groups = ["", *groups]  # that of the time is blank
     if abs(len(groups) - len(names)) > 1:
         return names
@@ -320,6 +320,14 @@ def _join_groups(names: Row, groups: Row) -> Row:
         last = group or (last if are_merged else "")
         joined.append(f"{last}/{name}" if last and name else name or group)
     return joined if repeated and not _repeat(joined) else names
+
+
+def _begin_alike(names: Row, groups: Row) -> bool:
+    """Return whether each group with names that repeat begins with the first of these."""
+    pairs = list(zip(names, groups, strict=True))
+    first = next(name for name in names if names.count(name) > 1)
+    starts = {group: name for name, group in reversed(pairs)}
+    return all(starts[group] == first for name, group in pairs if names.count(name) > 1)
 
 
 def _repeat(names: Row) -> bool:

@@ -15,7 +15,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import islice, pairwise, takewhile
+from itertools import dropwhile, islice, pairwise, takewhile
+from operator import not_
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference
@@ -25,6 +26,7 @@ from urmpipe_pipeline.logs.formats.row_form import (
     CLOSING,
     RowForm,
     numbers_in,
+    quoted_lengths,
     spread_names,
     usual_length,
     with_brackets,
@@ -132,8 +134,9 @@ def sniff_arrays(
         OptionError: As `sniff`.
     """
     lines = list(head_lines(segment)) if any(sign in segment.head for sign in (*CLOSING, '"')) else []
-    plain = [replace(line, text=with_brackets(line.text)) for line in lines]
-    quoted = plain != lines
+    in_quotes = {*dropwhile(not_, (quoted_lengths(line.text) for line in lines))}
+    quoted = len(in_quotes) == 1  # of several lengths they are texts
+    plain = [replace(line, text=with_brackets(line.text)) for line in lines] if quoted else lines
     opening = next((sign for sign in CLOSING if _begin_cells(plain, sign)), None)
     if opening is None:
         return None

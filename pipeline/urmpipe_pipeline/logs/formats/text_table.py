@@ -142,7 +142,7 @@ class TextTable(LogTable):
         else:
             sample = tuple(tuple(split_line(text, self.delimiter)) for text in texts)
         inferences = (*self.inferences, *inferences)
-        return replace(self, rows=in_file, sample=sample, inferences=inferences, whole=self.whole or self)
+        return replace(self, rows=in_file, sample=sample, inferences=inferences)
 
     def lines_of(self, rows: Sequence[int]) -> dict[int, int]:
         """Return the line of the file of some data rows, both from 1."""
