@@ -321,8 +321,8 @@ def _is_of_joint(word: str, words: frozenset[str]) -> bool:
 
 def _lacks_parts(columns: Sequence[Column], free: Sequence[Column]) -> bool:
     """Return whether other columns are named as some, and are of parts of an arm that these lack."""
-    others = [c for c in _of_parts(free) if ("joint" in c.words) == ("joint" in columns[0].words)]
-    return not {*map(_part, others)} <= {*map(_part, columns)}
+    further = [c for c in _of_parts(free) if ("joint" in c.words) == ("joint" in columns[0].words)]
+    return not {*map(_part, further)} <= {*map(_part, columns)}
 
 
 def _part(column: Column) -> int:

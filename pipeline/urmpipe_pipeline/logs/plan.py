@@ -363,7 +363,7 @@ def plan_topic(tables: Tables, options: LogMap, robot: Chain | None) -> Plan:
     why = f"{format_count(int(is_other.sum()), 'row')} of other topics, with {with_values}, left out"
     rows = np.flatnonzero(~is_other)
     chosen = table.take(rows, Inference(ROWS_READ, f"{len(rows)} of {len(is_other)}", why))
-    table = replace(chosen, whole=table.whole or table)
+    table = replace(chosen, uncut=table.uncut or table)
     in_topic = (*tables.tables[:main], table, *tables.tables[main + 1 :])
     plan = make_plan(replace(tables, tables=in_topic), options, robot)
     empty = {column.number for column in without_values(~is_other)}

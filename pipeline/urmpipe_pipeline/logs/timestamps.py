@@ -228,8 +228,8 @@ def sum_durations(table: LogTable, numbers: Numbers, clock: Clock) -> Numbers:
     durations = numbers.clock
     if durations is None or not len(durations):
         return numbers
-    if table.whole is not None and table.rows is not None:
-        every = table.whole.read((), clock.parts).clock
+    if table.uncut is not None and table.rows is not None:
+        every = table.uncut.read((), clock.parts).clock
         rows = table.rows[: len(durations)] if numbers.rows is None else numbers.rows - 1  # of the file
         if every is not None and rows[-1] < len(every):
             durations = every[: rows[-1] + 1]

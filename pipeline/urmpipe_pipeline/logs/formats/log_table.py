@@ -175,7 +175,7 @@ class LogTable(ABC):
         applied: Options of reading that its format applied already, such as "topic" or "episode".
         across: Whether one line of text has the rows of its only column.
         arrow: The Arrow table that it is, where it is no text: then it has no lines.
-        whole: The table with all rows, where some are chosen: durations are summed over all.
+        uncut: The table with all rows, where some are chosen: durations are summed over all.
     """
 
     names: tuple[str, ...]
@@ -190,7 +190,7 @@ class LogTable(ABC):
     applied: tuple[str, ...] = ()
     across: bool = False
     arrow: Any = None
-    whole: LogTable | None = None
+    uncut: LogTable | None = None
     _answers: list[tuple[object, Numbers]] = field(default_factory=list, init=False, repr=False)
 
     @property

@@ -268,7 +268,7 @@ def _choose_ranges(table: LogTable, ranges: str) -> LogTable:
         return table
     why = f"{GIVEN}: {ranges}"
     chosen = table.take(np.flatnonzero(is_read), _rows_read(int(is_read.sum()), count, why))
-    return replace(chosen, whole=table)
+    return replace(chosen, uncut=table)
 
 
 def _rows_read(rows: int, count: int, why: str) -> Inference:

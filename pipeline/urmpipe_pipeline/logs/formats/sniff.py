@@ -310,7 +310,7 @@ def _join_groups(names: Row, groups: Row) -> Row:
     if len(groups) == len(repeated) and all(groups):  # blanks between them are no cells
         places = dict(zip(repeated, groups, strict=True))
         groups = [places.get(k, "") for k in range(len(names))]
-    elif repeated and len(groups) == len(names) - 1 and all(groups) and _begin_alike(names, ["", *groups]):
+    elif repeated and len(groups) == len(names) - 1 and all(groups) and _begin_as_first(names, ["", *groups]):
         groups = ["", *groups]  # that of the time is blank
     if abs(len(groups) - len(names)) > 1:
         return names
@@ -322,7 +322,7 @@ def _join_groups(names: Row, groups: Row) -> Row:
     return joined if repeated and not _repeat(joined) else names
 
 
-def _begin_alike(names: Row, groups: Row) -> bool:
+def _begin_as_first(names: Row, groups: Row) -> bool:
     """Return whether each group with names that repeat begins with the first of these."""
     pairs = list(zip(names, groups, strict=True))
     first = next(name for name in names if names.count(name) > 1)
