@@ -1,8 +1,9 @@
 """Joints by their names: families of columns that share a name except for a number or an axis.
 
 1. `find_families`: the columns that match patterns of the vocabulary, without words for measured, commanded.
-2. `find_joints`: by the names of the robot's joints or of a known arm; by a word and a number; by a word for
-   positions that all share; by their units. Of several groups those measured are read; else it is a question.
+2. `find_joints`: by the names of the robot's joints or of a known arm; by a word and a number; by parts of an
+   arm; by a word for positions that all share; by their units. Of several groups those measured are read;
+   else it is a question.
 3. `named_after`, `family_of`: names and numbers of joints, which their rates share.
 4. `proved_by_rates`: families without known words, one of which steps as another one says.
 """
@@ -304,19 +305,14 @@ def _of_parts(free: Sequence[Column]) -> tuple[Column, ...]:
     """Return the columns whose names are those of the joints of an arm by its parts: forearm_roll_joint."""
     columns = [column for column in _not_commanded(of_first_kind(_candidates(free))) if _part(column) >= 0]
     are_joints = all("joint" in column.words for column in columns)
-    words = vocabulary().joint_terms["position"] | vocabulary().part_motions
+    words = vocabulary().joint_terms["position"] | vocabulary().part_motions | {"", "j"}
 
     def is_joint(column: Column) -> bool:
         remaining = vocabulary().parts[_part(column)].sub("_", column.bare).split("_")
-        return are_joints or all(_is_of_joint(word, words) for word in remaining)
+        unknown = {word.strip("0123456789") for word in remaining} - words
+        return are_joints or all(map(vocabulary().arms.fullmatch, unknown))
 
     return tuple(filter(is_joint, columns))
-
-
-def _is_of_joint(word: str, words: frozenset[str]) -> bool:
-    """Return whether a word of a name, without its number, is of a joint, an arm or a side."""
-    plain = word.strip("0123456789")
-    return not plain or plain in words or plain == "j" or bool(vocabulary().arms.fullmatch(plain))
 
 
 def _lacks_parts(columns: Sequence[Column], free: Sequence[Column]) -> bool:

@@ -80,6 +80,7 @@ from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 
 GIVEN = "given as an option"  # evidence of columns that the user named
 MAX_POSITIONS = 6  # choices of x, y, z in a question
+_TWIST = re.compile(r"(?:^|[./])twist[./]")  # the rates of a pose in messages; wrist_twist is a joint
 
 
 @dataclass(frozen=True, slots=True)
@@ -375,7 +376,8 @@ def _path(
     positions = [] if robot else may_be_positions(numeric)
     further += [take(group, "reads a path", parameter="position") for group in positions[:MAX_POSITIONS]]
     of_tool = {column for group in positions for column in group}
-    numeric = [column for column in numeric if column not in of_tool] if len(of_tool) > 2 else numeric
+    if len(of_tool) > 2:  # x and y alone may be joints as well
+        numeric = [column for column in numeric if column not in of_tool]
     raise which_joints(file, none, _may_be(numeric, columns, tables, robot), need, *further)
 
 
@@ -383,7 +385,7 @@ def _may_move(columns: Sequence[Column]) -> list[Column]:
     """Return the columns that may be joints by name and unit: no rates, torques and such."""
     words = vocabulary()
     excluded = words.joint_terms["rate"] | words.joint_terms["acceleration"] | words.other | words.outside
-    free = [column for column in columns if not column.words & excluded]
+    free = [c for c in columns if not c.words & excluded and not _TWIST.search(c.header)]
     return [
         column
         for column in free

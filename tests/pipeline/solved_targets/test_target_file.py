@@ -220,7 +220,7 @@ def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
         f" them; {NAMED}"
     ]
     assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", orientation=("u", "v", "w")) == [
-        "orientation (--orientation): found without a position, allowed: beside x, y, z; --position X,Y,Z"
+        "orientation (--orientation): found without a position, allowed: next to x, y, z; --position X,Y,Z"
         " names x, y, z"
     ]
 

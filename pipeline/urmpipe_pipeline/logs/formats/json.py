@@ -7,8 +7,9 @@ Numbers are read from their text, so that they have the same values as in a CSV 
 
 1. `sniff_records`: JSON lines, and messages as `rostopic echo` prints them, become text with tabs and the
    same line numbers. What is damaged is a row that cannot be read.
-2. `read_document`: any other document becomes a table in memory, and messages name its rows. The forms that
-   pandas writes are known; of arrays of several lengths, or episodes, the user chooses (`array_choice`).
+2. `read_document`: any other document, or a printed array, becomes a table in memory, and messages name its
+   rows. Samples under names that count are in the order of their numbers. The forms that pandas writes are
+   known; of arrays of several lengths, or episodes, the user chooses (`array_choice`).
 """
 
 from __future__ import annotations
@@ -43,14 +44,13 @@ MAX_DIGITS = 17  # decimal digits of a double
 _SEPARATORS = str.maketrans('\t\r\n"', "   '")  # would end a cell or a line of text with tabs
 _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 _BEGINNING = re.compile(r'\s*(?:\[\s*(?:[\[{]|$)|\{\s*")')
-_PRINTED = re.compile(
-    r"\s*(?:\w+ *= *)?(?:(?:\w+\.)?(?:array|tensor)\()?(?=\[\s*\[)"
-)  # by Python, NumPy, PyTorch
-_CALLED = re.compile(r"\s*(?:\w+ *= *)?(?:\w+\.)?(?:array|tensor)\(\[")
-_PRINTED_END = re.compile(r"\](?:,\s*\w+='?[\w.:]+'?)*,?\s*\)?\s*\Z")
+# An array as Python, NumPy or PyTorch prints it, or assigns it to a variable: q = np.array([[0., 1.], [...]])
+_PRINTED = re.compile(r"\s*(?:\w+ *= *)?(?:(?:\w+\.)?(?:array|tensor)\()?(?=\[\s*\[)")
+_CALLED = re.compile(r"\s*(?:\w+ *= *)?(?:\w+\.)?(?:array|tensor)\(\[")  # surely no other text
+_PRINTED_END = re.compile(r"\](?:,\s*\w+='?[\w.:]+'?)*,?\s*\)?\s*\Z")  # ], dtype=float32)
 _LAST_COMMA = re.compile(r",\s*\]")
 _BLANK = re.compile(r"(?<=[\d.\]nf])\s+(?=[-+.\d\[ni])")  # between numbers or rows that no comma parts
-_POINT = re.compile(r"(?<=\d)\.(?!\d)")
+_POINT = re.compile(r"(?<=\d)\.(?!\d)")  # of 1., which JSON has not
 _DOCUMENT = re.compile(r"\s*(?:\[\s*\{|[\[{]\r?\n)")  # no other text begins so
 _YAML_LINE = re.compile(r"\s*+(?:-(?: .*)?|[\w./~]++:(?: .*)?|.*---|-?[\d.][^:]*|[^:]*\],?|#.*)")
 _YAML_NEXT = re.compile(r"^( *+)(?:- )*[\w./~]++: *+\n(?:\1 +\S| *- )", re.MULTILINE)  # a key above its value
