@@ -540,7 +540,7 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
 
 
 def _find_role(column: Column, name: str) -> str | None:
-    """Return what a column says about a joint: by the words next to the joint's name in its name."""
+    """Return the role of a column by the words next to the name of a joint in its name; None without it."""
     around, words = _words_around(column, name), vocabulary().joint_terms
     if around is None or around & vocabulary().other or column.moves_nothing:
         return None

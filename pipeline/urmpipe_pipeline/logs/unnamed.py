@@ -60,7 +60,6 @@ ASSUMED_JOINTS = "assumed-joints"  # warning: all columns of a table without nam
 NO_HEADER = "no header states what they are"
 TWO_TURNS = 720.0, 2.0 * math.tau  # [deg], [rad]: no joint goes further, as clocks, wheels and counts do
 MAX_SELDOM = 0.2  # a column that moves in a smaller share of the rows than others may be a gripper's
-YOUBOT_COLUMNS = 13  # chassis (3), arm (5), wheels (4), gripper, as a scene of CoppeliaSim takes them
 MAX_UNASKED = 7  # columns that are joints where no robot states how many there are; more may be blocks
 
 
@@ -241,7 +240,7 @@ def _joints_among(
     if not blocks and count is None and len(free) <= MAX_UNASKED and not odd.any() and not may_be_path:
         return tuple(free), (), "no header: joints in order"
     groups = [[free[k] for k in block.joints] for block in blocks] + [free[7:]] * (pose is not None)
-    groups += _groups(free, odd, count)  # next to those after a pose, of a base that moves
+    groups += _groups(free, odd, count)  # and the columns after a pose: joints on a base that moves
     doubtful = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
     message = f"{len(free)} columns that no header names"
     message += f", of which {listed(doubtful)} may not be joints" if doubtful else ""
@@ -299,8 +298,7 @@ def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[S
     ]
     starts = [k for k in range(1, len(odd)) if odd[k - 1] and not odd[k]]
     after_odd = [free[k : k + size] for k in starts[:1] for size in USUAL_COUNTS[:2]]
-    base = [free[3:8]] if len(free) == YOUBOT_COLUMNS else []
-    return [*tiles, *near[:1], *base, *after_odd, free]
+    return [*tiles, *near[:1], *after_odd, free]
 
 
 # 4. Plots
